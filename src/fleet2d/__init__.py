@@ -1,0 +1,70 @@
+"""Fleet2D: weeks of a home in a fraction of a second, exactly reproducible.
+
+Heavy parts load when they are first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Algorithm as Algorithm
+    from fleet2d.algorithms.algorithm import Present as Present
+    from fleet2d.algorithms.history import History as History
+    from fleet2d.algorithms.output import RoomDistribution as RoomDistribution
+    from fleet2d.artifacts.reader import Run as Run
+    from fleet2d.artifacts.reader import open_run as open_run
+    from fleet2d.engine.run import reproduce as reproduce
+    from fleet2d.engine.run import run as run
+    from fleet2d.engine.simulation import Simulation as Simulation
+    from fleet2d.entities.behavior import Behavior as Behavior
+    from fleet2d.entities.behavior import Situation as Situation
+    from fleet2d.entities.plan import Plan as Plan
+    from fleet2d.errors import Fleet2DError as Fleet2DError
+    from fleet2d.floorplan.home import Home as Home
+    from fleet2d.floorplan.load import load_floorplan as load_floorplan
+    from fleet2d.floorplan.plan import FloorPlan as FloorPlan
+    from fleet2d.metrics.metric import Metric as Metric
+    from fleet2d.scenario.model import Scenario as Scenario
+    from fleet2d.scenario.model import load_scenario as load_scenario
+    from fleet2d.units import Duration as Duration
+
+__version__ = "0.1.0"
+
+_HOME_OF = {
+    "Algorithm": "algorithms.algorithm",
+    "Behavior": "entities.behavior",
+    "Duration": "units",
+    "Fleet2DError": "errors",
+    "FloorPlan": "floorplan.plan",
+    "History": "algorithms.history",
+    "Home": "floorplan.home",
+    "Metric": "metrics.metric",
+    "Plan": "entities.plan",
+    "Present": "algorithms.algorithm",
+    "RoomDistribution": "algorithms.output",
+    "Run": "artifacts.reader",
+    "Scenario": "scenario.model",
+    "Simulation": "engine.simulation",
+    "Situation": "entities.behavior",
+    "load_floorplan": "floorplan.load",
+    "load_scenario": "scenario.model",
+    "open_run": "artifacts.reader",
+    "reproduce": "engine.run",
+    "run": "engine.run",
+}
+
+__all__ = sorted([*_HOME_OF, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'fleet2d' has no attribute {name!r}")
+    value = getattr(import_module(f"fleet2d.{_HOME_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__

@@ -1,0 +1,83 @@
+"""Algorithms: what learns from the history of a run, and what others may read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import Component
+from fleet2d.engine.streams import Draws, stream_key
+from fleet2d.units import PositiveDuration
+
+if TYPE_CHECKING:
+    from fleet2d.floorplan.home import Home
+
+
+@dataclass(frozen=True)
+class Present:
+    """The state of a run when an algorithm or a metric is updated.
+
+    Attributes:
+        path: The component's path in the scenario, "algorithms.ltp".
+        step: The present step; its history ends with it.
+        time: Its local time.
+        home: The home.
+        users: Names of the users, in the order of their indices.
+        robots: Names of the robots.
+        outputs: The newest output of each algorithm updated before, by name.
+    """
+
+    path: str
+    step: int
+    time: datetime
+    home: "Home"
+    users: tuple[str, ...]
+    robots: tuple[str, ...]
+    outputs: Mapping[str, Any]
+    seed: int
+
+    def random(self, purpose: str) -> Draws:
+        """Return the random draws of this component for a purpose of its own, at this step."""
+        return Draws(np.uint64(stream_key(self.seed, self.path, purpose)), self.step)
+
+
+class Algorithm(Component):
+    """Base of what computes from history and state; a subclass writes `update`.
+
+    It is updated after every full `period`, with the history of exactly that period. What it returns (a
+    RoomDistribution, or a mapping of names to numbers or arrays; None for nothing) is stored as rows of a
+    table of its own, and everybody reads it from the next step on. Run state is set in `start`.
+
+    Example:
+        >>> import numpy as np
+        >>> from fleet2d import Algorithm, RoomDistribution
+        >>> class SightingShare(Algorithm):
+        ...     '''Share of sightings per room.'''
+        ...     def start(self, home):
+        ...         self.counts = np.zeros(len(home.rooms))
+        ...     def update(self, history, state):
+        ...         self.counts += np.bincount(history.observations.room, minlength=len(self.counts))
+        ...         return RoomDistribution(self.counts)
+        >>> SightingShare(period="30 min").period.total_seconds()
+        1800.0
+    """
+
+    kind: ClassVar[str] = "algorithm"
+
+    period: PositiveDuration = Field(
+        default=timedelta(hours=1), description="how often it is updated"
+    )
+    reads: tuple[str, ...] = Field(
+        default=(), description="algorithms whose output it uses; they are updated before it"
+    )
+
+    def start(self, home: "Home") -> None:
+        """Prepare for a run."""
+
+    def update(self, history: History, state: Present) -> Any:
+        """Take in the history since the last update; return the output, or None."""
+        raise NotImplementedError

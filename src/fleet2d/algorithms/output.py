@@ -1,0 +1,82 @@
+"""What algorithms put out, and how it becomes rows of a table."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fleet2d.errors import ComponentError
+
+
+class RoomDistribution:
+    """A probability for each room: weights that are divided by their sum (uniform if that is zero).
+
+    Attributes:
+        share: float64 (rooms,), sums to one.
+
+    Raises:
+        ComponentError: A weight is negative or not a number.
+
+    Example:
+        >>> RoomDistribution([3, 1, 0, 0]).share
+        array([0.75, 0.25, 0.  , 0.  ])
+    """
+
+    def __init__(self, weights: ArrayLike) -> None:
+        values = np.array(weights, dtype=np.float64)
+        if values.ndim != 1 or not len(values):
+            raise ComponentError(f"a room distribution has one weight per room; found shape {values.shape}")
+        if not (np.isfinite(values).all() and (values >= 0).all()):
+            raise ComponentError(f"a room distribution needs finite weights of at least 0; found {values}")
+        total = values.sum()
+        self.share: NDArray[np.float64] = (
+            values / total if total > 0 else np.full(len(values), 1 / len(values))
+        )
+
+    def __repr__(self) -> str:
+        """Show the shares."""
+        return f"RoomDistribution({self.share.round(4).tolist()})"
+
+
+def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArray[Any]]:
+    """Return an output as columns of equal length: a distribution, one row, or arrays.
+
+    Args:
+        output: A RoomDistribution (columns room, share), a mapping of names to numbers or strings (one
+            row), or a mapping of names to arrays of one length.
+        rooms: The names of the rooms.
+        where: The component's path, for errors.
+
+    Raises:
+        ComponentError: The output is none of these, or holds a number that isn't finite.
+
+    Example:
+        >>> to_columns({"sightings": 3}, [], "algorithms.mine")
+        {'sightings': array([3])}
+    """
+    if isinstance(output, RoomDistribution):
+        if len(output.share) != len(rooms):
+            raise ComponentError(
+                f"{where} put out {len(output.share)} shares, but the home has {len(rooms)} rooms"
+            )
+        return {"room": np.array(rooms, dtype=object), "share": output.share}
+    if not isinstance(output, Mapping) or not output:
+        raise ComponentError(
+            f"{where} put out {output!r}; a RoomDistribution, or a mapping of names to numbers or to"
+            " arrays of one length, is wanted"
+        )
+    columns = {str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()}
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise ComponentError(f"{where} put out arrays of different lengths: {lengths}")
+    for name, values in columns.items():
+        if values.dtype.kind not in "biufO":
+            raise ComponentError(f"{where} put out {name!r} of dtype {values.dtype}; numbers or strings are wanted")
+        if values.dtype.kind == "f" and not np.isfinite(values).all():
+            raise ComponentError(f"{where} put out {name!r} with a value that is not finite: {values}")
+    return columns
+
+
+def _column(values: NDArray[Any]) -> NDArray[Any]:
+    return values.astype(object) if values.dtype.kind == "U" else values

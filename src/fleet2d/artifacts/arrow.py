@@ -1,0 +1,319 @@
+"""Between chunks and Arrow: schemas, tables, Parquet files."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, empty_chunk
+from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
+from fleet2d.errors import ArtifactError
+
+PARTIAL = ".partial"
+"""What the name of a file ends in until the file is whole."""
+
+_TYPES = {
+    "step": pa.int64(),
+    "time": pa.timestamp("us"),
+    "int32": pa.int32(),
+    "int64": pa.int64(),
+    "float64": pa.float64(),
+    "bool": pa.bool_(),
+    "category": pa.dictionary(pa.int32(), pa.string()),
+    "string": pa.string(),
+}
+
+
+def schema_of(spec: TableSpec) -> pa.Schema:
+    """Return the Arrow schema, which carries all that the spec says."""
+    fields = [
+        pa.field(column.name, _TYPES[column.kind], column.nullable, _metadata(column))
+        for column in spec.columns
+    ]
+    return pa.schema(fields, {"fleet2d.table": spec.name, "description": spec.description})
+
+
+def spec_of(schema: pa.Schema) -> TableSpec:
+    """Return the spec that a schema of ours carries.
+
+    Raises:
+        ArtifactError: The schema is not one that `schema_of` made.
+    """
+    try:
+        columns = [_column_of(field) for field in schema]
+        name = schema.metadata[b"fleet2d.table"].decode()
+        return TableSpec(name, tuple(columns), schema.metadata[b"description"].decode())
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError("this table was not stored by Fleet2D: read it with pyarrow") from error
+
+
+def _metadata(column: Column) -> dict[str, str]:
+    metadata: dict[str, str] = {"kind": column.kind}
+    if column.unit:
+        metadata["unit"] = column.unit
+    if column.description:
+        metadata["description"] = column.description
+    if column.categories:
+        metadata["categories"] = json.dumps(column.categories)
+    return metadata
+
+
+def _column_of(field: pa.Field) -> Column:
+    said = {key.decode(): value.decode() for key, value in field.metadata.items()}
+    return Column(
+        field.name,
+        cast(Kind, said["kind"]),  # Column refuses what is none
+        unit=said.get("unit", ""),
+        nullable=field.nullable,
+        categories=tuple(json.loads(said.get("categories", "[]"))),
+        description=said.get("description", ""),
+    )
+
+
+def table_of(
+    chunks: Sequence[tuple[Chunk, int]],
+    spec: TableSpec,
+    words: Mapping[str, Words],
+    schema: pa.Schema | None = None,
+) -> pa.Table:
+    """Return chunks, each with its number of rows, as one Arrow table."""
+    columns = []
+    for column in spec.columns:
+        names: Sequence[str] = column.categories
+        if column.is_growing:
+            names = words[column.name].listed()
+        dictionary = pa.array(names, pa.string()) if column.kind == "category" else None
+        parts = [_array_of(chunk[column.name], column, dictionary) for chunk, _ in chunks]
+        columns.append(pa.chunked_array(parts, _TYPES[column.kind]))
+    return pa.Table.from_arrays(columns, schema=schema or schema_of(spec))
+
+
+def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -> pa.Array:
+    """Wrap the values of a column, without a copy where Arrow allows it."""
+    missing = None if chunk.valid is None or chunk.valid.all() else ~chunk.valid
+    if chunk.lengths is not None:
+        ends = np.zeros(len(chunk.lengths) + 1, np.int64)
+        np.cumsum(chunk.lengths, out=ends[1:])
+        buffers = [pa.py_buffer(ends), pa.py_buffer(np.ascontiguousarray(chunk.values))]
+        bitmap = None if missing is None else pa.array(~missing).buffers()[1]
+        strings = pa.LargeStringArray.from_buffers(len(chunk.lengths), *buffers, bitmap)
+        return strings.cast(pa.string())
+    if dictionary is not None:
+        codes = pa.array(chunk.values, pa.int32(), mask=missing)
+        return pa.DictionaryArray.from_arrays(codes, dictionary)
+    values = chunk.values.view("datetime64[us]") if column.kind == "time" else chunk.values
+    return pa.array(values, _TYPES[column.kind], mask=missing)
+
+
+def chunks_of(
+    table: pa.Table, spec: TableSpec, words: Mapping[str, Words]
+) -> Iterator[tuple[Chunk, int]]:
+    """Yield the rows of a table as chunks, and the number of rows of each.
+
+    Raises:
+        ArtifactError: The table's columns are not those of the spec.
+    """
+    if tuple(table.column_names) != spec.names:
+        raise ArtifactError(
+            f"table {spec.name!r} should have the columns {', '.join(spec.names)}, "
+            f"but has {', '.join(table.column_names)}"
+        )
+    for batch in table.to_batches():
+        chunk = {
+            column.name: _chunk_of(batch.column(i), column, words)
+            for i, column in enumerate(spec.columns)
+        }
+        yield chunk, batch.num_rows
+
+
+def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> ColumnChunk:
+    """Bring an Arrow array to the form that is hashed: nulls are zero."""
+    if not len(array):
+        return empty_chunk(column)
+    valid = array.is_valid().to_numpy(zero_copy_only=False) if column.nullable else None
+    if column.kind == "category":
+        return ColumnChunk(_codes_of(array, column, words), valid)
+    if column.kind == "string":
+        strings = array.cast(pa.large_string()).fill_null("")
+        ends = np.frombuffer(strings.buffers()[1], np.int64)[strings.offset :][: len(strings) + 1]
+        data = strings.buffers()[2]
+        text = np.empty(0, np.uint8) if data is None else np.frombuffer(data, np.uint8)
+        return ColumnChunk(text[ends[0] : ends[-1]], valid, np.diff(ends))
+    if column.kind == "time":
+        array = array.cast(pa.timestamp("us")).cast(pa.int64())
+    if array.null_count:
+        array = array.fill_null(False if column.kind == "bool" else 0)
+    values = array.to_numpy(zero_copy_only=False)
+    return ColumnChunk(values.astype(DTYPES[column.kind], casting="safe", copy=False), valid)
+
+
+def _codes_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> Any:
+    """Return codes into the column's own dictionary, whatever dictionary the array has."""
+    if not pa.types.is_dictionary(array.type):
+        array = array.dictionary_encode()
+    local = array.dictionary.to_pylist()
+    if local == list(column.categories):
+        return array.indices.fill_null(0).to_numpy(zero_copy_only=False)
+    known: dict[str, int] = {name: code for code, name in enumerate(column.categories)}
+    codes = array.indices.fill_null(-1).to_numpy(zero_copy_only=False)
+    used, first = np.unique(codes[codes >= 0], return_index=True)
+    own = np.zeros(len(local) + 1, np.int32)  # the last one is for -1, a missing value
+    for code in used[np.argsort(first, kind="stable")]:
+        name = local[code]
+        if not column.is_growing and name not in known:
+            raise ArtifactError(f"column {column.name!r} has no category {name!r}")
+        own[code] = words[column.name][name] if column.is_growing else known[name]
+    return own[codes]
+
+
+class ParquetTable:
+    """One table's file on its way: written as `NAME.parquet.partial`, renamed when whole."""
+
+    def __init__(self, directory: Path, spec: TableSpec) -> None:
+        """Create the partial file.
+
+        Raises:
+            OSError: The file can't be created.
+        """
+        self.spec = spec
+        self.path = directory / f"{spec.name}.parquet"
+        self.partial = directory / f"{spec.name}.parquet{PARTIAL}"
+        self._is_published = False
+        self._schema = schema_of(spec)
+        sorted_kinds = ("step", "time")
+        self._writer = pq.ParquetWriter(
+            self.partial,
+            self._schema,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=[c.name for c in spec.columns if c.kind in ("category", "string")],
+            column_encoding={
+                c.name: "DELTA_BINARY_PACKED" for c in spec.columns if c.kind in sorted_kinds
+            },
+        )
+
+    def write(self, chunk: Chunk, rows: int, words: Mapping[str, Words]) -> None:
+        """Write one row group."""
+        table = table_of([(chunk, rows)], self.spec, words, self._schema)
+        self._writer.write_table(table, row_group_size=max(rows, 1))
+
+    def finish(self) -> None:
+        """End the file and see it onto the disk; it keeps its partial name."""
+        if self._is_published:
+            return
+        self._writer.close()
+        handle = os.open(self.partial, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    def publish(self) -> None:
+        """Give the finished file its name."""
+        if not self._is_published:
+            os.replace(self.partial, self.path)
+            self._is_published = True
+
+    def abandon(self) -> None:
+        """Let go of the file, which stays partial."""
+        try:
+            self._writer.close()
+        except OSError:  # the disk is still full
+            self._writer.is_open = False
+
+    def empty(self) -> bool:
+        """Give back the disk space of a file that is lost; return whether that worked."""
+        try:
+            os.truncate(self.partial, 0)
+        except OSError:
+            return False
+        return True
+
+
+def read_parquet(path: Path) -> pa.Table:
+    """Read a table; its categories are whole, in their order, and the same in every chunk.
+
+    Raises:
+        ArtifactError: The file is missing, cut off or otherwise damaged.
+    """
+    with _opened(path) as file:
+        try:
+            table = file.read()
+        except (OSError, pa.ArrowException) as error:
+            raise _damaged(path, error) from error
+    return with_categories(table)
+
+
+def read_row_groups(path: Path) -> Iterator[pa.Table]:
+    """Yield a table a row group at a time, the first without rows, so that memory stays small."""
+    with _opened(path) as file:
+        yield file.schema_arrow.empty_table()
+        for group in range(file.num_row_groups):
+            try:
+                part = file.read_row_group(group)
+            except (OSError, pa.ArrowException) as error:
+                raise _damaged(path, error) from error
+            yield part
+
+
+def count_rows(path: Path) -> int:
+    """Return the number of rows that the file says it has.
+
+    Raises:
+        ArtifactError: The file is missing or cut off.
+    """
+    with _opened(path) as file:
+        return int(file.metadata.num_rows)
+
+
+def _opened(path: Path) -> pq.ParquetFile:
+    try:
+        return pq.ParquetFile(path)
+    except FileNotFoundError as error:
+        raise ArtifactError(
+            f"{path} is missing: the run directory was changed; run the scenario again"
+        ) from error
+    except (OSError, pa.ArrowException) as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> ArtifactError:
+    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return ArtifactError(
+        f"{path} is damaged or cut off ({reason}): copy the run again from where it was whole, "
+        "or run the scenario again"
+    )
+
+
+def with_categories(table: pa.Table) -> pa.Table:
+    """Give every chunk of a category column the same dictionary: all categories, in order."""
+    spec = spec_of(table.schema)
+    for i, column in enumerate(spec.columns):
+        if column.kind != "category":
+            continue
+        words = {column.name: Words()}
+        arrays = table.column(i).chunks
+        codes = [_codes_of(array, column, words) for array in arrays]
+        names = words[column.name].listed() if column.is_growing else column.categories
+        dictionary = pa.array(names, pa.string())
+        parts = [
+            pa.DictionaryArray.from_arrays(
+                pa.array(own, pa.int32(), mask=_missing(array)), dictionary
+            )
+            for own, array in zip(codes, arrays, strict=True)
+        ]
+        table = table.set_column(
+            i, table.schema.field(i), pa.chunked_array(parts, _TYPES["category"])
+        )
+    return table
+
+
+def _missing(array: pa.Array) -> Any:
+    return array.is_null().to_numpy(zero_copy_only=False) if array.null_count else None

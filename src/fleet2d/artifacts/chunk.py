@@ -1,0 +1,79 @@
+"""Chunks of a table: consecutive rows in the one form that is both hashed and stored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.table import DTYPES, Column
+from fleet2d.errors import ArtifactError
+
+
+class ColumnChunk(NamedTuple):
+    """Consecutive values of one column, in the one form that is both hashed and stored.
+
+    Attributes:
+        values: Numbers or category codes, (n,), 0 where missing; for strings their UTF-8 bytes.
+        valid: Which values are there, (n,) bool; None if the column isn't nullable.
+        lengths: Bytes of each string, (n,) int64; None for every other kind.
+    """
+
+    values: NDArray[Any]
+    valid: NDArray[np.bool_] | None = None
+    lengths: NDArray[np.int64] | None = None
+
+
+Chunk = dict[str, ColumnChunk]
+
+
+class Words(dict[str | None, int]):
+    """A growing dictionary: looking up a new word gives it the next code.
+
+    Example:
+        >>> words = Words()
+        >>> words["on"], words["off"], words["on"], words.listed()
+        (0, 1, 0, ['on', 'off'])
+    """
+
+    def __missing__(self, word: str | None) -> int:
+        """Enter a word that was not there."""
+        if not isinstance(word, str):
+            raise ArtifactError(f"{word!r} is no string")
+        self[word] = code = len(self) - (None in self)
+        return code
+
+    def listed(self) -> list[str]:
+        """All words in the order of their codes."""
+        return [word for word in self if word is not None]
+
+
+def empty_chunk(column: Column) -> ColumnChunk:
+    """Return no values of a column."""
+    valid = np.empty(0, np.bool_) if column.nullable else None
+    if column.kind == "string":
+        return ColumnChunk(np.empty(0, np.uint8), valid, np.empty(0, np.int64))
+    return ColumnChunk(np.empty(0, DTYPES[column.kind]), valid)
+
+
+def encode_strings(strings: Sequence[str | None], nullable: bool) -> ColumnChunk:
+    """Turn strings into their UTF-8 bytes and the length of each."""
+    valid = _are_there(strings) if nullable else None
+    encoded = [string.encode() if string else b"" for string in strings]
+    lengths = np.fromiter(map(len, encoded), np.int64, len(encoded))
+    return ColumnChunk(np.frombuffer(b"".join(encoded), np.uint8), valid, lengths)
+
+
+def encode_words(strings: Sequence[str | None], words: Words, nullable: bool) -> ColumnChunk:
+    """Turn strings into codes, entering new ones into `words`."""
+    valid = _are_there(strings) if nullable else None
+    if nullable:
+        words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
+    codes = np.fromiter(map(words.__getitem__, strings), np.int32, len(strings))
+    return ColumnChunk(codes, valid)
+
+
+def _are_there(strings: Sequence[str | None]) -> NDArray[np.bool_]:
+    return np.fromiter((string is not None for string in strings), np.bool_, len(strings))

@@ -1,0 +1,138 @@
+"""Content digests: what a table holds, whatever its chunks, compression and file bytes are."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words
+from fleet2d.artifacts.table import Column, TableSpec
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+class TableDigest:
+    """SHA-256 of a table's content, taken chunk by chunk.
+
+    Values, validity and string lengths of a column have a hash each, so that it doesn't matter
+    where one chunk ends and the next begins.
+    """
+
+    def __init__(self, spec: TableSpec) -> None:
+        """Start with no rows."""
+        self.spec = spec
+        self.rows = 0
+        self._columns = [_ColumnDigest(column) for column in spec.columns]
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> TableDigest:
+        """Copy the state of the hashes, which the copy module can't."""
+        twin = TableDigest(self.spec)
+        twin.rows = self.rows
+        twin._columns = [column.copy() for column in self._columns]
+        return twin
+
+    def update(self, chunk: Chunk, rows: int) -> None:
+        """Take in the next `rows` rows."""
+        for column in self._columns:
+            column.update(chunk[column.name])
+        self.rows += rows
+
+    def hexdigest(self, words: Mapping[str, Words] | None = None) -> str:
+        """Return the digest of all rows so far.
+
+        Args:
+            words: The dictionaries of the columns whose dictionary grows.
+        """
+        columns = [
+            (
+                column.name,
+                column.kind,
+                column.nullable,
+                digest.hexdigest(
+                    words[column.name].listed()
+                    if words and column.is_growing
+                    else column.categories
+                ),
+            )
+            for column, digest in zip(self.spec.columns, self._columns, strict=True)
+        ]
+        return _sha256_of([self.spec.name, self.rows, columns])
+
+
+class _ColumnDigest:
+    """The hashes of one column: its values, which are there, and how long strings are."""
+
+    def __init__(self, column: Column) -> None:
+        self.name = column.name
+        self._hashes = [hashlib.sha256() for _ in range(3)]
+
+    def copy(self) -> _ColumnDigest:
+        twin = object.__new__(_ColumnDigest)
+        twin.name = self.name
+        twin._hashes = [kept.copy() for kept in self._hashes]
+        return twin
+
+    def update(self, chunk: ColumnChunk) -> None:
+        for kept, values in zip(self._hashes, chunk, strict=True):
+            if values is not None and len(values):
+                kept.update(_little_endian(values))
+
+    def hexdigest(self, categories: Sequence[str]) -> str:
+        return _sha256_of([[kept.hexdigest() for kept in self._hashes], list(categories)])
+
+
+def run_digest(tables: Mapping[str, str]) -> str:
+    """Return the digest of a run from the digests of its tables.
+
+    Example:
+        >>> run_digest({"a": "1", "b": "2"}) == run_digest({"b": "2", "a": "1"})
+        True
+    """
+    return _sha256_of(sorted(tables.items()))
+
+
+def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
+    """Return the digest of a table in memory.
+
+    Args:
+        table: A table as read back from a run.
+        spec: What the table should be; None takes it from the table's own schema.
+
+    Raises:
+        ArtifactError: The table's columns are not those of the spec.
+    """
+    return digest_tables([table], spec)
+
+
+def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> str:
+    """Return the digest of a table that comes in parts, row after row."""
+    from fleet2d.artifacts.arrow import chunks_of, spec_of
+
+    digest: TableDigest | None = None
+    words: dict[str, Words] = {}
+    for part in parts:
+        if digest is None:
+            spec = spec or spec_of(part.schema)
+            digest = TableDigest(spec)
+            words = {column.name: Words() for column in spec.columns if column.is_growing}
+        for chunk, rows in chunks_of(part, digest.spec, words):
+            digest.update(chunk, rows)
+    if digest is None:
+        raise ValueError("a table needs at least one part, if only one without rows")
+    return digest.hexdigest(words)
+
+
+def _little_endian(values: NDArray[Any]) -> memoryview:
+    values = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
+    return values.view(np.uint8).data
+
+
+def _sha256_of(content: Any) -> str:
+    """Hash nested lists of strings and numbers, unambiguously."""
+    return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()

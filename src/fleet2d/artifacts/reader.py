@@ -1,0 +1,274 @@
+"""Reading a run back: its manifest, its tables, and whether they are what was stored."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.artifacts.digest import digest_table, digest_tables, run_digest
+from fleet2d.artifacts.manifest import FILE_NAME, Manifest, plain
+from fleet2d.errors import ArtifactError, RunDirectoryError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+
+    from fleet2d.engine.rebuild import Path as EntityPath
+    from fleet2d.floorplan.plan import FloorPlan
+
+
+FLOORPLAN_NAME = "floorplan.json"
+"""The floor plan in a run directory, in our own format."""
+
+
+class Tables(Mapping[str, "pa.Table"]):
+    """Tables by name, each read when it is first asked for."""
+
+    def __init__(self, names: Sequence[str], read: Callable[[str], pa.Table]) -> None:
+        """Read nothing yet."""
+        self._names = tuple(names)
+        self._read = read
+        self._loaded: dict[str, pa.Table] = {}
+
+    def __getitem__(self, name: str) -> pa.Table:
+        """Return a table.
+
+        Raises:
+            KeyError: The run has no such table.
+            ArtifactError: Its file can't be read.
+        """
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._loaded:
+            self._loaded[name] = self._read(name)
+        return self._loaded[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether the run has such a table."""
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of tables."""
+        return len(self._names)
+
+    def __repr__(self) -> str:
+        """Name the tables."""
+        return f"Tables({', '.join(self._names)})"
+
+
+class Run:
+    """A run that is over: what was run, and what it stored.
+
+    Attributes:
+        directory: Where it is stored; None for a run in memory.
+        manifest: The content of `manifest.json`.
+        tables: The tables by name, read when first asked for.
+        notes: Remarks in plain words, such as what is missing after a crash.
+    """
+
+    def __init__(
+        self,
+        directory: Path | None,
+        manifest: Manifest,
+        names: Sequence[str],
+        read: Callable[[str], pa.Table],
+        notes: Sequence[str] = (),
+    ) -> None:
+        """Read nothing yet; `open_run` and `RunStore.run` make runs."""
+        self.directory = directory
+        self.manifest: dict[str, Any] = plain(asdict(manifest))
+        self.tables = Tables(names, read)
+        self.notes = [*manifest.notes, *notes]
+        self._plan: FloorPlan | None = None
+
+    def __repr__(self) -> str:
+        """Say where the run is and how it ended."""
+        where = "in memory" if self.directory is None else str(self.directory)
+        return f"<Run {where}: {self.status}, tables {', '.join(self.tables)}>"
+
+    @property
+    def status(self) -> str:
+        """How it ended: complete, interrupted, failed, or running (still, or until a crash)."""
+        return str(self.manifest["status"])
+
+    @property
+    def digest(self) -> str | None:
+        """Digest of all tables; None if the run was never closed."""
+        digest = self.manifest["digest"]
+        return None if digest is None else str(digest)
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """Summary of the metrics."""
+        return dict(self.manifest["metrics"])
+
+    @property
+    def plan(self) -> FloorPlan:
+        """The floor plan it ran in.
+
+        Raises:
+            ArtifactError: The run directory holds none.
+        """
+        if self._plan is None:
+            from fleet2d.floorplan.native import read_native
+
+            path = (self.directory or Path()) / FLOORPLAN_NAME
+            if not path.exists():
+                raise ArtifactError(f"{path} is missing: the run can't be shown in its home")
+            self._plan = read_native(path, self.manifest["scenario"]["floorplan"]["cell"])
+        return self._plan
+
+    @plan.setter
+    def plan(self, plan: FloorPlan) -> None:
+        self._plan = plan
+
+    def path(self, entity: str, every: timedelta = timedelta(minutes=1)) -> EntityPath:
+        """Return where a user or robot was, every so often, rebuilt exactly from key frames.
+
+        Args:
+            entity: Its name.
+            every: Time between two poses, a multiple of the step.
+
+        Raises:
+            ArtifactError: The run stored no key frames, there is no such body, or `every` doesn't fit.
+        """
+        from fleet2d.engine.rebuild import rebuild_path
+
+        return rebuild_path(self, self.plan, entity, every)
+
+    def arrow(self, name: str) -> pa.Table:
+        """Return a table as Arrow has it.
+
+        Raises:
+            ArtifactError: The run has no such table, or its file can't be read.
+        """
+        if name not in self.tables:
+            near = difflib.get_close_matches(name, self.tables, 1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise ArtifactError(
+                f"the run has no table {name!r}: {hint}It has {', '.join(self.tables) or 'none'}"
+            )
+        return self.tables[name]
+
+    def pandas(self, name: str) -> pd.DataFrame:
+        """Return a table as a pandas data frame.
+
+        Raises:
+            ArtifactError: pandas is not installed, or see `arrow`.
+        """
+        try:
+            import pandas  # noqa: F401 - only to see whether it is there
+        except ImportError as error:
+            raise _not_installed("pandas") from error
+        return self.arrow(name).to_pandas()
+
+    def polars(self, name: str) -> pl.DataFrame:
+        """Return a table as a polars data frame.
+
+        Raises:
+            ArtifactError: polars is not installed, or see `arrow`.
+        """
+        try:
+            import polars as pl
+        except ImportError as error:
+            raise _not_installed("polars") from error
+        frame = pl.from_arrow(self.arrow(name))
+        assert isinstance(frame, pl.DataFrame)
+        return frame
+
+    def verify(self) -> list[str]:
+        """Compute all digests anew; return the names of the tables that are not as stored.
+
+        The list ends in `manifest.json` if the digest of the whole is not that of its tables.
+
+        Raises:
+            ArtifactError: The run was never closed, so there is nothing to compare with.
+        """
+        if self.digest is None:
+            raise ArtifactError(
+                f"{self.directory or 'the run'} has no digest, for its status is {self.status}: "
+                "there is nothing to compare with"
+            )
+        stored = {name: table["digest"] for name, table in self.manifest["tables"].items()}
+        differing = [name for name in stored if self._digest_of(name) != stored[name]]
+        if run_digest(stored) != self.digest:
+            differing.append(FILE_NAME)
+        return differing
+
+    def _digest_of(self, name: str) -> str | None:
+        """Return the digest of a table as it is now, None if it can't be read."""
+        from fleet2d.artifacts.arrow import read_row_groups
+
+        try:
+            if self.directory is None:
+                return digest_table(self.tables[name])
+            return digest_tables(read_row_groups(self.directory / f"{name}.parquet"))
+        except (ArtifactError, KeyError):
+            return None
+
+
+def open_run(directory: Path | str) -> Run:
+    """Open a stored run for reading.
+
+    A run that crashed or failed opens too, with the tables that are whole; `Run.notes` says what
+    is not.
+
+    Raises:
+        RunDirectoryError: There is no run in that directory, or its manifest is damaged.
+    """
+    from fleet2d.artifacts.arrow import PARTIAL, count_rows, read_parquet
+
+    root = Path(directory)
+    if not root.is_dir():
+        what = "is a file" if root.exists() else "does not exist"
+        raise RunDirectoryError(f"{root} {what}: give the directory that `fleet2d run --out` wrote")
+    manifest = Manifest.read(root)
+    on_disk = {path.name.removesuffix(".parquet") for path in root.glob("*.parquet")}
+    notes = _state_notes(root, manifest, sorted(root.glob(f"*.parquet{PARTIAL}")))
+    names = sorted(on_disk | manifest.tables.keys())
+    readable = []
+    for name in names:
+        try:
+            rows = count_rows(root / f"{name}.parquet")
+        except ArtifactError as error:
+            notes.append(str(error))
+            if name not in manifest.tables:
+                continue
+        else:
+            said = manifest.tables.get(name, {}).get("rows", rows)
+            if rows != said:
+                notes.append(f"table {name!r} has {rows} rows, but {said} were stored")
+        readable.append(name)
+    return Run(root, manifest, readable, lambda name: read_parquet(root / f"{name}.parquet"), notes)
+
+
+def _state_notes(root: Path, manifest: Manifest, partial: list[Path]) -> list[str]:
+    """Say what a run lacks that did not end as it should."""
+    notes = []
+    if manifest.status == "running":
+        notes.append(
+            f"{root} was not closed: the run crashed, or is still going on; only tables that "
+            "are whole can be read"
+        )
+    if manifest.status == "interrupted":
+        notes.append(f"{root} was interrupted: it holds what was stored until then")
+    if manifest.status == "failed" and not manifest.notes:
+        notes.append(f"{root} failed: it holds what was stored until then")
+    if partial:
+        notes.append(f"cut off and not readable: {', '.join(path.name for path in partial)}")
+    return notes
+
+
+def _not_installed(package: str) -> ArtifactError:
+    return ArtifactError(
+        f"{package} is not installed: `pip install {package}`, or use .arrow(name)"
+    )

@@ -1,0 +1,48 @@
+"""What a run stores: the `artifacts` section of a scenario."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from fleet2d.component import Settings
+from fleet2d.units import PositiveDuration
+
+
+def _off_is_a_word(value: Any) -> Any:
+    """Undo YAML 1.1, where a bare `off` is the truth value false."""
+    return "off" if value is False else value
+
+
+class ArtifactSettings(Settings):
+    """Which tables a run stores, and how finely.
+
+    Example:
+        >>> ArtifactSettings(trajectories="off", events=False).observations
+        True
+    """
+
+    trajectories: Annotated[
+        PositiveDuration | Literal["off", "every step"], BeforeValidator(_off_is_a_word)
+    ] = Field(
+        default=timedelta(hours=1),
+        description="Store every entity's pose this often (a multiple of simulation.step), "
+        "at `every step`, or not at all (`off`).",
+    )
+    key_frames: bool = Field(
+        default=True,
+        description="Store the key frames of every movement: few rows, from which the pose at "
+        "any step can be rebuilt.",
+    )
+    observations: bool = Field(
+        default=True, description="Store every observation that a robot makes."
+    )
+    events: bool = Field(
+        default=True,
+        description="Store events: a user seen or lost, an arrival, a change of activity.",
+    )
+    outputs: bool = Field(
+        default=True, description="Store what algorithms and metrics put out, one table each."
+    )

@@ -1,0 +1,360 @@
+"""The run store: takes rows while a run goes on, and leaves a run directory that can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.artifacts.buffer import FLUSH_ROWS, TableBuffer
+from fleet2d.artifacts.chunk import Chunk
+from fleet2d.artifacts.digest import TableDigest, run_digest
+from fleet2d.artifacts.directory import (
+    cannot_write,
+    check_run_directory,
+    is_disk_full,
+    make_directories,
+    remove_directories,
+    sync_directory,
+)
+from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status
+from fleet2d.artifacts.table import TableSpec
+from fleet2d.errors import ArtifactError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from fleet2d.artifacts.arrow import ParquetTable
+    from fleet2d.artifacts.reader import Run
+
+
+@dataclass
+class _Table:
+    """One table on its way: what waits, what is kept, and the digest so far."""
+
+    buffer: TableBuffer
+    digest: TableDigest
+    kept: list[tuple[Chunk, int]] = field(default_factory=list)
+    file: ParquetTable | None = None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Table:
+        """Copy what changes; chunks that are kept never do."""
+        return _Table(deepcopy(self.buffer, memo), deepcopy(self.digest, memo), list(self.kept))
+
+
+class RunStore:
+    """Tables of a run, in a directory or in memory.
+
+    Files are called `NAME.parquet.partial` until they are whole and on the disk. Only then are
+    they renamed, and only after that does the manifest say that the run is done: however the
+    process ends, a file called `NAME.parquet` is whole.
+
+    Attributes:
+        directory: Where the run is stored; None keeps it in memory.
+        manifest: What `manifest.json` will hold. The engine fills it in; status, tables and
+            digest are the store's.
+
+    Example:
+        >>> from fleet2d.artifacts.table import Column
+        >>> spec = TableSpec("events", (Column("step", "step"), Column("what", "category")))
+        >>> store = RunStore(None, [spec])
+        >>> store.append("events", step=[0, 5], what=["seen", "lost"])
+        >>> _ = store.close()
+        >>> store.run().tables["events"].num_rows
+        2
+    """
+
+    def __init__(
+        self,
+        directory: Path | str | None,
+        specs: Iterable[TableSpec] = (),
+        manifest: Manifest | None = None,
+        *,
+        flush_rows: int = FLUSH_ROWS,
+    ) -> None:
+        """Touch nothing yet: `open` does."""
+        self.directory = None if directory is None else Path(directory)
+        self.manifest = manifest or Manifest()
+        self._root = None if self.directory is None else self.directory.absolute()
+        self._flush_rows = flush_rows
+        self._tables: dict[str, _Table] = {}
+        self._made: list[Path] = []
+        self._digests: dict[str, str] | None = None
+        self._is_open = directory is None
+        self._failure: ArtifactError | None = None
+        for spec in specs:
+            self.add_table(spec)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> RunStore:
+        """Branch a run that is stored in memory.
+
+        Raises:
+            ArtifactError: The run is stored in a directory, which can't be in two states.
+        """
+        if self.directory is not None:
+            raise ArtifactError(
+                f"a simulation that stores in {self.directory} can't be copied, for both would "
+                "write there: branch a simulation that stores in memory"
+            )
+        twin = RunStore(None, (), deepcopy(self.manifest, memo), flush_rows=self._flush_rows)
+        twin._tables = {name: deepcopy(table, memo) for name, table in self._tables.items()}
+        twin._digests = deepcopy(self._digests, memo)
+        return twin
+
+    def check(self) -> None:
+        """Say, without writing, that the directory can't be used: worth asking before set-up.
+
+        Raises:
+            RunDirectoryError: It exists and holds something, is a file, or can't be written.
+        """
+        if self.directory is not None:
+            check_run_directory(self.directory)
+
+    def open(self) -> None:
+        """Make the directory and its manifest, with the status `running`.
+
+        Raises:
+            RunDirectoryError: The directory can't be used; nothing is left behind.
+            ArtifactError: The disk is full.
+        """
+        if self._is_open or self.directory is None or self._root is None:
+            return
+        self.check()
+        try:
+            self._made = make_directories(self._root)
+            self._is_open = True
+            self.manifest.status = "running"
+            self.manifest.write(self._root)
+        except OSError as error:
+            self.discard()
+            raise cannot_write(self.directory, error) from error
+
+    def add_table(self, spec: TableSpec) -> None:
+        """Add a table, at any time before the run is closed; one that is there may come again.
+
+        Raises:
+            ArtifactError: Another table has that name, or the run is closed.
+        """
+        self._check_usable()
+        known = self._tables.get(spec.name)
+        if known is None:
+            self._tables[spec.name] = _Table(TableBuffer(spec, self._flush_rows), TableDigest(spec))
+        elif known.buffer.spec != spec:
+            raise ArtifactError(
+                f"there is a table {spec.name!r} with other columns already: name yours otherwise"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the tables, as they were added."""
+        return tuple(self._tables)
+
+    def append(self, table: str, **columns: Any) -> None:
+        """Add rows to a table; arrays are copied, and may be used again.
+
+        Args:
+            table: The name of a table that was added.
+            columns: One array per column, all of one length; a scalar stands for all rows.
+
+        Raises:
+            ArtifactError: The columns don't fit the table, or it can't be written.
+        """
+        self._check_usable()
+        if not self._is_open:
+            raise ArtifactError("the run directory is not open: call open() before append()")
+        if table not in self._tables:
+            raise ArtifactError(f"there is no table {table!r}: add_table() it first")
+        entry = self._tables[table]
+        checked = entry.buffer.check(columns)
+        start = 0
+        while start < checked.rows:
+            start = entry.buffer.fill(checked, start)
+            if entry.buffer.is_full:
+                self._flush(entry)
+
+    def arrow(self, table: str) -> pa.Table:
+        """Return a table of a run in memory, up to the last row appended.
+
+        Raises:
+            ArtifactError: There is no such table, or the run is stored in a directory.
+        """
+        from fleet2d.artifacts.arrow import table_of
+
+        if self.directory is not None:
+            raise ArtifactError(
+                f"the run is stored in {self.directory}: close it, and read it by open_run()"
+            )
+        if table not in self._tables:
+            raise ArtifactError(f"there is no table {table!r}, only {', '.join(self._tables)}")
+        entry = self._tables[table]
+        self._flush(entry)
+        return table_of(entry.kept, entry.buffer.spec, entry.buffer.words)
+
+    def close_tables(self) -> dict[str, str]:
+        """Write what waits, make all files whole, and return the digest of each table.
+
+        Raises:
+            ArtifactError: They can't be written; the run is marked as failed.
+        """
+        self._check_failure()
+        if self._digests is not None:
+            return self._digests
+        for entry in self._tables.values():
+            self._flush(entry)
+        if self._root is not None:
+            self._finish_files(self._root)
+        self._digests = {
+            name: entry.digest.hexdigest(entry.buffer.words) for name, entry in self._tables.items()
+        }
+        return self._digests
+
+    def close(self, status: Status = "complete") -> dict[str, str]:
+        """End the run: close the tables if that is still to do, then write the manifest.
+
+        Returns:
+            The digest of each table; the run's own is in `manifest.digest`.
+
+        Raises:
+            ArtifactError: The run can't be written; it is marked as failed.
+        """
+        if self._failure is None and not self._is_open:
+            raise ArtifactError("the run directory is not open: call open() before close()")
+        digests = self.close_tables()
+        self.manifest.status = status
+        self.manifest.tables = {name: self._described(name) for name in sorted(digests)}
+        self.manifest.digest = run_digest(digests)
+        if self._root is not None:
+            with self._writing(FILE_NAME):
+                self.manifest.write(self._root)
+                sync_directory(self._root)
+        return digests
+
+    def abandon(self) -> dict[str, str]:
+        """End a run that was interrupted: what was stored until now stays readable."""
+        return self.close("interrupted")
+
+    def discard(self) -> None:
+        """Take back everything that was made, for a run that failed before its first step."""
+        for entry in self._tables.values():
+            if entry.file is not None:
+                entry.file.abandon()
+        if self._root is not None and self._is_open:
+            names = [name for table in self._tables for name in _file_names(table)]
+            for name in (FILE_NAME, f"{FILE_NAME}.partial", *names):
+                with suppress(OSError):
+                    (self._root / name).unlink()
+            remove_directories(self._made)
+        self._is_open = False
+
+    def run(self) -> Run:
+        """Return the closed run for reading."""
+        from fleet2d.artifacts.reader import Run, open_run
+
+        if self._digests is None:
+            raise ArtifactError("the run is not closed yet: close() it before reading it")
+        if self._root is not None:
+            return open_run(self._root)
+        return Run(None, self.manifest, self.names, self.arrow)
+
+    def _flush(self, entry: _Table) -> None:
+        """Hash the rows that wait, and write or keep them."""
+        rows = entry.buffer.rows
+        if not rows:
+            return
+        chunk = entry.buffer.take(reuse=self._root is not None)
+        entry.digest.update(chunk, rows)
+        if self._root is None:
+            entry.kept.append((chunk, rows))
+            return
+        name = entry.buffer.spec.name
+        with self._writing(f"{name}.parquet", entry):
+            self._file_of(entry, self._root).write(chunk, rows, entry.buffer.words)
+
+    def _file_of(self, entry: _Table, root: Path) -> ParquetTable:
+        from fleet2d.artifacts.arrow import ParquetTable
+
+        if entry.file is None:
+            entry.file = ParquetTable(root, entry.buffer.spec)
+        return entry.file
+
+    def _finish_files(self, root: Path) -> None:
+        """Make every file whole before any gets its name."""
+        for name, entry in self._tables.items():
+            with self._writing(f"{name}.parquet", entry):
+                self._file_of(entry, root).finish()
+        for name, entry in self._tables.items():
+            with self._writing(f"{name}.parquet"):
+                self._file_of(entry, root).publish()
+        with self._writing("the directory"):
+            sync_directory(root)
+
+    def _described(self, name: str) -> dict[str, Any]:
+        """Return what the manifest says about a table."""
+        entry = self._tables[name]
+        columns = [
+            {"name": column.name, "kind": column.kind, "unit": column.unit}
+            for column in entry.buffer.spec.columns
+        ]
+        digest = self._digests[name] if self._digests else None
+        return {"rows": entry.digest.rows, "digest": digest, "columns": columns}
+
+    def _check_usable(self) -> None:
+        self._check_failure()
+        if self._digests is not None:
+            raise ArtifactError("the run is closed: nothing more can be stored in it")
+
+    def _check_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    @contextmanager
+    def _writing(self, what: str, entry: _Table | None = None) -> Iterator[None]:
+        """Turn a failed write into the end of the run, marked as failed."""
+        try:
+            yield
+        except OSError as error:
+            reason = f"{what} can't be written ({error.strerror or error})"
+            advice = "Run again with another --out"
+            if is_disk_full(error):
+                reason = f"the disk is full: {what} can't be written"
+                advice = (
+                    "Free some space, or store less (`artifacts:` in the scenario), and run "
+                    "again with another --out"
+                )
+            marked = self._mark_failed(reason, entry)
+            self._failure = ArtifactError(
+                f"{reason}; the run so far is in {self.directory} and "
+                f"{'marked as failed' if marked else 'not marked as complete'}. {advice}"
+            )
+            raise self._failure from error
+
+    def _mark_failed(self, reason: str, entry: _Table | None) -> bool:
+        """Leave the files partial; return whether the manifest could still say so."""
+        for other in self._tables.values():
+            if other.file is not None:
+                other.file.abandon()
+        self.manifest.status = "failed"
+        self.manifest.notes.append(reason)
+        return self._try_manifest() or (
+            # The file is lost; what it takes up is enough for a manifest on a full disk.
+            entry is not None
+            and entry.file is not None
+            and entry.file.empty()
+            and self._try_manifest()
+        )
+
+    def _try_manifest(self) -> bool:
+        if self._root is None:
+            return False
+        try:
+            self.manifest.write(self._root)
+        except OSError:
+            return False
+        return True
+
+
+def _file_names(table: str) -> tuple[str, str]:
+    return f"{table}.parquet", f"{table}.parquet.partial"

@@ -1,0 +1,301 @@
+"""The command line: `fleet2d run`, `validate`, `show` and the rest; see `fleet2d --help`."""
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from fleet2d.errors import Fleet2DError, InputError
+
+if TYPE_CHECKING:
+    from fleet2d.artifacts.reader import Run
+    from fleet2d.engine.simulation import Simulation
+
+_LOADED = time.perf_counter()
+
+app = typer.Typer(
+    help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Arguments = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
+        help="A scenario (left out: the bundled base scenario), and changes to it.",
+    ),
+]
+
+
+@app.command()
+def run(
+    arguments: Arguments = None,
+    seed: Annotated[int | None, typer.Option(help="The seed of all randomness.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Directory for the run.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Simulate a scenario and store the run."""
+    scenario, overrides = _split(arguments)
+    if not quiet:
+        _announce_compilation()
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.scenario.model import load_scenario
+
+    settings = {} if seed is None else {"seed": seed}
+    loaded = load_scenario(scenario, *overrides, **settings)
+    name = loaded.name or (Path(scenario).stem if scenario else "run")
+    simulation = Simulation(loaded, out=out or _fresh_directory(name))
+    try:
+        stored = _run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
+            f" {simulation.directory}",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+    summary = _summary(stored)
+    if as_json:
+        typer.echo(json.dumps(summary))
+    elif not quiet:
+        _print_summary(summary, stored)
+
+
+@app.command()
+def validate(arguments: Arguments = None) -> None:
+    """Check a scenario: its keys, its floor plan, and that everybody can be where they should."""
+    from fleet2d.engine.simulation import Simulation
+
+    scenario, overrides = _split(arguments)
+    simulation = Simulation(scenario, *overrides)
+    plan, settings = simulation.home.plan, simulation.scenario.simulation
+    typer.echo(
+        f"ok: {len(simulation.scenario.users)} users and {len(simulation.scenario.robots)} robots in"
+        f" {plan.name} ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
+        f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
+    )
+    for note in plan.notes:
+        typer.echo(f"note: {note}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of a scenario, for completion in an editor."""
+    from fleet2d.scenario.schema import schema as scenario_schema
+
+    typer.echo(json.dumps(scenario_schema(), indent=2))
+
+
+@app.command()
+def components(
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+) -> None:
+    """List every registered type, with its fields, units and defaults."""
+    from fleet2d.scenario.schema import describe_components
+
+    described = describe_components()
+    if as_json:
+        typer.echo(json.dumps(described, indent=2))
+        return
+    for component in described:
+        typer.echo(f"{component['kind']}: {component['name']}\n    {component['description']}")
+        for field in component["fields"]:
+            default = "required" if field["required"] else f"= {json.dumps(field['default'])}"
+            typer.echo(f"    {field['name']}: {field['type']} {default}")
+            if field["description"]:
+                typer.echo(f"        {field['description']}")
+        typer.echo("")
+
+
+@app.command()
+def show(
+    what: Annotated[
+        Path | None, typer.Argument(metavar="[FLOORPLAN|RUN_DIR]", help="Left out: the bundled home.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Picture to write, .png or .svg.")] = None,
+) -> None:
+    """Draw a floor plan, or a stored run in its home."""
+    if what is not None and (what / "manifest.json").exists():
+        from fleet2d.artifacts.reader import open_run
+        from fleet2d.view.run import draw_run
+
+        target = out or what / "picture.png"
+        draw_run(open_run(what), target)
+    else:
+        from fleet2d.floorplan.load import load_floorplan
+        from fleet2d.view.floorplan import draw_floorplan
+
+        plan = load_floorplan(what) if what else load_floorplan()
+        target = out or Path(f"{plan.name}.png")
+        draw_floorplan(plan, target)
+    typer.echo(target)
+
+
+@app.command()
+def convert(
+    old: Annotated[Path, typer.Argument(help="A configuration of the published Fleet2D.")],
+    new: Annotated[Path, typer.Argument(help="The scenario to write.")],
+) -> None:
+    """Turn a configuration of the published Fleet2D into a scenario."""
+    from fleet2d.scenario.published import convert_file
+
+    for remark in convert_file(old, new):
+        typer.echo(f"note: {remark}")
+    typer.echo(new)
+
+
+@app.command()
+def reproduce(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+) -> None:
+    """Run a stored run again from its manifest, and compare."""
+    from fleet2d.engine.run import reproduce as run_again
+
+    result = run_again(directory)
+    for cause in result.causes:
+        typer.echo(f"note: {cause}")
+    if result.same:
+        typer.echo(f"reproduced: digest {result.digest}")
+        return
+    typer.echo(f"not reproduced: {', '.join(result.differing)} came out different", err=True)
+    raise typer.Exit(1)
+
+
+def main() -> NoReturn:
+    """Run the command line; exit 0 done, 2 wrong input, 1 our fault, 130 interrupted."""
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(2)
+    except Fleet2DError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(0)
+
+
+def _split(arguments: list[str] | None) -> tuple[str | None, list[str]]:
+    """Tell the scenario from the overrides: it comes first, and has no '='."""
+    rest = list(arguments or [])
+    if rest and "=" not in rest[0]:
+        return rest[0], rest[1:]
+    return None, rest
+
+
+def _fresh_directory(name: str) -> Path:
+    """Return runs/NAME-001, or the first number that is free."""
+    number = 1
+    while (directory := Path("runs") / f"{name}-{number:03d}").exists():
+        number += 1
+    return directory
+
+
+def _announce_compilation() -> None:
+    from fleet2d.kernels._jit import cache_directory
+
+    if not cache_directory().exists():
+        typer.echo("compiling the kernels, once on this machine (about 10 s) …", err=True)
+
+
+def _run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
+    if not show:
+        return simulation.run()
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=simulation.clock.steps)
+        began = time.perf_counter()
+
+        def tell(now: "Simulation") -> None:
+            simulated = now.step * now.clock.step_us / 1e6
+            speedup = simulated / (time.perf_counter() - began)
+            text = f"{now.time:%a %d %b %Y %H:%M}  {speedup:,.0f} x real time"
+            progress.update(task, completed=now.step, description=text)
+
+        return simulation.run(tell)
+
+
+def _summary(stored: "Run") -> dict[str, Any]:
+    manifest = stored.manifest
+    wall = {**manifest["wall_s"], "total": _since_start()}
+    return {
+        "run_dir": str(stored.directory),
+        "steps": manifest["steps"],
+        "simulated_s": manifest["simulated_s"],
+        "seed": manifest["seed"],
+        "digest": stored.digest,
+        "wall_s": wall,
+        "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
+        "peak_rss_mb": _peak_rss_mb(),
+        "metrics": stored.metrics,
+    }
+
+
+def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    wall = summary["wall_s"]
+    days = summary["simulated_s"] / 86400
+    seconds = wall["setup"] + wall["simulate"] + wall["save"]
+    console.print(
+        f"{days:g} days in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
+        f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s, save {wall['save']:.2f} s;"
+        f" whole process {wall['total']:.2f} s, {summary['peak_rss_mb']:.0f} MB)",
+        highlight=False,
+    )
+    table = Table("metric", "of", "value", show_edge=False)
+    for metric, result in summary["metrics"].items():
+        for name, value in _flat(result):
+            table.add_row(metric, name, f"{value:.4g}" if isinstance(value, float) else str(value))
+            metric = ""  # noqa: PLW2901  (named once)
+    if table.row_count:
+        console.print(table)
+    for note in stored.notes or stored.manifest["notes"]:
+        console.print(f"note: {note}", highlight=False)
+    console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
+    console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True)
+
+
+def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
+    if not isinstance(result, dict):
+        return [(prefix, result)]
+    return [
+        row for key, value in result.items() for row in _flat(value, f"{prefix} · {key}" if prefix else key)
+    ]
+
+
+def _since_start() -> float:
+    """Return the wall time since this process began [s]."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, AttributeError, ValueError, IndexError):  # not Linux: since this module was loaded
+        return time.perf_counter() - _LOADED
+
+
+def _peak_rss_mb() -> float | None:
+    """Return the most memory that this process has held [MB]; None where nobody says."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)
+
+
+if __name__ == "__main__":
+    main()

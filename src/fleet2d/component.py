@@ -1,0 +1,326 @@
+"""Components: what a scenario is made of, how they are declared, registered and found by name.
+
+A component is one class whose typed fields are its configuration. Its kind (floorplan, behavior,
+algorithm, metric) is declared by the base class that its siblings share::
+
+    class Algorithm(Component):
+        kind: ClassVar[str] = "algorithm"
+
+    @register("algorithm", "ltp.likelihood")
+    class Likelihood(Algorithm):
+        period: Duration = timedelta(hours=1)
+
+A component in a module below its kind's package is found without being imported anywhere.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any, ClassVar, Self, TypeVar
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ModelWrapValidatorHandler,
+    SerializationInfo,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import CoreSchema, InitErrorDetails, core_schema
+
+from fleet2d.errors import ScenarioError
+from fleet2d.outside import import_class, written_path
+from fleet2d.problems import did_you_mean, problem, problem_at, rewritten, unknown_key
+
+PACKAGES = {
+    "floorplan": "fleet2d.floorplan",
+    "behavior": "fleet2d.entities",
+    "algorithm": "fleet2d.algorithms",
+    "metric": "fleet2d.metrics",
+}
+"""Where the built-in components of each kind live."""
+
+
+class Settings(BaseModel):
+    """A group of configuration keys: frozen, and unknown keys are errors that name the known."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _name_known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        try:
+            return handler(data)
+        except ValidationError as error:
+            raise rewritten(error, cls._explain_unknown_key) from None
+
+    @classmethod
+    def _explain_unknown_key(cls, line: InitErrorDetails) -> InitErrorDetails:
+        if line["type"] == "extra_forbidden" and len(line["loc"]) == 1:
+            line["type"] = unknown_key(line["loc"][0], cls.model_fields)
+        return line
+
+    def __eq__(self, other: object) -> bool:
+        """Compare the configuration; run state doesn't count."""
+        return type(self) is type(other) and all(
+            getattr(self, name) == getattr(other, name) for name in type(self).model_fields
+        )
+
+
+class Component(Settings):
+    """A part of a scenario that a ``type`` selects.
+
+    Declared fields are configuration and frozen. Anything else that is assigned on an instance is
+    run state: kept, copied with it, and not dumped.
+
+    >>> class Counter(Component):
+    ...     limit: int = 3
+    >>> counter = Counter()
+    >>> counter.seen = 1
+    >>> counter.model_dump()
+    {'limit': 3}
+    """
+
+    kind: ClassVar[str] = ""
+    type_name: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Name the class by where it is, until it is registered under a shorter name."""
+        super().__init_subclass__(**kwargs)
+        cls.type_name = written_path(cls)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse to change configuration; keep everything else as run state."""
+        cls = type(self)
+        declared = name in cls.model_fields or name in cls.__private_attributes__
+        if declared or name in cls.__class_vars__:
+            super().__setattr__(name, value)
+        else:
+            object.__setattr__(self, name, value)
+
+
+C = TypeVar("C", bound=type[Component])
+
+_REGISTRY: dict[str, dict[str, type[Component]]] = {}
+_ALIASES: dict[str, dict[str, str]] = {}
+_COMPLETE: set[str] = set()  # kinds whose built-in modules have all been imported
+
+
+def register(kind: str, name: str, *, aliases: Iterable[str] = ()) -> Callable[[C], C]:
+    """Register a component class as ``type: name``.
+
+    Raises:
+        ValueError: the name or an alias is taken, or the class is of another kind.
+    """
+
+    def decorate(cls: C) -> C:
+        if cls.kind != kind:
+            raise ValueError(
+                f"{cls.__qualname__} can't be a {kind}: derive it from the base class that "
+                f"declares `kind: ClassVar[str] = {kind!r}`"
+            )
+        classes, names = _REGISTRY.setdefault(kind, {}), _ALIASES.setdefault(kind, {})
+        for word in (name, *aliases):
+            if word in classes or word in names:
+                raise ValueError(f"there is a {kind} named {word!r} already")
+        classes[name] = cls
+        names.update(dict.fromkeys(aliases, name))
+        cls.type_name = name
+        return cls
+
+    return decorate
+
+
+def lookup(kind: str, name: str) -> type[Component]:
+    """Find a component class by its registered name, alias, entry point or 'package.module:Class'.
+
+    Modules named in a scenario are looked for in the scenario's own folder first, then among the
+    installed ones. 'folder/package.module:Class' names the folder.
+
+    Raises:
+        ScenarioError: nothing of that name, or it can't be imported, or is of another kind.
+    """
+    if ":" in name:
+        return _checked(kind, name, import_class(name))
+    if (found := _registered(kind, name)) is not None:
+        return found
+    _import_builtins(kind, name)
+    if (found := _registered(kind, name)) is not None:
+        return found
+    for entry in entry_points(group=f"fleet2d.{kind}", name=name):
+        cls = _checked(kind, name, import_class(entry.value))
+        cls.type_name = name
+        return cls
+    known = sorted(components(kind))
+    raise ScenarioError(
+        f"there is no {kind} {name!r}{did_you_mean(name, [*known, *_ALIASES.get(kind, ())])} "
+        f"There are: {', '.join(known) or 'none'}; your own is written 'package.module:Class'"
+    )
+
+
+def components(kind: str) -> dict[str, type[Component]]:
+    """Return every component of a kind, registered or from an entry point, by name, sorted."""
+    _import_builtins(kind)
+    plugins = {e.name: e for e in entry_points(group=f"fleet2d.{kind}")}
+    found = {name: lookup(kind, name) for name in plugins} | _REGISTRY.get(kind, {})
+    return dict(sorted(found.items()))
+
+
+def aliases(kind: str, name: str) -> tuple[str, ...]:
+    """Return the other names of a registered component."""
+    return tuple(sorted(a for a, n in _ALIASES.get(kind, {}).items() if n == name))
+
+
+def base_of(cls: type[Component]) -> type[Component]:
+    """Return the base class that declares the component's kind; its fields fit every type."""
+    return next((base for base in reversed(cls.__mro__) if vars(base).get("kind")), Component)
+
+
+def _registered(kind: str, name: str) -> type[Component] | None:
+    return _REGISTRY.get(kind, {}).get(_ALIASES.get(kind, {}).get(name, name))
+
+
+def _import_builtins(kind: str, name: str | None = None) -> None:
+    """Import a kind's modules; when a module is called ``name``, nothing beyond it."""
+    if kind in _COMPLETE or kind not in PACKAGES:
+        return
+    package = importlib.import_module(PACKAGES[kind])
+    modules = sorted(
+        m.name for m in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    )
+    for module in [m for m in modules if name and m.rpartition(".")[2] == name]:
+        importlib.import_module(module)
+        if name and _registered(kind, name):
+            return
+    for module in modules:
+        importlib.import_module(module)
+    _COMPLETE.add(kind)
+
+
+def _checked(kind: str, name: str, found: object) -> type[Component]:
+    if not (isinstance(found, type) and issubclass(found, Component) and found.kind == kind):
+        raise ScenarioError(
+            f"{name!r} is not a {kind}: it must be a class derived from the "
+            f"{kind} base class of fleet2d"
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Declares a field for any component of a kind: ``Annotated[Component, OneOf("metric")]``.
+
+    Its input is a mapping with ``type``, the bare name of a type, or an instance; it dumps to the
+    mapping.
+    """
+
+    kind: str
+
+    def validate(self, value: Any, info: ValidationInfo) -> Component:
+        """Build the component that a mapping describes."""
+        if isinstance(value, Component):
+            if value.kind != self.kind:
+                raise problem(f"found a {type(value).__name__}; a {self.kind} is wanted")
+            return value
+        if isinstance(value, str):
+            value = {"type": value}
+        if not isinstance(value, Mapping):
+            raise problem(f"found {value!r}; a mapping with 'type', or a type's name, is wanted")
+        fields = dict(value)
+        name = fields.pop("type", None)
+        try:
+            if not isinstance(name, str):
+                known = ", ".join(components(self.kind))
+                raise ScenarioError(f"'type' is needed to tell which {self.kind} this is: {known}")
+            cls = lookup(self.kind, name)
+        except ScenarioError as error:
+            raise problem_at(("type",), str(error), name) from error
+        return cls.model_validate(fields, context=info.context)
+
+    def dump(self, value: Component, info: SerializationInfo) -> dict[str, Any]:
+        """Write the component as a mapping that validates to an equal one."""
+        fields = value.model_dump(
+            mode=info.mode,
+            context=info.context,
+            exclude_defaults=info.exclude_defaults,
+            exclude_unset=info.exclude_unset,
+        )
+        return {"type": value.type_name, **fields}
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Validate and dump by this class alone."""
+        return core_schema.with_info_plain_validator_function(
+            self.validate,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                self.dump, info_arg=True, return_schema=core_schema.dict_schema()
+            ),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Leave a mark that `fleet2d.scenario.schema` replaces by all types of the kind."""
+        return {"x-kind": self.kind}
+
+
+def split_short_form(data: Any, body_fields: Iterable[str]) -> Any:
+    """Move the fields of an entity's only behavior, written beside its body's, into ``behaviors``.
+
+    >>> split_short_form({"type": "meander", "radius": 0.2, "pause": 3}, ["radius"])
+    {'radius': 0.2, 'behaviors': [{'type': 'meander', 'pause': 3}]}
+    """
+    if isinstance(data, str):
+        return {"behaviors": [data]}
+    if not isinstance(data, Mapping) or "type" not in data:
+        return data
+    if "behaviors" in data:
+        raise problem_at(("behaviors",), "give 'type' (one behavior) or 'behaviors', not both")
+    body = {key: value for key, value in data.items() if key in set(body_fields)}
+    return {**body, "behaviors": [{k: v for k, v in data.items() if k not in body}]}
+
+
+class ShortForm:
+    """Lets an entity's only behavior be written beside its body: ``Annotated[User, ShortForm()]``.
+
+    Errors in the behavior's fields name the keys as they are written.
+    """
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Settings], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Validate ``source`` from both forms."""
+        body = source.model_fields.keys() - {"behaviors"}
+
+        def move(line: InitErrorDetails) -> InitErrorDetails:
+            if line["loc"][:2] == ("behaviors", 0):
+                line["loc"] = line["loc"][2:]
+                if "known" in line["ctx"] and len(line["loc"]) == 1:
+                    line["type"] = unknown_key(line["loc"][0], {*line["ctx"]["known"], *body})
+            return line
+
+        def validate(data: Any, validate_long: Callable[[Any], Any]) -> Any:
+            long = split_short_form(data, body)
+            try:
+                return validate_long(long)
+            except ValidationError as error:
+                raise error if long is data else rewritten(error, move) from None
+
+        return core_schema.no_info_wrap_validator_function(validate, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Leave the body's keys as a mark: `fleet2d.scenario.schema` makes short forms of it."""
+        long = handler(schema)
+        body = dict(handler.resolve_ref_schema(long)["properties"])
+        kind = body.pop("behaviors")["items"]["x-kind"]
+        return {"anyOf": [long], "x-short-form": {"kind": kind, "body": body}}

@@ -1,0 +1,52 @@
+"""Simulated time: steps of one length from a start; times are integer microseconds since then."""
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+MICROSECOND = timedelta(microseconds=1)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The steps of a run: step k is the moment k * step_us after the start.
+
+    Attributes:
+        start: Local time of step 0, without time zone: a simulated day always has 24 hours.
+        step_us: Length of a step [us].
+        steps: Number of steps; the last is steps - 1.
+
+    Example:
+        >>> clock = Clock(datetime(2026, 1, 5), step_us=1_000_000, steps=3600)
+        >>> clock.time(90).isoformat()
+        '2026-01-05T00:01:30'
+        >>> clock.step_at_or_after(1_500_000)
+        2
+    """
+
+    start: datetime
+    step_us: int
+    steps: int
+
+    def time(self, step: int) -> datetime:
+        """Return the local time of a step."""
+        return self.start + step * self.step_us * MICROSECOND
+
+    def times(self, steps: NDArray[np.int64]) -> NDArray[np.datetime64]:
+        """Return the local times of steps, datetime64[us]."""
+        return self.moments(steps * self.step_us)
+
+    def moments(self, elapsed_us: NDArray[np.int64]) -> NDArray[np.datetime64]:
+        """Return the local times of moments given in microseconds since the start."""
+        times: NDArray[np.datetime64] = np.datetime64(self.start, "us") + elapsed_us.astype("m8[us]")
+        return times
+
+    def elapsed(self, moment: datetime) -> int:
+        """Return the microseconds from the start to a local time; negative before the start."""
+        return (moment - self.start) // MICROSECOND
+
+    def step_at_or_after(self, elapsed_us: int) -> int:
+        """Return the first step that is not before a moment [us since the start]."""
+        return -(-elapsed_us // self.step_us)

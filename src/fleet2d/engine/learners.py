@@ -1,0 +1,183 @@
+"""Algorithms and metrics in a run: their order, when they are due, and what they put out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.algorithm import Algorithm, Present
+from fleet2d.algorithms.history import History, Log
+from fleet2d.algorithms.output import to_columns
+from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.table import Column, Kind, TableSpec
+from fleet2d.engine.clock import Clock
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
+from fleet2d.floorplan.home import Home
+from fleet2d.metrics.metric import Metric
+from fleet2d.problems import did_you_mean
+from fleet2d.units import micros
+
+KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
+
+
+@dataclass
+class Learner:
+    """An algorithm or a metric in a run.
+
+    Attributes:
+        every: Steps between two updates.
+        since: First step of its next history.
+    """
+
+    name: str
+    path: str
+    component: Algorithm | Metric
+    every: int
+    since: int = 0
+
+    @property
+    def due(self) -> int:
+        """The step before which it is updated next: its history ends with the step before."""
+        return self.since + self.every
+
+
+class Learners:
+    """All algorithms, in the order of their dependencies, and then all metrics.
+
+    Attributes:
+        outputs: The newest output of each algorithm.
+    """
+
+    def __init__(
+        self,
+        algorithms: Mapping[str, Algorithm],
+        metrics: Mapping[str, Metric],
+        home: Home,
+        clock: Clock,
+        seed: int,
+        names: tuple[Sequence[str], Sequence[str]],
+        store: RunStore | None,
+    ) -> None:
+        self.home, self.clock, self.seed, self.store = home, clock, seed, store
+        self.users, self.robots = tuple(names[0]), tuple(names[1])
+        self.outputs: dict[str, Any] = {}
+        self.all: list[Learner] = []
+        for name in update_order(algorithms):
+            self._add(name, f"algorithms.{name}", algorithms[name])
+        for name, metric in metrics.items():
+            self._add(name, f"metrics.{name}", metric)
+        self._room_names = [room.name for room in home.rooms]
+
+    def next_due(self) -> int | None:
+        """Return the step before which somebody is due; None if there is nobody."""
+        return min((learner.due for learner in self.all), default=None)
+
+    def earliest_needed(self) -> int:
+        """Return the first step that is still part of somebody's next history."""
+        return min(learner.since for learner in self.all)
+
+    def update(self, end: int, log: Log) -> None:
+        """Update everybody whose period ends before step `end`."""
+        fresh: dict[str, Any] = {}
+        for learner in self.all:
+            if learner.due == end:
+                output = self._update(learner, end, log, {**self.outputs, **fresh})
+                learner.since = end
+                if isinstance(learner.component, Algorithm) and output is not None:
+                    fresh[learner.name] = output
+        self.outputs.update(fresh)
+
+    def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
+        """Give metrics what is left of a period; return the results of all metrics by name."""
+        results = {}
+        for learner in self.all:
+            if isinstance(learner.component, Metric):
+                if learner.since < end:
+                    self._update(learner, end, log, self.outputs)
+                    learner.since = end
+                with _blame(learner.path, end):
+                    results[learner.name] = learner.component.result()
+        return results
+
+    def _add(self, name: str, path: str, component: Algorithm | Metric) -> None:
+        every, rest = divmod(micros(component.period), self.clock.step_us)
+        if rest or not every:
+            raise ScenarioError(
+                f"{path}.period is {component.period}, which is no multiple of simulation.step"
+                f" ({self.clock.step_us / 1e6:g} s): choose a multiple"
+            )
+        component = component.model_copy()
+        with _blame(path, 0):
+            component.start(self.home)
+        self.all.append(Learner(name, path, component, every))
+
+    def _update(self, learner: Learner, end: int, log: Log, outputs: Mapping[str, Any]) -> Any:
+        knows_truth = isinstance(learner.component, Metric)
+        visible = frozenset((*self.users, *self.robots) if knows_truth else self.robots)
+        history = History(log, learner.since, end, self.clock.step_us / 1e6, visible)
+        state = Present(
+            learner.path, end - 1, self.clock.time(end - 1), self.home, self.users, self.robots, outputs, self.seed
+        )  # fmt: skip
+        with _blame(learner.path, end - 1):
+            output = learner.component.update(history, state)
+            if output is not None:
+                columns = to_columns(output, self._room_names, learner.path)
+                self._store(learner, end - 1, columns)
+        return output
+
+    def _store(self, learner: Learner, step: int, columns: dict[str, NDArray[Any]]) -> None:
+        if self.store is None:
+            return
+        # Metrics and algorithms may share a name.
+        table = learner.path.replace(".", "_") if learner.name in _FIXED else learner.name
+        steps = np.full(len(next(iter(columns.values()))), step, np.int64)
+        if table not in self.store.names:
+            kinds = [Column(n, KINDS[values.dtype.kind]) for n, values in columns.items()]
+            self.store.add_table(TableSpec(table, (Column("step", "step"), Column("time", "time"), *kinds)))
+        self.store.append(table, step=steps, time=self.clock.times(steps), **columns)
+
+
+_FIXED = {"trajectories", "key_frames", "observations", "events"}
+
+
+def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
+    """Return the algorithms so that each stands behind those it reads; else as in the scenario.
+
+    Raises:
+        ScenarioError: One reads something that doesn't exist, or they read each other in a circle.
+    """
+    for name, algorithm in algorithms.items():
+        for read in algorithm.reads:
+            if read not in algorithms:
+                raise ScenarioError(
+                    f"algorithms.{name}.reads names {read!r}, which is no algorithm of the scenario;"
+                    f" there are: {', '.join(algorithms)}{did_you_mean(read, algorithms)}"
+                )
+    sorter = TopologicalSorter({name: algorithm.reads for name, algorithm in algorithms.items()})
+    try:
+        return list(sorter.static_order())
+    except CycleError as error:
+        circle = " reads ".join(reversed(error.args[1]))
+        raise ScenarioError(f"algorithms read each other in a circle: {circle}") from None
+
+
+class _blame:  # noqa: N801  (used as a function)
+    """Name the component and the step when a user's code fails."""
+
+    def __init__(self, path: str, step: int) -> None:
+        self.path, self.step = path, step
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        """Turn an exception into one that says whose it is."""
+        if isinstance(error, Exception) and not isinstance(error, Fleet2DError):
+            raise ComponentError(
+                f"{self.path} failed at step {self.step}: {type(error).__name__}: {error}"
+            ) from error
+        if isinstance(error, ComponentError) and self.path not in str(error):
+            raise ComponentError(f"{self.path} failed at step {self.step}: {error}") from error

@@ -1,0 +1,161 @@
+"""Poses at any step of a stored run, rebuilt exactly from its key frames."""
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.engine.clock import Clock
+from fleet2d.engine.recorder import KEY_KINDS, PLANNED, WALK
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.meander import Meander
+from fleet2d.entities.plan import State
+from fleet2d.errors import ArtifactError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.motion import Breakpoints, Poses, trace_meander, trace_track
+from fleet2d.scenario.model import load_scenario
+from fleet2d.units import micros
+
+if TYPE_CHECKING:
+    from fleet2d.artifacts.reader import Run
+
+I64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Path:
+    """Poses of one body, all arrays of one length.
+
+    Attributes:
+        step: int64.
+        time: datetime64[us], local.
+        x: float64 [m]; where it left while it is away.
+        y: float64 [m].
+        heading: float64 [rad], counter-clockwise from +x.
+        away: bool.
+        room: Index of the room, -1 while away, int16.
+    """
+
+    step: I64
+    time: NDArray[np.datetime64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    away: NDArray[np.bool_]
+    room: NDArray[np.int16]
+
+
+def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> Path:
+    """Return where a body of a stored run was, every so often.
+
+    Args:
+        run: A run that stored key_frames.
+        plan: The floor plan it ran in.
+        entity: The name of the body.
+        every: Time between two poses, a multiple of the step.
+
+    Raises:
+        ArtifactError: The run stored no key frames, there is no such body, or `every` is no multiple.
+    """
+    manifest = run.manifest
+    clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
+    stride, rest = divmod(micros(every), clock.step_us)
+    if rest or stride < 1:
+        raise ArtifactError(f"every is {every}: it must be a multiple of the step, {clock.step_us / 1e6:g} s")
+    if "key_frames" not in run.tables:
+        raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
+    keys = _keys_of(run, plan, entity, clock)
+    steps = np.arange(0, clock.steps, stride, dtype=np.int64)
+    out = Poses(*(np.zeros(len(steps), np.int64) for _ in range(3)), np.zeros(len(steps), np.uint8))
+    _trace(run, plan, entity, clock, keys, stride, out)
+    xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
+    room = np.where(out.away, -1, plan.room_of_cell[out.y // SUB, out.x // SUB])
+    radians = out.heading * (2 * np.pi / TURN)
+    return Path(steps, clock.times(steps), xy[:, 0], xy[:, 1], radians, out.away.astype(bool), room)
+
+
+def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str, Any]:
+    """Return the key frames of a body in lattice units."""
+    entities = run.manifest["entities"]
+    names = [*entities["users"], *entities["robots"]]
+    if entity not in names:
+        raise ArtifactError(f"there is no {entity!r} in the run; there are: {', '.join(names)}")
+    table = run.tables["key_frames"]
+    mine = table["entity"].combine_chunks().cast("string").to_numpy(zero_copy_only=False) == entity
+    column = {n: table[n].to_numpy()[mine] for n in ("step", "time", "x", "y", "heading", "away")}
+    kind = table["kind"].combine_chunks().cast("string").to_numpy(zero_copy_only=False)[mine]
+    xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
+    return {
+        "step": column["step"],
+        "time": (column["time"].astype("M8[us]") - np.datetime64(clock.start, "us")).astype(np.int64),
+        "kind": np.array([KEY_KINDS.index(k) for k in kind], np.int64),
+        "x": np.ascontiguousarray(xy[:, 0]),
+        "y": np.ascontiguousarray(xy[:, 1]),
+        "heading": np.rint(column["heading"] * (TURN / (2 * np.pi))).astype(np.int64) % TURN,
+        "away": column["away"].astype(np.uint8),
+    }
+
+
+def _trace(
+    run: "Run", plan: FloorPlan, entity: str, clock: Clock, keys: dict[str, Any], stride: int, out: Poses
+) -> None:
+    """Follow the key frames, stretch by stretch, each until the next key frame that was reached."""
+    kind, time, step = keys["kind"], keys["time"], keys["step"]
+    walker = None
+    begin = 0
+    while begin < len(kind):
+        end = begin + 1
+        if kind[begin] == WALK:
+            stop = step[end] if end < len(kind) else clock.steps
+            walker = walker or _walker(run, plan, entity, clock)
+            _follow_walk(walker, keys, begin, int(stop), stride, out)
+        else:
+            while end < len(kind) and kind[end] not in (WALK, PLANNED):
+                end += 1
+            if end < len(kind) and kind[end] == PLANNED:  # an end that was never reached
+                end += 1
+            stop = step[end] if end < len(kind) else clock.steps
+            _follow_track(keys, begin, end, int(stop), clock, stride, out)
+        begin = end
+
+
+def _follow_track(
+    keys: dict[str, Any], begin: int, end: int, stop: int, clock: Clock, stride: int, out: Poses
+) -> None:
+    part = Breakpoints(*(np.ascontiguousarray(keys[n][begin:end]) for n in Breakpoints._fields))
+    first = -(-int(keys["step"][begin]) // stride)
+    last = -(-stop // stride)
+    if last > first:
+        row = Poses(*(array[first:last] for array in out))
+        trace_track(part, first * stride * clock.step_us, stride * clock.step_us, last - first, row)
+
+
+def _follow_walk(
+    walker: tuple[Home, Actor, Meander], keys: dict[str, Any], begin: int, stop: int, stride: int, out: Poses
+) -> None:
+    home, actor, behavior = walker
+    step = int(keys["step"][begin])
+    state = State(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
+    row = Poses(*(np.empty(stop - step, array.dtype) for array in out))
+    trace_meander(home.plan.mesh, actor.space.mesh, behavior.rule, step, np.array(state[:3]), row)
+    first, last = -(-step // stride), -(-stop // stride)
+    for whole, values in zip(out, row, strict=True):
+        whole[first:last] = values[first * stride - step :: stride]
+
+
+def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
+    """Return the body as it was configured, to walk its random walk again."""
+    scenario = load_scenario(run.manifest["scenario"])
+    bucket = "users" if entity in scenario.users else "robots"
+    configured = {**scenario.users, **scenario.robots}[entity]
+    home = Home(plan)
+    actor = Actor(entity, f"{bucket}.{entity}", configured, home, clock, run.manifest["seed"])
+    walks = [behavior for behavior in actor.behaviors if isinstance(behavior, Meander)]
+    if not walks:
+        raise ArtifactError(f"{entity} walked at random by a behavior that is not 'meander': it can't be rebuilt")
+    return home, actor, walks[0]

@@ -1,0 +1,367 @@
+"""What a run writes down: samples, key frames, observations and events, in an order of their own.
+
+Rows are gathered over spans and handed to the store sorted by (step, entity), so that a table is the
+same however the run was cut into spans.
+"""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.history import Observations
+from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock
+from fleet2d.engine.clock import Clock
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.plan import Track
+from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.motion import Breakpoints
+from fleet2d.units import micros
+
+# How a row of key_frames is to be read: a breakpoint that was reached, the end of a segment that was
+# broken off before it, or a state from which a random walk is drawn on.
+TRACK, PLANNED, WALK = 0, 1, 2
+KEY_KINDS = ("track", "planned", "walk")
+# A random walk is rebuilt from the last hour's key frame.
+WALK_KEY_US = 3_600_000_000
+# Rows gathered before they go to the store.
+GATHERED = 1 << 15
+
+STEP = Column("step", "step", description="step at which the row takes effect")
+TIME = Column("time", "time", description="local time")
+X = Column("x", "float64", "m", nullable=True)
+Y = Column("y", "float64", "m", nullable=True)
+HEADING = Column("heading", "float64", "rad", description="counter-clockwise from +x")
+
+
+def table_specs(
+    users: Sequence[str], robots: Sequence[str], rooms: Sequence[str], settings: ArtifactSettings
+) -> list[TableSpec]:
+    """Return the tables that a run with these settings stores."""
+    entity = Column("entity", "category", categories=(*users, *robots))
+    room = Column("room", "category", nullable=True, categories=tuple(rooms))
+    away = Column("away", "bool", description="not at home; x and y are where it left")
+    specs = []
+    if settings.trajectories != "off":
+        specs.append(TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away)))
+    if settings.key_frames:
+        kind = Column("kind", "category", categories=KEY_KINDS)
+        specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
+    if settings.observations and users and robots:
+        robot = Column("robot", "category", categories=tuple(robots))
+        user = Column("user", "category", categories=tuple(users))
+        specs.append(TableSpec("observations", (STEP, TIME, robot, user, X, Y, room)))
+    if settings.events:
+        user = Column("user", "category", nullable=True, categories=tuple(users)) if users else None
+        event = Column("event", "category")
+        detail = Column("detail", "string")
+        columns = (STEP, TIME, entity, event, user, detail)
+        specs.append(TableSpec("events", tuple(column for column in columns if column)))
+    return specs
+
+
+class Recorder:
+    """Gathers the rows of a run.
+
+    Attributes:
+        wall_s: Time spent on storing [s].
+    """
+
+    def __init__(
+        self,
+        store: RunStore,
+        settings: ArtifactSettings,
+        clock: Clock,
+        home: Home,
+        actors: Sequence[Actor],
+    ) -> None:
+        self.store = store
+        self.clock, self.home, self.actors = clock, home, actors
+        self.row_of = {actor.path: row for row, actor in enumerate(actors)}
+        names = set(store.names)
+        self._keeps_keys = "key_frames" in names
+        self._keeps_observations = "observations" in names
+        self._keeps_events = "events" in names
+        self._every = _steps_between_samples(settings, clock)
+        self._walk_every = max(1, WALK_KEY_US // clock.step_us)
+        # Breakpoints of the present plan already gathered; the plan before the first has none to tell.
+        self._emitted = [1] * len(actors)
+        self._told_until = [-1] * len(actors)
+        self._notes_told = [0] * len(actors)
+        self._samples: list[NDArray[np.int64]] = []
+        self._keys: list[NDArray[np.int64]] = []
+        self._events: list[tuple[int, int, int, str, int, str]] = []
+        self._observations: list[Observations] = []
+        self._gathered = 0
+        self.wall_s = 0.0
+
+    def before_plan(self, row: int, step: int) -> None:
+        """Gather the end of the plan that is about to be replaced at `step`."""
+        self._tell_plan(row, step)
+        self._break_off(row, step)
+        motion = self.actors[row].motion
+        track = motion.breakpoints if isinstance(motion, Track) else None
+        self._told_until[row] = (
+            int(track.time[-1]) if track is not None and self._emitted[row] == len(track.time) else -1
+        )
+
+    def after_plan(self, row: int, step: int) -> None:
+        """Gather the beginning of the plan that was just made at `step`."""
+        # A plan that takes over just where the last one ended needs no key frame to begin.
+        self._emitted[row] = int(self._told_until[row] == step * self.clock.step_us and step > 0)
+        self._notes_told[row] = 0
+        actor = self.actors[row]
+        if self._keeps_keys and not isinstance(actor.motion, Track):
+            self._keys.append(_key(step, row, WALK, step * self.clock.step_us, actor.state))
+        self._tell_plan(row, step)
+
+    def span(self, block: PoseBlock, first: int, count: int, eyes: Sequence[Eye]) -> Observations | None:
+        """Gather a span; return its observations."""
+        for row in range(len(self.actors)):
+            self._tell_plan(row, first + count - 1)
+        if self._every:
+            self._sample(block, first, count)
+        if self._keeps_keys:
+            self._key_walks(block, first, count)
+        observations = self._observe(eyes) if eyes else None
+        if self._gathered + len(self._events) + 8 * len(self._keys) > GATHERED:
+            self.drain()
+        return observations
+
+    def end(self, step: int) -> None:
+        """Gather what is under way when the run ends before `step`, and hand over everything."""
+        for row in range(len(self.actors)):
+            self._break_off(row, max(0, step - 1))
+        self.drain()
+
+    def drain(self) -> None:
+        """Hand everything gathered to the store."""
+        began = time.perf_counter()
+        self._store_samples()
+        self._store_keys()
+        self._store_observations()
+        self._store_events()
+        self._gathered = 0
+        self.wall_s += time.perf_counter() - began
+
+    # Gathering
+
+    def _tell_plan(self, row: int, step: int) -> None:
+        """Gather key frames and notes of the present plan up to a step."""
+        actor = self.actors[row]
+        moment = step * self.clock.step_us
+        if self._keeps_events:
+            notes = actor.plan.notes
+            while self._notes_told[row] < len(notes) and notes[self._notes_told[row]].time_us <= moment:
+                note = notes[self._notes_told[row]]
+                at = self.clock.step_at_or_after(note.time_us)
+                self._events.append((at, row, 0, note.event, -1, note.detail))
+                self._notes_told[row] += 1
+        if self._keeps_keys and isinstance(actor.motion, Track):
+            track = actor.motion.breakpoints
+            begin = self._emitted[row]
+            if begin < len(track.time) and track.time[begin] <= moment:
+                end = int(np.searchsorted(track.time, moment, side="right"))
+                self._keys.append(_keys(track, begin, end, row, TRACK, self.clock.step_us))
+                self._gathered += end - begin
+                self._emitted[row] = end
+
+    def _break_off(self, row: int, step: int) -> None:
+        """Gather where the present segment would have ended."""
+        motion = self.actors[row].motion
+        if self._keeps_keys and isinstance(motion, Track):
+            begin = self._emitted[row]
+            if begin < len(motion.breakpoints.time):
+                planned = _keys(motion.breakpoints, begin, begin + 1, row, PLANNED, self.clock.step_us)
+                planned[:, 0] = step
+                self._keys.append(planned)
+
+    def _sample(self, block: PoseBlock, first: int, count: int) -> None:
+        steps = np.arange(-(-first // self._every) * self._every, first + count, self._every)
+        for row in range(len(self.actors) if len(steps) else 0):
+            columns = steps - first
+            self._samples.append(
+                np.stack(
+                    [
+                        steps,
+                        np.full_like(steps, row),
+                        block.x[row, columns],
+                        block.y[row, columns],
+                        block.heading[row, columns],
+                        block.away[row, columns].astype(np.int64),
+                    ],
+                    axis=1,
+                )
+            )
+            self._gathered += len(steps)
+
+    def _key_walks(self, block: PoseBlock, first: int, count: int) -> None:
+        every = self._walk_every
+        for row, actor in enumerate(self.actors):
+            if isinstance(actor.motion, Track):
+                continue
+            for step in range(-(-first // every) * every, first + count, every):
+                if step != actor.planned_at:
+                    state = block.state(row, step - first)
+                    self._keys.append(_key(step, row, WALK, step * self.clock.step_us, state))
+
+    def _observe(self, eyes: Sequence[Eye]) -> Observations:
+        """Join the findings of all cameras, in order of step, robot, user."""
+        parts = [eye.sightings for eye in eyes]
+        step = np.concatenate([p.step[: e.found] for p, e in zip(parts, eyes, strict=True)])
+        user = np.concatenate([p.user[: e.found] for p, e in zip(parts, eyes, strict=True)])
+        x = np.concatenate([p.x[: e.found] for p, e in zip(parts, eyes, strict=True)])
+        y = np.concatenate([p.y[: e.found] for p, e in zip(parts, eyes, strict=True)])
+        robots = [eye.row - len(eye.users) for eye in eyes]
+        robot = np.repeat(np.array(robots, np.int32), [eye.found for eye in eyes])
+        if len(eyes) > 1:
+            order = np.argsort(step, kind="stable")
+            step, user, robot, x, y = (column[order] for column in (step, user, robot, x, y))
+        plan = self.home.plan
+        xy = plan.lattice.to_metres(np.stack([x, y], axis=-1))
+        room = plan.room_of_cell[y // SUB, x // SUB]
+        observations = Observations(step, robot, user, xy[:, 0], xy[:, 1], room)
+        if self._keeps_observations and len(step):
+            self._observations.append(observations)
+            self._gathered += len(step)
+        if self._keeps_events:
+            for eye in eyes:
+                for i in range(eye.happened):
+                    event = EVENT_NAMES[eye.events.kind[i]]
+                    who = int(eye.events.user[i])
+                    self._events.append((int(eye.events.step[i]), eye.row, 1, event, who, ""))
+        return observations
+
+    # Storing
+
+    def _store_samples(self) -> None:
+        if not self._samples:
+            return
+        rows = _in_order(self._samples)
+        self._samples = []
+        step, entity, x, y, heading, away = rows.T
+        plan = self.home.plan
+        gone = away.astype(bool)
+        xy = plan.lattice.to_metres(rows[:, 2:4])
+        xy[gone] = np.nan
+        room = plan.room_of_cell[y // SUB, x // SUB].astype(np.int32)
+        self.store.append(
+            "trajectories",
+            **self._when(step),
+            entity=entity.astype(np.int32),
+            x=xy[:, 0],
+            y=xy[:, 1],
+            heading=_radians(heading),
+            room=np.where(gone, np.int32(-1), room),
+            away=gone,
+        )
+
+    def _store_keys(self) -> None:
+        if not self._keys:
+            return
+        rows = _in_order(self._keys)
+        self._keys = []
+        xy = self.home.plan.lattice.to_metres(rows[:, 4:6])
+        self.store.append(
+            "key_frames",
+            step=rows[:, 0],
+            time=self.clock.moments(rows[:, 3]),
+            entity=rows[:, 1].astype(np.int32),
+            kind=rows[:, 2].astype(np.int32),
+            x=xy[:, 0],
+            y=xy[:, 1],
+            heading=_radians(rows[:, 6]),
+            away=rows[:, 7].astype(bool),
+        )
+
+    def _store_observations(self) -> None:
+        if not self._observations:
+            return
+        o = Observations(*(np.concatenate(c) for c in zip(*self._observations, strict=True)))
+        self._observations = []
+        self.store.append(
+            "observations",
+            **self._when(o.step),
+            robot=o.robot,
+            user=o.user,
+            x=o.x,
+            y=o.y,
+            room=o.room.astype(np.int32),
+        )
+
+    def _store_events(self) -> None:
+        if not self._events:
+            return
+        rows = sorted(self._events, key=lambda row: row[:3])
+        self._events = []
+        step, entity, _, event, user, detail = zip(*rows, strict=True)
+        columns: dict[str, Any] = self._when(np.array(step, np.int64))
+        if len(self.actors) > 0 and self._has_users:
+            columns["user"] = np.array(user, np.int32)
+        self.store.append(
+            "events",
+            **columns,
+            entity=np.array(entity, np.int32),
+            event=list(event),
+            detail=list(detail),
+        )
+
+    @property
+    def _has_users(self) -> bool:
+        return any(actor.path.startswith("users.") for actor in self.actors)
+
+    def _when(self, step: NDArray[np.int64]) -> dict[str, Any]:
+        return {"step": step, "time": self.clock.times(step)}
+
+
+def _steps_between_samples(settings: ArtifactSettings, clock: Clock) -> int:
+    """Return how many steps lie between two samples, 0 for no samples.
+
+    Raises:
+        ScenarioError: The interval is not a multiple of the step.
+    """
+    if settings.trajectories == "off":
+        return 0
+    if settings.trajectories == "every step":
+        return 1
+    every, rest = divmod(micros(settings.trajectories), clock.step_us)
+    if rest or not every:
+        raise ScenarioError(
+            f"artifacts.trajectories is {settings.trajectories}, which is no multiple of simulation.step"
+            f" ({clock.step_us / 1e6:g} s): choose a multiple, 'every step' or 'off'"
+        )
+    return every
+
+
+def _key(step: int, row: int, kind: int, time_us: int, state: Sequence[int]) -> NDArray[np.int64]:
+    return np.array([[step, row, kind, time_us, *state]], np.int64)
+
+
+def _keys(
+    track: Breakpoints, begin: int, end: int, row: int, kind: int, step_us: int
+) -> NDArray[np.int64]:
+    keys = np.empty((end - begin, 8), np.int64)
+    time = track.time[begin:end]
+    keys[:, 0] = -(-time // step_us)
+    keys[:, 1], keys[:, 2], keys[:, 3] = row, kind, time
+    keys[:, 4], keys[:, 5] = track.x[begin:end], track.y[begin:end]
+    keys[:, 6], keys[:, 7] = track.heading[begin:end], track.away[begin:end]
+    return keys
+
+
+def _in_order(blocks: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Join blocks of rows (step, entity, …) and sort them, rows of one entity in the order gathered."""
+    rows = np.concatenate(blocks)
+    return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+
+
+def _radians(heading: NDArray[np.int64]) -> NDArray[np.float64]:
+    return heading * (2 * np.pi / TURN)

@@ -1,0 +1,359 @@
+"""The simulation: steps taken a span at a time, in the order that the design fixes.
+
+In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps at which somebody
+must decide, nothing but arithmetic happens, so the engine takes the whole *span* between them at once.
+What a span is never shows in a result: every draw is addressed by step, and every plan by time.
+"""
+
+import json
+import secrets
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any, Self
+
+from fleet2d.algorithms.history import Log, Piece
+from fleet2d.artifacts.manifest import Status, file_record, versions
+from fleet2d.artifacts.reader import FLOORPLAN_NAME, Run
+from fleet2d.artifacts.store import RunStore
+from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock, look_together
+from fleet2d.engine.clock import Clock
+from fleet2d.engine.inputs import input_files
+from fleet2d.engine.learners import Learners
+from fleet2d.engine.pace import Pace
+from fleet2d.engine.recorder import Recorder, table_specs
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.entity import Robot
+from fleet2d.floorplan.home import Home
+from fleet2d.scenario.model import Scenario, load_scenario
+
+
+class Simulation:
+    """A scenario under way: step it, run it until a time, look at it, branch it.
+
+    Attributes:
+        scenario: What is simulated.
+        seed: The seed, given or drawn.
+        clock: Its steps.
+        home: Its home.
+        step: The next step to simulate; 0 at first.
+
+    Example:
+        >>> import copy
+        >>> from datetime import timedelta
+        >>> simulation = Simulation("base", "simulation.duration=1 d", seed=4)
+        >>> simulation.run_until(timedelta(hours=12))
+        >>> futures = [copy.deepcopy(simulation).run() for _ in range(2)]
+        >>> futures[0].digest == futures[1].digest
+        True
+    """
+
+    def __init__(
+        self,
+        scenario: str | Path | Mapping[str, Any] | Scenario | None = None,
+        *overrides: str,
+        out: str | Path | None = None,
+        **settings: Any,
+    ) -> None:
+        """Set everything up; with `out`, store in that directory, else in memory.
+
+        Raises:
+            InputError: The scenario, its floor plan, a place in it or the directory is wrong. Nothing is
+                written then.
+        """
+        began = time.perf_counter()
+        self.scenario = load_scenario(scenario, *overrides, **settings)
+        simulation = self.scenario.simulation
+        self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
+        self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
+        self._store = RunStore(out)
+        self._store.check()
+        self.home = Home(self.scenario.floorplan.load())
+        self._users = self._actors("users", self.scenario.users)
+        self._robots = self._actors("robots", self.scenario.robots)
+        self._all = [*self._users, *self._robots]
+        self._block = PoseBlock(self._all)
+        self._eyes = self._open_eyes()
+        self._make_tables()
+        settings_ = self.scenario.artifacts
+        self._recorder = Recorder(self._store, settings_, self.clock, self.home, self._all)
+        self._learners = Learners(
+            self.scenario.algorithms,
+            self.scenario.metrics,
+            self.home,
+            self.clock,
+            self.seed,
+            (list(self.scenario.users), list(self.scenario.robots)),
+            self._store if settings_.outputs else None,
+        )
+        self._log = Log(self.home, self._all) if self._learners.all else None
+        self._pending: dict[int, list[SightEvent]] = {}  # events that interrupted a robot's plan
+        self._max_span = simulation.max_span or self._block.capacity
+        self._max_span = min(self._max_span, self._block.capacity)
+        self._pace: Pace | None = None
+        self.step = 0
+        self._stopping = False
+        self._open()
+        self._setup_s = time.perf_counter() - began
+        self._simulate_s = self._save_s = 0.0
+
+    # State
+
+    @property
+    def time(self) -> datetime:
+        """The local time of the next step."""
+        return self.clock.time(self.step)
+
+    @property
+    def done(self) -> bool:
+        """Whether all steps are simulated."""
+        return self.step >= self.clock.steps
+
+    @property
+    def state(self) -> dict[str, dict[str, Any]]:
+        """Where everybody is at the next step: x, y [m], heading [1/4096 turn], room, away."""
+        return {actor.name: self._state_of(actor) for actor in self._all}
+
+    @property
+    def directory(self) -> Path | None:
+        """Where the run is stored; None in memory."""
+        return self._store.directory
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """The newest output of each algorithm, by name."""
+        return dict(self._learners.outputs)
+
+    # Running
+
+    def advance(self, steps: int = 1) -> None:
+        """Simulate so many steps, or up to the end of the run."""
+        self._run_to(min(self.clock.steps, self.step + steps))
+
+    def run_until(self, when: int | datetime | timedelta) -> None:
+        """Simulate up to a step, a local time, or a time since the start; that step is the next then."""
+        if isinstance(when, datetime):
+            when = when - self.clock.start
+        if isinstance(when, timedelta):
+            when = self.clock.step_at_or_after(when // timedelta(microseconds=1))
+        self._run_to(min(self.clock.steps, when))
+
+    def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
+        """Simulate to the end, store, and return the run.
+
+        Args:
+            on_progress: Called now and then with the simulation.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C; what was simulated until then is stored and readable.
+        """
+        with _deferred_interrupt(self._stop):
+            try:
+                self._run_to(self.clock.steps, on_progress)
+            except BaseException:
+                self._fail()
+                raise
+            if self._stopping:
+                self.finish("interrupted")
+                raise KeyboardInterrupt
+            return self.finish()
+
+    def finish(self, status: Status = "complete") -> Run:
+        """Close the run at the present step and return it for reading."""
+        if not self.done and status == "complete":
+            status = "interrupted"
+        began = time.perf_counter()
+        results = self._learners.finish(self.step, self._log) if self._log else {}
+        self._simulate_s += time.perf_counter() - began
+        began = time.perf_counter()
+        self._recorder.end(self.step)
+        self._store.close_tables()
+        self._save_s += time.perf_counter() - began
+        self._fill_manifest(results)
+        self._store.close(status)
+        run = self._store.run()
+        run.plan = self.home.plan
+        return run
+
+    # The loop
+
+    def _run_to(self, end: int, on_progress: Callable[[Self], None] | None = None) -> None:
+        began, stored = time.perf_counter(), self._recorder.wall_s
+        speedup = self.scenario.simulation.speedup
+        if speedup and self._pace is None:
+            self._pace = Pace(speedup)
+        told = began
+        while self.step < end and not self._stopping:
+            self._span(end)
+            if self._pace:
+                self._pace.hold(self.step * self.clock.step_us / 1e6)
+            if on_progress and time.perf_counter() - told > 0.1:
+                on_progress(self)
+                told = time.perf_counter()
+        stored = self._recorder.wall_s - stored
+        self._simulate_s += time.perf_counter() - began - stored
+        self._save_s += stored
+
+    def _span(self, limit: int) -> None:
+        """Simulate one span: up to the next decision, and not beyond step `limit`."""
+        first = self.step
+        self._decide(first)
+        count = self._span_end(limit) - first
+        for row, actor in enumerate(self._all):
+            if self._log:
+                self._log.pieces[row].append(Piece(first, actor.state, actor.motion))
+            actor.motion.trace(first, actor.state, self._block.row(row, count + 1))
+        if self._eyes:
+            count = look_together(self._eyes, self._block, first, count)
+        observations = self._recorder.span(self._block, first, count, self._eyes)
+        for row, actor in enumerate(self._all):
+            actor.state = self._block.state(row, count)
+        self._interrupt(first + count - 1)
+        self.step = first + count
+        if self._log:
+            if observations is not None:
+                self._log.observations.append(observations)
+            if self._learners.next_due() == self.step:
+                self._learners.update(self.step, self._log)
+                self._log.forget(self._learners.earliest_needed())
+
+    def _decide(self, step: int) -> None:
+        """Ask everybody whose plan is over: users, then robots."""
+        for row, actor in enumerate(self._all):
+            if actor.ask_at is not None and actor.ask_at <= step:
+                self._recorder.before_plan(row, step)
+                actor.decide(step, tuple(self._pending.pop(row, ())), self._learners.outputs)
+                self._recorder.after_plan(row, step)
+
+    def _span_end(self, limit: int) -> int:
+        """Return the step before which the present span ends at the latest."""
+        end = min(limit, self.step + self._max_span)
+        for actor in self._all:
+            if actor.ask_at is not None and actor.ask_at < end:
+                end = actor.ask_at
+        due = self._learners.next_due()
+        if due is not None:
+            end = min(end, due)
+        if self._pace:
+            end = min(end, self.step + max(1, int(self._pace.slice_s * 1e6 / self.clock.step_us)))
+        return end
+
+    def _interrupt(self, step: int) -> None:
+        """End the plans of robots that an event of the span's last step interrupts."""
+        lattice = self.home.plan.lattice
+        for eye in self._eyes:
+            eye.remember()
+            stops = eye.stops
+            events = eye.events
+            for i in range(eye.happened):
+                if events.step[i] == step and stops[events.kind[i]]:
+                    user = int(events.user[i])
+                    x, y = lattice.to_metres(eye.perceived[user]).tolist()
+                    event = SightEvent(EVENT_NAMES[events.kind[i]], self._users[user].name, x, y)
+                    self._pending.setdefault(eye.row, []).append(event)
+                    eye.robot.ask_at = step + 1
+
+    # Set-up and closing
+
+    def _actors(self, bucket: str, entities: Mapping[str, Any]) -> list[Actor]:
+        return [
+            Actor(name, f"{bucket}.{name}", entity, self.home, self.clock, self.seed)
+            for name, entity in entities.items()
+        ]
+
+    def _open_eyes(self) -> list[Eye]:
+        if not self._users:
+            return []
+        return [
+            Eye(robot, len(self._users) + i, self._users, self._block.capacity)
+            for i, robot in enumerate(self._robots)
+            if isinstance(robot.entity, Robot) and robot.entity.camera is not None
+        ]
+
+    def _make_tables(self) -> None:
+        users, robots = list(self.scenario.users), list(self.scenario.robots)
+        rooms = [room.name for room in self.home.rooms]
+        for spec in table_specs(users, robots, rooms, self.scenario.artifacts):
+            self._store.add_table(spec)
+        manifest = self._store.manifest
+        manifest.scenario = self.scenario.resolved()
+        manifest.scenario["simulation"]["seed"] = self.seed
+        manifest.seed = self.seed
+        manifest.step_us = self.clock.step_us
+        manifest.start = self.clock.start.isoformat()
+        manifest.entities = {"users": users, "robots": robots}
+        manifest.versions = versions()
+        manifest.inputs = [file_record(path) for path in input_files(self.scenario)]
+        manifest.notes = list(self.home.plan.notes)
+
+    def _fill_manifest(self, results: Mapping[str, Any]) -> None:
+        manifest = self._store.manifest
+        manifest.steps = self.step
+        manifest.simulated_s = self.step * self.clock.step_us / 1e6
+        manifest.metrics = dict(results)
+        manifest.wall_s = {
+            "setup": self._setup_s,
+            "simulate": self._simulate_s,
+            "save": self._save_s,
+        }
+        if self._pace:
+            reached = self._pace.reached(manifest.simulated_s)
+            if reached < 0.98 * self._pace.speedup:
+                manifest.notes.append(
+                    f"simulation.speedup asked for {self._pace.speedup:g} times real time;"
+                    f" {reached:.0f} was reached, for computing took that long"
+                )
+
+    def _open(self) -> None:
+        """Make the run directory, and put the floor plan in it."""
+        self._store.open()
+        if self.directory is not None:
+            text = json.dumps(self.home.plan.to_native())
+            (self.directory / FLOORPLAN_NAME).write_text(text, encoding="utf-8")
+
+    def _stop(self) -> None:
+        """Let the run end after the present span, where everything stored fits together."""
+        self._stopping = True
+
+    def _fail(self) -> None:
+        """Leave what was stored before the failure readable; the first error is the one to report."""
+        try:
+            self.finish("failed")
+        except Exception:  # noqa: BLE001, S110
+            pass
+
+    def _state_of(self, actor: Actor) -> dict[str, Any]:
+        state = actor.state
+        x, y = self.home.plan.lattice.to_metres([state.x, state.y]).tolist()
+        room = None if state.away else self.home.plan.room_at(x, y)
+        return {
+            "x": x,
+            "y": y,
+            "heading": state.heading,
+            "room": room.name if room else None,
+            "away": bool(state.away),
+        }
+
+
+@contextmanager
+def _deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
+    """Call `stop` on the first Ctrl-C, so that no row is half stored; a second one acts at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def on_interrupt(number: int, frame: Any) -> None:
+        stop()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

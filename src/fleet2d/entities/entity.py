@@ -1,0 +1,54 @@
+"""Entities as a scenario declares them: a body, its behaviors, and a robot's camera."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from fleet2d.component import OneOf, Settings
+from fleet2d.entities.behavior import Behavior
+from fleet2d.entities.place import Place
+from fleet2d.sight.camera import Camera
+from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
+
+
+class Entity(Settings):
+    """A body in the home, and what decides where it goes.
+
+    Short form in a scenario: ``ana: {type: schedule, radius: 0.2, days: […]}`` gives the body one
+    behavior, of that type, with all keys that aren't the body's own.
+    """
+
+    radius: Length = Field(default=0.2, gt=0, le=2, description="radius of the body [m]")
+    speed: Speed = Field(default=1.0, gt=0, le=20, description="walking speed [m/s]")
+    turn_rate_deg: TurnRateDeg = Field(
+        default=180.0, gt=0, le=36000, description="how fast it turns on the spot [deg/s]"
+    )
+    start: Place | None = Field(
+        default=None,
+        description="where it is at first; left out: where its behavior would be, else drawn",
+    )
+    start_heading_deg: AngleDeg | None = Field(
+        default=None, description="heading at first, counter-clockwise from +x; left out: drawn"
+    )
+    color: str | None = Field(default=None, min_length=1, description="color in pictures")
+    behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = Field(
+        default=(),
+        description="what decides where it goes: the first that has a plan; none: it stays still",
+    )
+
+
+class User(Entity):
+    """A person who lives in the home."""
+
+
+class Robot(Entity):
+    """A robot, which sees users with its camera."""
+
+    radius: Length = Field(default=0.15, gt=0, le=2, description="radius of the body [m]")
+    speed: Speed = Field(default=0.6, gt=0, le=20, description="driving speed [m/s]")
+    turn_rate_deg: TurnRateDeg = Field(
+        default=90.0, gt=0, le=36000, description="how fast it turns on the spot [deg/s]"
+    )
+    camera: Camera | None = Field(
+        default=Camera(), description="what it sees with; null: it is blind"
+    )

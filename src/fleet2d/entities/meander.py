@@ -1,0 +1,45 @@
+"""Meander: the random walk of the paper, for users and robots."""
+
+import math
+from typing import TYPE_CHECKING
+
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.motion import WalkRule
+from fleet2d.kernels.random import BELL_STD
+from fleet2d.units import AngleDeg
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+
+@register("behavior", "meander")
+class Meander(Behavior):
+    """Walk at random, for good: two-dimensional Brownian motion with a steady pace.
+
+    In each step the body turns by a normally distributed angle, no faster than its turn rate, and goes
+    forward at its speed; where a wall is in the way it only turns (the walk of the published Fleet2D).
+    """
+
+    turn_std_deg: AngleDeg = Field(
+        default=15.0, ge=0, description="standard deviation of the turn in one second [deg/sqrt(s)]"
+    )
+
+    def start(self, actor: "Actor") -> None:
+        """Work out the walk in lattice units per step."""
+        step_s = actor.clock.step_us / 1e6
+        std = self.turn_std_deg / 360 * TURN * math.sqrt(step_s)  # headings per step
+        self.rule = WalkRule(
+            key=actor.stream("meander"),
+            stride=round(actor.speed * step_s * 256),
+            sway=round(std / BELL_STD * 65536),
+            turn_limit=max(1, math.floor(actor.turn_rate * step_s)),
+        )
+
+    def decide(self, now: Situation) -> Plan:
+        """Walk on."""
+        return now.plan().meander(self.rule)

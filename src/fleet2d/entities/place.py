@@ -1,0 +1,95 @@
+"""Places as a scenario names them: a room, a kind of room, a list of those to try, or a point."""
+
+import difflib
+from collections.abc import Sequence
+from numbers import Real
+from typing import Annotated
+
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.plan import Room
+from fleet2d.units import problem
+
+ANY = "any"
+
+RoomChoice = tuple[str, ...]
+Point = tuple[float, float]
+
+
+def parse_place(value: object) -> RoomChoice | Point:
+    """Read a place: ``kitchen``, ``[dining_room, kitchen, any]`` or ``[x, y]`` in metres.
+
+    Example:
+        >>> parse_place("kitchen"), parse_place([1, 2.5])
+        (('kitchen',), (1.0, 2.5))
+    """
+    if isinstance(value, str) and value:
+        return (value,)
+    if isinstance(value, Sequence) and value and not isinstance(value, str):
+        if all(isinstance(item, str) and item for item in value):
+            return tuple(value)
+        if len(value) == 2 and all(isinstance(v, Real) and not isinstance(v, bool) for v in value):
+            x, y = float(value[0]), float(value[1])
+            if abs(x) < 1e6 and abs(y) < 1e6:  # NaN fails this, too
+                return x, y
+    raise problem(
+        f"found {value!r}; a place is wanted: a room or kind of room like 'kitchen',"
+        " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in metres"
+    )
+
+
+def _dump(place: RoomChoice | Point) -> str | list[str] | list[float]:
+    return place[0] if len(place) == 1 else list(place)  # type: ignore[return-value]
+
+
+Place = Annotated[
+    RoomChoice | Point,
+    BeforeValidator(parse_place),
+    PlainSerializer(_dump),
+    WithJsonSchema(
+        {
+            "description": "a room, a kind of room, a list of those to try in turn, or [x, y] in metres;"
+            " 'any' is any room",
+            "x-quantity": "place",
+            "anyOf": [
+                {"type": "string"},
+                {"type": "array", "items": {"type": "string"}, "minItems": 1},
+                {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
+            ],
+            "examples": ["kitchen", ["dining_room", "kitchen", "any"], [4.0, 2.5]],
+        }
+    ),
+]
+
+
+def is_point(place: RoomChoice | Point) -> bool:
+    """Tell whether a place is a point."""
+    return not isinstance(place[0], str)
+
+
+def matching_rooms(names: RoomChoice, rooms: Sequence[Room], reachable: Sequence[Room]) -> list[Room]:
+    """Return the reachable rooms of the first name that has any.
+
+    Raises:
+        PlacementError: No name fits a room that can be reached; says which rooms there are.
+    """
+    for name in names:
+        if name == ANY:
+            return list(reachable)
+        found = [room for room in reachable if name in (room.name, room.type)]
+        if found:
+            return found
+    known = any(name in (room.name, room.type) for name in names for room in rooms)
+    wanted = " or ".join(repr(name) for name in names)
+    listed = ", ".join(room.name for room in reachable)
+    if known:
+        raise PlacementError(f"{wanted} can't be reached from where it starts; it can reach: {listed}")
+    choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
+    close = difflib.get_close_matches(names[0], choices, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise PlacementError(
+        f"there is no room {wanted}{hint} The rooms are: {listed}. A list that ends in 'any' works in every home"
+        if hint
+        else f"there is no room {wanted}. The rooms are: {listed}. A list that ends in 'any' works in every home"
+    )

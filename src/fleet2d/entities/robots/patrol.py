@@ -1,0 +1,69 @@
+"""Patrol: a robot's rounds through rooms or along waypoints."""
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, Literal, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.place import Place, Point
+from fleet2d.entities.plan import Plan
+from fleet2d.units import Duration, problem
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+
+@register("behavior", "patrol")
+class Patrol(Behavior):
+    """Make rounds: go to each room or waypoint in turn, look around, stay a while, go on.
+
+    In a room the robot stops at the point farthest from its walls.
+    """
+
+    rooms: Literal["all"] | tuple[Place, ...] = Field(
+        default="all", description="the rooms of a round; all: every room that it can enter"
+    )
+    waypoints: tuple[Point, ...] = Field(
+        default=(), description="points [x, y] in metres to go to instead of rooms"
+    )
+    dwell: Duration = Field(default=timedelta(minutes=5), description="how long it stays at each stop")
+    order: Literal["fixed", "random"] = Field(
+        default="fixed", description="stops in the order given, or shuffled anew for each round"
+    )
+    look_around: bool = Field(
+        default=True, description="turn once on the spot on arriving at a stop"
+    )
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if self.waypoints and self.rooms != "all":
+            raise problem("rooms and waypoints are both given: keep one of them")
+        if not self.waypoints and not self.rooms:
+            raise problem("there is nowhere to go: name rooms, or waypoints, or leave out 'rooms'")
+        return self
+
+    def start(self, actor: "Actor") -> None:
+        """Find the stops."""
+        if self.waypoints:
+            self.stops = [actor.point(point) for point in self.waypoints]
+            return
+        if self.rooms == "all":
+            rooms = actor.reachable_rooms()
+        else:
+            rooms = [room for names in self.rooms for room in actor.rooms(names)]  # type: ignore[arg-type]
+        self.stops = [actor.middle(room) for room in dict.fromkeys(rooms)]
+
+    def decide(self, now: Situation) -> Plan:
+        """Plan one round."""
+        stops = self.stops
+        if self.order == "random":
+            stops = now.random("order").shuffled(stops)
+        plan = now.plan()
+        for stop in stops:
+            plan.go_to_point(*stop)
+            if self.look_around:
+                plan.turn_by(1.0)
+            plan.stay(self.dwell)
+        return plan

@@ -1,0 +1,165 @@
+"""Schedule: a fixed daily or weekly agenda of places."""
+
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Literal, NamedTuple, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings, register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.place import Place, Point, RoomChoice, is_point
+from fleet2d.entities.plan import Plan
+from fleet2d.units import Duration, TimeOfDay, problem
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+DAY = timedelta(days=1)
+WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+Days = Literal[
+    "daily", "weekdays", "weekend",
+    "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
+]  # fmt: skip
+GROUPS = {"daily": range(7), "weekdays": range(5), "weekend": range(5, 7)}
+AWAY: tuple[()] = ()
+
+
+class Item(Settings):
+    """One entry of an agenda: when, where, and for how long."""
+
+    at: TimeOfDay | None = Field(
+        default=None, description="when it begins; left out: when the item before is over"
+    )
+    place: Place | None = Field(default=None, description="where: a room, a kind of room, or a point")
+    away: bool = Field(default=False, description="out of the home instead of at a place")
+    dwell: Duration | None = Field(
+        default=None, description="how long it takes; left out: until the next item begins"
+    )
+    activity: str = Field(default="", description="what is done there, for the events table")
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> Self:
+        if self.away == (self.place is not None):
+            raise problem("an item needs a place, or 'away: true', and not both")
+        return self
+
+
+class Day(Settings):
+    """An agenda, and the days on which it holds."""
+
+    on: Days | tuple[Days, ...] = Field(default="daily", description="the days on which it holds")
+    items: tuple[Item, ...] = Field(min_length=1, description="what happens, in order")
+
+    @property
+    def weekdays(self) -> set[int]:
+        """The days of the week it holds on, 0 = Monday."""
+        names = (self.on,) if isinstance(self.on, str) else self.on
+        return {day for name in names for day in _days_of(name)}
+
+
+def _days_of(name: str) -> tuple[int, ...]:
+    return tuple(GROUPS[name]) if name in GROUPS else (WEEKDAYS.index(name),)
+
+
+class Entry(NamedTuple):
+    """An item with its time worked out."""
+
+    begins: timedelta  # since midnight
+    place: RoomChoice | Point | tuple[()]
+    activity: str
+
+
+@register("behavior", "schedule")
+class Schedule(Behavior):
+    """Be at fixed places at fixed times, daily or by weekday.
+
+    At an item's time the body walks to its place by the shortest path, to a spot drawn anew in a room.
+    When an item with a dwell is over and nothing is due, it goes to the place `rest`. A later day of
+    the list replaces an earlier one on the weekdays they share.
+    """
+
+    days: tuple[Day, ...] = Field(min_length=1, description="the agendas of the days of the week")
+    rest: Place = Field(
+        default=("living_room", "any"), description="where it goes when an item is over and nothing is due"
+    )
+
+    @model_validator(mode="after")
+    def _days_work_out(self) -> Self:
+        for day in self.days:
+            _entries(day, self.rest)
+        return self
+
+    def start(self, actor: "Actor") -> None:
+        """Work out the week, and check that every place exists and can be reached."""
+        self.week = self._week()
+        for entry in {entry for day in self.week for entry in day}:
+            if entry.place and is_point(entry.place):
+                actor.point(entry.place)  # type: ignore[arg-type]
+            elif entry.place:
+                actor.rooms(entry.place)  # type: ignore[arg-type]
+
+    def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
+        """Return the place of the last item before the run."""
+        entry = self._current(self._week(), time)
+        return entry.place if entry else None
+
+    def decide(self, now: Situation) -> Plan:
+        """Plan the rest of the day."""
+        plan = now.plan()
+        midnight = datetime.combine(now.time.date(), datetime.min.time())
+        for entry in self.week[now.time.weekday()]:
+            if midnight + entry.begins < now.time:
+                continue
+            plan.stay(until=midnight + entry.begins)
+            if not entry.place:
+                plan.leave_home()
+            else:
+                plan.go_to(entry.place)
+            if entry.activity:
+                plan.note("activity", entry.activity)
+        return plan.stay(until=midnight + DAY)
+
+    def _week(self) -> list[list[Entry]]:
+        week: list[list[Entry]] = [[] for _ in range(7)]
+        for day in self.days:
+            for weekday in day.weekdays:
+                week[weekday] = _entries(day, self.rest)
+        return week
+
+    @staticmethod
+    def _current(week: list[list[Entry]], time: datetime) -> Entry | None:
+        """Return the last entry that began before `time`, up to a week ago."""
+        midnight = datetime.combine(time.date(), datetime.min.time())
+        for back in range(8):
+            day = midnight - back * DAY
+            begun = [entry for entry in week[day.weekday()] if day + entry.begins < time]
+            if begun:
+                return begun[-1]
+        return None
+
+
+def _entries(day: Day, rest: RoomChoice | Point) -> list[Entry]:
+    """Work out when each item of a day begins, and when one goes to rest.
+
+    Raises:
+        PydanticCustomError: The items don't follow each other within a day.
+    """
+    entries: list[Entry] = []
+    over: timedelta | None = None  # when the item before is over, if it says so
+    for number, item in enumerate(day.items):
+        begins = item.at if item.at is not None else over
+        if begins is None:
+            raise problem(f"items.{number} needs 'at', or a 'dwell' in the item before it")
+        earliest = over if over is not None else entries[-1].begins if entries else timedelta(0)
+        if not earliest <= begins < DAY:
+            raise problem(
+                f"items.{number} begins at {begins}, but the item before it lasts until {earliest}:"
+                " list the items of a day in order, and within the day"
+            )
+        if over is not None and begins > over:
+            entries.append(Entry(over, rest, "rest"))
+        entries.append(Entry(begins, AWAY if item.away else item.place or AWAY, item.activity))
+        over = None if item.dwell is None else begins + item.dwell
+    if over is not None and over < DAY:
+        entries.append(Entry(over, rest, "rest"))
+    return entries

@@ -1,0 +1,45 @@
+"""Read a floor plan from whatever names one: a file of a known format, or a bundled home."""
+
+from pathlib import Path
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.bundled import HOMES, bundled_names
+from fleet2d.floorplan.houseexpo import read_houseexpo
+from fleet2d.floorplan.native import FORMAT, read_native
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import read_json
+from fleet2d.problems import did_you_mean
+
+
+def load_floorplan(plan: str | Path = "family_home", cell: float = 0.05) -> FloorPlan:
+    """Read a floor plan.
+
+    Args:
+        plan: A file, whose content tells its format, or the name of a bundled home.
+        cell: Side of a grid cell [m].
+
+    Raises:
+        FloorPlanError: There is no such plan, or it can't be read.
+
+    Example:
+        >>> load_floorplan().name
+        'family_home'
+    """
+    names = bundled_names()
+    if str(plan) in names:
+        return read_native(HOMES / f"{plan}.json", cell)
+    path = Path(plan)
+    if not path.exists() and path.suffix == "" and path.name == str(plan):
+        raise FloorPlanError(
+            f"there is no floor plan file {plan!r}, and no bundled home of that name"
+            f"{did_you_mean(plan, names)} Bundled homes: {', '.join(names)}"
+        )
+    content = read_json(path)
+    if content.get("format") == FORMAT:
+        return read_native(path, cell)
+    if "verts" in content:
+        return read_houseexpo(path, cell)
+    raise FloorPlanError(
+        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
+        f' "format": "{FORMAT}"'
+    )

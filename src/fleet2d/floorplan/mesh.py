@@ -1,0 +1,227 @@
+"""From wall outlines on the lattice to the triangle mesh that the kernels work on."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.kernels.mesh import BUCKET, SUB, WALL, Mesh, build_buckets
+
+GRID = 2
+"""Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""
+LIMIT = 1 << 20
+"""Coordinates stay below this, so that no product in the kernels overflows."""
+
+Int64 = npt.NDArray[np.int64]
+
+
+class Snapped(NamedTuple):
+    """A polygon moved onto the wall lattice.
+
+    Attributes:
+        polygons: What is left of it, with even integer coordinates; empty when it was too thin.
+        area_change: New area minus old area, square lattice units.
+        tolerance: The most that moving every wall point by the rounding can change the area.
+    """
+
+    polygons: list[Polygon]
+    area_change: float
+    tolerance: float
+
+
+def snap_polygon(polygon: Polygon | MultiPolygon) -> Snapped:
+    """Move a polygon in lattice units onto even coordinates, and drop what collapses to nothing.
+
+    Parts thinner than the lattice vanish, and a part that hangs on by less than that comes off as
+    its own polygon. Where an outline crosses itself, the loops become parts of their own; whether
+    that is a slip of the pen or a wrong outline shows in the area, so check `abs(area_change) <=
+    tolerance`.
+
+    Args:
+        polygon: Free space in lattice units; any coordinates.
+
+    >>> snapped = snap_polygon(shapely.box(0.3, 0.2, 99.7, 10.9))
+    >>> [part.bounds for part in snapped.polygons], round(snapped.area_change, 2)
+    ([(0.0, 0.0, 100.0, 10.0)], -63.58)
+    """
+    sound = polygon if polygon.is_valid else shapely.make_valid(polygon, method="structure")
+    snapped = shapely.set_precision(sound, GRID)
+    parts = [part for part in shapely.get_parts(snapped) if part.area > 0]
+    parts = [shapely.orient_polygons(part) for part in parts]
+    area_change = sum(part.area for part in parts) - polygon.area
+    return Snapped(parts, area_change, GRID * polygon.length)
+
+
+def build_mesh(polygons: Sequence[Polygon], columns: int, rows: int) -> Mesh:
+    """Triangulate free space.
+
+    Args:
+        polygons: The free space; even integer coordinates, interiors disjoint. Rings may touch each
+            other in points.
+        columns: Width of the plan, cells.
+        rows: Height of the plan, cells.
+
+    Raises:
+        FloorPlanError: If the polygons are not such a free space, or don't fit the plan.
+
+    >>> mesh = build_mesh([shapely.box(0, 0, 640, 320)], columns=10, rows=5)
+    >>> mesh.vertices.tolist(), len(mesh.triangles)
+    ([[0, 0], [0, 320], [640, 0], [640, 320]], 2)
+    """
+    rings = _rings(polygons, columns * SUB, rows * SUB)
+    mesh = _meshed(rings, columns, rows)
+    if mesh is None:
+        # A corner that touches the middle of another wall: make it a vertex of that wall, too.
+        mesh = _meshed(_split_at_touching_vertices(rings), columns, rows)
+    if mesh is None:
+        raise FloorPlanError(
+            "The walls don't bound a free space that can be cut into triangles: two outlines "
+            "cross, overlap or share a piece of wall. Merge outlines that share a wall."
+        )
+    return mesh
+
+
+def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[Int64]]:
+    """Return each polygon as open rings, outer first: int64 (n, 2), free space on the left."""
+    if not polygons or any(polygon.area <= 0 for polygon in polygons):
+        raise FloorPlanError(
+            "The floor plan has no free space: there is no polygon, or one without an area."
+        )
+    found = []
+    for polygon in polygons:
+        exact = shapely.get_coordinates(polygon)
+        if not np.array_equal(exact % GRID, np.zeros_like(exact)):
+            raise FloorPlanError(
+                "Walls must lie on even lattice units. Pass the polygon to snap_polygon first."
+            )
+        low, high = exact.min(axis=0), exact.max(axis=0)
+        if low.min() < 0 or high[0] > width or high[1] > height or high.max() >= LIMIT:
+            raise FloorPlanError(
+                f"The walls reach from {low.tolist()} to {high.tolist()} lattice units, but the "
+                f"plan covers [0, 0] to [{width}, {height}], and nothing may reach {LIMIT}. "
+                "Use larger cells."
+            )
+        oriented = shapely.orient_polygons(polygon)
+        found.append(
+            [
+                shapely.get_coordinates(ring)[:-1].astype(np.int64)
+                for ring in (oriented.exterior, *oriented.interiors)
+            ]
+        )
+    return _without_flat_vertices(found)
+
+
+def _keys(points: Int64) -> Int64:
+    """Return one number per point that sorts like (x, y)."""
+    keys: Int64 = points[..., 0] * (2 * LIMIT) + points[..., 1]
+    return keys
+
+
+def _without_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
+    """Drop vertices in the middle of a straight wall, except where rings touch."""
+    everywhere = np.concatenate([_keys(ring) for rings in polygons for ring in rings])
+    keys, counts = np.unique(everywhere, return_counts=True)
+    touching = keys[counts > 1]
+
+    def straightened(ring: Int64) -> Int64:
+        before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
+        bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
+        kept: Int64 = ring[bends | np.isin(_keys(ring), touching)]
+        return kept
+
+    return [[straightened(ring) for ring in rings] for rings in polygons]
+
+
+def _split_at_touching_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
+    """Insert every vertex that lies in the middle of a wall into that wall."""
+    vertices = np.unique(np.concatenate([ring for rings in polygons for ring in rings]), axis=0)
+
+    def split(ring: Int64) -> Int64:
+        points = []
+        for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            along, offsets = end - start, vertices - start
+            distances = offsets @ along
+            on_line = along[0] * offsets[:, 1] == along[1] * offsets[:, 0]
+            between = on_line & (distances > 0) & (distances < along @ along)
+            inserted = np.flatnonzero(between)
+            order = np.argsort(distances[inserted], kind="stable")
+            points += [start[None], vertices[inserted[order]]]
+        return np.concatenate(points)
+
+    return [[split(ring) for ring in rings] for rings in polygons]
+
+
+def _meshed(polygons: list[list[Int64]], columns: int, rows: int) -> Mesh | None:
+    """Return the mesh, or None when the triangles don't fill just the space between the rings."""
+    rings = [ring for rings in polygons for ring in rings]
+    wall_starts = np.concatenate(rings)
+    wall_ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+    keys = np.unique(_keys(wall_starts))
+    vertices = np.stack([keys // (2 * LIMIT), keys % (2 * LIMIT)], axis=1)
+    corners = _triangulated(polygons)
+    triangles = np.searchsorted(keys, _keys(corners))
+    area = int(_doubled_areas(corners).sum())
+    area_between_walls = int(_crossed(wall_starts, wall_ends).sum())
+    if area != area_between_walls or not np.array_equal(vertices[triangles], corners):
+        return None
+    walls = np.searchsorted(keys, _keys(wall_starts)) * len(keys)
+    walls += np.searchsorted(keys, _keys(wall_ends))
+    neighbors = _neighbors(triangles, len(keys), np.sort(walls, kind="stable"))
+    if neighbors is None:
+        return None
+    corner_ids: npt.NDArray[np.int32] = triangles.astype(np.int32)
+    bucket_rows, bucket_columns = rows * SUB // BUCKET + 1, columns * SUB // BUCKET + 1
+    buckets = build_buckets(vertices, corner_ids, bucket_rows, bucket_columns)
+    return Mesh(vertices, corner_ids, neighbors, *buckets, bucket_columns, bucket_rows)
+
+
+def _triangulated(polygons: list[list[Int64]]) -> Int64:
+    """Return triangles that fill the polygons: int64 (t, 3, 2), counter-clockwise corners."""
+    shapes = [Polygon(rings[0], rings[1:]) for rings in polygons]
+    filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
+    exact = shapely.get_coordinates(filled).reshape(len(filled), 4, 2)[:, :3]
+    corners: Int64 = exact.astype(np.int64)
+    areas = _doubled_areas(corners)
+    corners[areas < 0] = corners[areas < 0][:, ::-1]
+    solid: Int64 = corners[areas != 0]
+    return solid
+
+
+def _crossed(starts: Int64, ends: Int64) -> Int64:
+    """Return the cross products of points; over a closed ring they add up to twice its area."""
+    products: Int64 = starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
+    return products
+
+
+def _doubled_areas(corners: Int64) -> Int64:
+    """Return twice the signed area of each triangle; `corners` is int64 (t, 3, 2)."""
+    return _crossed(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _neighbors(triangles: Int64, vertex_count: int, walls: Int64) -> npt.NDArray[np.int32] | None:
+    """Return the triangle across each edge.
+
+    Args:
+        triangles: int64 (t, 3), vertex ids.
+        vertex_count: Number of vertices.
+        walls: start * vertex_count + end of each wall, with the free space on its left, sorted.
+
+    Returns:
+        int32 (t, 3); None unless every edge is either shared by two triangles or is a wall.
+    """
+    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    edges = starts * vertex_count + ends
+    order = np.argsort(edges, kind="stable")
+    ordered = edges[order]
+    reverse = ends * vertex_count + starts
+    position = np.minimum(np.searchsorted(ordered, reverse), len(ordered) - 1)
+    shared = ordered[position] == reverse
+    if (ordered[1:] == ordered[:-1]).any() or not np.array_equal(np.sort(edges[~shared]), walls):
+        return None
+    across = np.where(shared, order[position] // 3, WALL)
+    neighbors: npt.NDArray[np.int32] = across.reshape(-1, 3).astype(np.int32)
+    return neighbors

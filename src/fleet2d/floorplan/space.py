@@ -1,0 +1,188 @@
+"""Where a round body can be, and its shortest ways: the free space shrunk by the body's radius."""
+
+from functools import cached_property, lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.mesh import build_mesh, snap_polygon
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.cells import label_triangles
+from fleet2d.kernels.mesh import Mesh, locate, rasterize_cells, strictly_inside
+from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, find_route
+from fleet2d.kernels.sight import line_of_sight
+
+# Snapping the shrunk walls and rounding a pose move it by less than this many lattice units.
+ROUNDING = 3
+# How many free cells are tried for a way back into the space, nearest first.
+ESCAPES = 200
+# Answers that a space keeps for when they are asked for again.
+ROUTES_KEPT = 4096
+
+I64 = NDArray[np.int64]
+
+
+class Space:
+    """The places where the centre of a body of one radius may be (its configuration space).
+
+    The walls are grown by a regular octagon round the body: a body keeps its radius from every wall, on
+    all sides alike, and at most 8 % more from slanted ones.
+
+    Attributes:
+        radius: The body's radius [m].
+        mesh: Triangles of the space [lattice]; empty when the body fits nowhere.
+        part_of_cell: int32 (rows, columns), the connected part that holds each cell's centre, -1 where
+            the body can't be.
+        parts: Number of connected parts; part 0 holds the most cells.
+    """
+
+    def __init__(self, plan: FloorPlan, radius: float) -> None:
+        self.plan = plan
+        # What behaviors ask for again and again: the same rooms, and on rounds the same ways.
+        self.route = lru_cache(ROUTES_KEPT)(self._find_route)
+        self.cells = lru_cache(None)(self._find_cells)
+        self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
+        self.radius = radius
+        lattice = plan.lattice
+        polygons = _shrunk(plan.polygons, radius * lattice.units_per_m)
+        if not polygons:
+            raise FloorPlanError(
+                f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller radius"
+                " or check the scale of the plan"
+            )
+        self._polygons = polygons
+        self.mesh: Mesh = build_mesh(polygons, lattice.columns, lattice.rows)
+        triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
+        part = label_triangles(self.mesh.neighbors)
+        part_of_cell = np.where(triangles >= 0, part[triangles], -1)
+        # Parts too small to hold a cell's centre are of no use to anyone.
+        sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
+        order = np.argsort(-sizes, kind="stable")
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        self.part_of_cell = np.where(triangles >= 0, rank[part_of_cell], -1).astype(np.int32)
+        self._part_of_triangle = rank[part].astype(np.int32)
+        self.parts = int(np.count_nonzero(sizes))
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Space":
+        """Return itself: what it holds never changes."""
+        return self
+
+    @cached_property
+    def graph(self) -> RouteGraph:
+        """The corners of the space and the legs between them, built when first needed."""
+        return build_route_graph(self.mesh, self._corners())
+
+    def part_at(self, x: int, y: int) -> int:
+        """Return the connected part of a lattice point strictly inside the space, else -1."""
+        if not strictly_inside(self.mesh, x, y):
+            return -1
+        return int(self._part_of_triangle[locate(self.mesh, x, y)])
+
+    def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
+        """Return the cells (n, 2) as (row, column) of a part of the space, in one room if given."""
+        mask = self.part_of_cell == part
+        if room is not None:
+            mask &= self.plan.room_of_cell == room
+        return np.argwhere(mask)
+
+    def _find_nearest(
+        self, x: int, y: int, part: int | None = None, room: int | None = None
+    ) -> tuple[int, int] | None:
+        """Return the centre of the free cell nearest to a lattice point; ties: lowest row, column."""
+        found = self._by_distance(x, y, part, room)
+        return self.plan.lattice.cell_centre(*found[0].tolist()) if len(found) else None
+
+    def _find_route(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+        """Return the shortest path (n, 2) from `start` to `goal` [lattice], or None.
+
+        A start on the border of the space, where a walk can be broken off, first steps back in.
+        """
+        prefix: list[tuple[int, int]] = []
+        if not strictly_inside(self.mesh, *start):
+            inside = self._way_in(*start)
+            if inside is None:
+                return None
+            prefix, start = [start], inside
+        out = np.empty((len(self.graph.corners.vertex) + 2, 2), np.int64)
+        count = find_route(self.mesh, self.graph, *start, *goal, out)
+        if count == 0:
+            return None
+        return np.concatenate([np.array(prefix, np.int64).reshape(-1, 2), out[:count]])
+
+    def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
+        walls = self.plan.mesh
+        triangle = locate(walls, x, y)
+        for row, column in self._by_distance(x, y)[:ESCAPES].tolist():
+            target = self.plan.lattice.cell_centre(row, column)
+            if triangle >= 0 and line_of_sight(walls, x, y, triangle, *target):
+                return target
+        return None
+
+    def _by_distance(
+        self, x: int, y: int, part: int | None = None, room: int | None = None
+    ) -> I64:
+        mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
+        if room is not None:
+            mask = mask & (self.plan.room_of_cell == room)
+        cells = np.argwhere(mask)
+        xs, ys = self.plan.lattice.centre_axes()
+        away = (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
+        return cells[np.argsort(away, kind="stable")]
+
+    def _corners(self) -> Corners:
+        """Find the vertices where the border turns into the space."""
+        vertices = self.mesh.vertices
+        before, at, after = [], [], []
+        for polygon in self._polygons:
+            for ring in (polygon.exterior, *polygon.interiors):
+                points = np.asarray(ring.coords)[:-1].astype(np.int64)
+                before.append(np.roll(points, 1, axis=0))
+                at.append(points)
+                after.append(np.roll(points, -1, axis=0))
+        p, q, r = np.concatenate(before), np.concatenate(at), np.concatenate(after)
+        a, b = q - p, r - q
+        reflex = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0  # the free space lies to the left
+        keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
+        ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
+        walls_meeting = np.bincount(ids, minlength=len(vertices))
+        vertex, first = np.unique(ids[reflex], return_index=True)
+        node_of_vertex = np.full(len(vertices), -1, np.int32)
+        node_of_vertex[vertex] = np.arange(len(vertex))
+        return Corners(
+            node_of_vertex=node_of_vertex,
+            vertex=vertex.astype(np.int32),
+            before=np.ascontiguousarray(p[reflex][first]),
+            after=np.ascontiguousarray(r[reflex][first]),
+            simple=(walls_meeting[vertex] == 1).astype(np.uint8),
+        )
+
+
+def _shrunk(polygons: list[shapely.Polygon], radius: float) -> list[shapely.Polygon]:
+    """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side."""
+    reach = _even_at_least(radius + ROUNDING)
+    # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
+    half_side = _even_at_least(reach * 0.41421357)
+    a, b = reach, half_side
+    octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+    shrunk: list[shapely.Polygon] = []
+    for polygon in polygons:
+        grown = [_grown_walls(np.asarray(r.coords), octagon) for r in (polygon.exterior, *polygon.interiors)]
+        rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
+        for part in shapely.get_parts(rest):
+            if part.geom_type == "Polygon" and part.area > 0:
+                shrunk += snap_polygon(part).polygons
+    return shrunk
+
+
+def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:
+    """Return every wall of a ring, grown by the octagon, as convex polygons."""
+    ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
+    hulls: NDArray[np.object_] = shapely.convex_hull(shapely.multipoints(ends))
+    return hulls
+
+
+def _even_at_least(value: float) -> int:
+    return 2 * int(np.ceil(value / 2))

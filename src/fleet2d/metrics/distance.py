@@ -1,0 +1,35 @@
+"""How far everybody goes."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+
+@register("metric", "distance")
+class Distance(Metric):
+    """Metres that each body covers per day, as the sum of its moves from step to step."""
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.metres: dict[str, float] = {}
+        self.days = 0.0
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Add up the moves."""
+        for name in (*state.users, *state.robots):
+            poses = history.poses(name)
+            moves = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)
+            self.metres[name] = self.metres.get(name, 0.0) + float(moves.sum())
+        self.days += len(history) * history.step_s / 86400
+
+    def result(self) -> dict[str, Any]:
+        """Return {name: metres per day}."""
+        return {name: metres / self.days for name, metres in self.metres.items() if self.days}

@@ -1,0 +1,40 @@
+"""Metrics: algorithms that only record. They know the truth, and nobody acts on what they say."""
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import Field
+
+from datetime import timedelta
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import Component
+from fleet2d.units import PositiveDuration
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+
+class Metric(Component):
+    """Base of what measures a run; a subclass writes `update` and `result`.
+
+    Like an algorithm it is updated after every full `period`, and what `update` returns is stored.
+    Unlike one it may ask for the poses of users.
+    """
+
+    kind: ClassVar[str] = "metric"
+
+    period: PositiveDuration = Field(
+        default=timedelta(days=1), description="how often it is updated"
+    )
+
+    def start(self, home: "Home") -> None:
+        """Prepare for a run."""
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Take in the history since the last update; return rows to store, or None."""
+        raise NotImplementedError
+
+    def result(self) -> dict[str, Any]:
+        """Return the few numbers that sum up the run, for the manifest and the closing table."""
+        return {}

@@ -1,0 +1,53 @@
+"""Where users really are: the share of time per room."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+AWAY = "away"
+
+
+@register("metric", "room_share")
+class RoomShare(Metric):
+    """Share of time that each user spends in each room, and away.
+
+    Stored per period; the result is over the whole run. Shares of a user sum to one.
+    """
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.names = [*(room.name for room in home.rooms), AWAY]
+        self.seconds: dict[str, Any] = {}
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Count the steps per room."""
+        users, shares = [], []
+        for user in state.users:
+            room = history.poses(user).room.astype(np.int64)
+            # Away is -1 and comes last.
+            steps = np.bincount(room % len(self.names), minlength=len(self.names))
+            self.seconds[user] = self.seconds.get(user, 0) + steps
+            users.append(user)
+            shares.append(steps / steps.sum())
+        if not users:
+            return None
+        return {
+            "user": np.repeat(users, len(self.names)),
+            "room": np.tile(self.names, len(users)),
+            "share": np.concatenate(shares),
+        }
+
+    def result(self) -> dict[str, Any]:
+        """Return {user: {room: share}} of the rooms that the user was in."""
+        return {
+            user: {n: float(s / steps.sum()) for n, s in zip(self.names, steps, strict=True) if s}
+            for user, steps in self.seconds.items()
+        }

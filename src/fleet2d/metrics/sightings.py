@@ -1,0 +1,36 @@
+"""How much the robots see of the users."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+
+@register("metric", "sightings")
+class Sightings(Metric):
+    """Share of a user's steps at home in which at least one robot detects the user."""
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.seen: dict[str, int] = {}
+        self.at_home: dict[str, int] = {}
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Count detections by step."""
+        observations = history.observations
+        for index, user in enumerate(state.users):
+            steps = np.unique(observations.step[observations.user == index])
+            self.seen[user] = self.seen.get(user, 0) + len(steps)
+            at_home = int(np.count_nonzero(~history.poses(user).away))
+            self.at_home[user] = self.at_home.get(user, 0) + at_home
+
+    def result(self) -> dict[str, Any]:
+        """Return {user: share}; a user who was never at home has none."""
+        return {user: seen / self.at_home[user] for user, seen in self.seen.items() if self.at_home[user]}

@@ -1,0 +1,76 @@
+"""Errors that validators raise: in plain words, about a key, with the nearest valid name."""
+
+import difflib
+from collections.abc import Callable, Iterable
+from typing import get_args
+
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+
+Location = tuple[int | str, ...]
+
+_PYDANTIC_ERRORS = frozenset(get_args(core_schema.ErrorType))
+
+
+def problem(message: str) -> PydanticCustomError:
+    """Make the error that a validator raises to say ``message`` about its value, word for word."""
+    return PydanticCustomError("problem", "{message}", {"message": message})
+
+
+def problem_at(location: Location, message: str, found: object = None) -> ValidationError:
+    """Make the error that a validator raises about a key below its own value."""
+    return ValidationError.from_exception_data(
+        "", [InitErrorDetails(type=problem(message), loc=location, input=found)]
+    )
+
+
+def unknown_key(key: object, known: Iterable[str]) -> PydanticCustomError:
+    """Make the error about a key that is not among the known ones."""
+    names = sorted(known)
+    return PydanticCustomError(
+        "unknown_key",
+        "unknown key {key}{hint} Allowed here: {names}",
+        {
+            "key": repr(key),
+            "hint": did_you_mean(key, names),
+            "names": ", ".join(names),
+            "known": names,
+        },
+    )
+
+
+def rewritten(
+    error: ValidationError, change: Callable[[InitErrorDetails], InitErrorDetails]
+) -> ValidationError:
+    """Return the same error with ``change`` applied to each of its lines."""
+    lines = []
+    for line in error.errors(include_url=False):
+        kind, context = line["type"], line.get("ctx", {})
+        details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
+        if kind not in _PYDANTIC_ERRORS:
+            # Last, so that nothing in the finished message is taken for a place to fill.
+            filled = {key: context[key] for key in context if key != "message"}
+            details["type"] = PydanticCustomError(
+                kind, "{message}", {**filled, "message": line["msg"]}
+            )
+        lines.append(change(details))
+    return ValidationError.from_exception_data(error.title, lines)
+
+
+def did_you_mean(name: object, known: Iterable[object]) -> str:
+    """Return ": did you mean …?" for the nearest of the known names, else a full stop.
+
+    >>> did_you_mean("sped", ["speed", "radius"])
+    ": did you mean 'speed'?"
+    """
+    near = difflib.get_close_matches(str(name), [str(k) for k in known], n=1)
+    return f": did you mean {near[0]!r}?" if near else "."
+
+
+def shown(value: object) -> str:
+    """Write a found value for a message: text in quotes, everything else as it is.
+
+    >>> shown("fast"), shown(3)
+    ("'fast'", '3')
+    """
+    return repr(str(value)) if isinstance(value, str) else str(value)

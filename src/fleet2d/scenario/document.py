@@ -1,0 +1,185 @@
+"""Read one YAML file into plain data that remembers where each value was written."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fleet2d.errors import ScenarioError
+from fleet2d.paths import Text
+from fleet2d.problems import Location, did_you_mean
+
+Keys = tuple[str, ...]
+"""The path of a value in a scenario; the places in a list are written as keys, too."""
+
+
+@dataclass
+class Document:
+    """Plain data, and for each of its key paths where it was written, like 'home.yaml:12'."""
+
+    data: dict[str, Any] = field(default_factory=dict)
+    places: dict[Keys, str] = field(default_factory=dict)
+
+    def place(self, location: Location) -> str:
+        """Return where a key was written, or where the nearest key around it was."""
+        keys = tuple(map(str, location))
+        around = (self.places.get(keys[:n]) for n in range(len(keys), -1, -1))
+        return next((place for place in around if place is not None), "")
+
+
+def read_document(path: Path, shown: str | None = None) -> Document:
+    """Read a YAML file; ``shown`` is what messages call it.
+
+    Raises:
+        ScenarioError: the file can't be read, or is not a YAML mapping; with file and line.
+    """
+    shown = shown or str(path)
+    document = Document()
+    document.data = parse_yaml(_read_text(path, shown), path.parent, shown, document.places)
+    if document.data is None:
+        raise ScenarioError(
+            f"{shown} is empty; a scenario that changes nothing reads: extends: bundled:base"
+        )
+    if not isinstance(document.data, dict):
+        raise ScenarioError(
+            f"{shown}: a scenario is a mapping (simulation: …, floorplan: …); this is "
+            f"{'a list' if isinstance(document.data, list) else f'the value {document.data!r}'}"
+        )
+    return document
+
+
+def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | None = None) -> Any:
+    """Parse YAML text; note the place of each value in ``places``.
+
+    Booleans are true and false only, 12:30 is text, a key twice is an error: YAML 1.2 and no traps.
+
+    >>> parse_yaml("{start: 12:30, light: on, tolerance: 1e-3}", Path(), "example")
+    {'start': '12:30', 'light': 'on', 'tolerance': 0.001}
+
+    Raises:
+        ScenarioError: the text is not YAML; with file and line.
+    """
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        return _Builder(loader, folder, shown, {} if places is None else places).build(node, ())
+    except yaml.MarkedYAMLError as error:
+        line = (
+            f":{error.problem_mark.line + 1}" if error.problem_mark and places is not None else ""
+        )
+        why = " ".join(part for part in (error.context, error.problem) if part)
+        raise ScenarioError(f"{shown}{line}: not valid YAML: {why}") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ScenarioError(f"{shown}: not valid YAML: {error}") from error
+
+
+def _read_text(path: Path, shown: str) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        near = [str(p) for p in sorted(path.parent.glob("*.y*ml"))] if path.parent.is_dir() else []
+        raise ScenarioError(f"there is no file {shown}{did_you_mean(path, near)}") from None
+    except IsADirectoryError:
+        raise ScenarioError(f"{shown} is a folder; name the YAML file in it") from None
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{shown} is not a text file (byte {error.start})") from None
+    except OSError as error:
+        raise ScenarioError(f"can't read {shown}: {error.strerror}") from error
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader with the scalars of YAML 1.2, dates included."""
+
+
+_Loader.yaml_implicit_resolvers = {}
+_TAG = "tag:yaml.org,2002:"
+for _name, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
+    (
+        "float",
+        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+        list("-+.0123456789"),
+    ),
+    ("merge", r"<<", ["<"]),
+):
+    _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
+_TIMESTAMP = [
+    resolver
+    for resolver in yaml.SafeLoader.yaml_implicit_resolvers["1"]
+    if resolver[0] == _TAG + "timestamp"
+]
+for _digit in "0123456789":
+    _Loader.yaml_implicit_resolvers[_digit] += _TIMESTAMP
+
+
+def _construct_int(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+    text = node.value
+    return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
+
+
+def _construct_timestamp(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> Any:
+    try:
+        return loader.construct_yaml_timestamp(node)
+    except ValueError:  # 2026-02-31: text, which the model refuses with the key's name
+        return node.value
+
+
+_Loader.add_constructor(_TAG + "int", _construct_int)
+_Loader.add_constructor(_TAG + "timestamp", _construct_timestamp)
+
+
+@dataclass
+class _Builder:
+    """Turns a tree of YAML nodes into plain data."""
+
+    loader: _Loader
+    folder: Path
+    shown: str
+    places: dict[Keys, str]
+    open_nodes: list[yaml.Node] = field(default_factory=list)
+
+    def build(self, node: yaml.Node, location: Keys) -> Any:
+        """Build a node's value; note where it starts."""
+        self.places.setdefault(location, f"{self.shown}:{node.start_mark.line + 1}")
+        if any(node is outer for outer in self.open_nodes):
+            raise self._error(node, "a value can't contain itself")
+        self.open_nodes.append(node)
+        try:
+            if isinstance(node, yaml.MappingNode):
+                return self._mapping(node, location)
+            if isinstance(node, yaml.SequenceNode):
+                return [self.build(item, (*location, str(i))) for i, item in enumerate(node.value)]
+            value = self.loader.construct_object(node)
+            return Text(value, self.folder) if isinstance(value, str) else value
+        finally:
+            self.open_nodes.pop()
+
+    def _mapping(self, node: yaml.MappingNode, location: Keys) -> dict[str, Any]:
+        seen: dict[str, int] = {}
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise self._error(key, "a key must be plain text")
+            line = key.start_mark.line + 1
+            if key.value in seen:
+                raise self._error(
+                    key, f"the key {key.value!r} is already in line {seen[key.value]}"
+                )
+            seen[key.value] = line
+        self.loader.flatten_mapping(node)  # unfolds '<<: *anchor': merged keys come first
+        result = {}
+        for key, value in node.value:
+            inner = (*location, key.value)
+            self.places.pop(inner, None)
+            result[key.value] = self.build(value, inner)
+            self.places[inner] = f"{self.shown}:{key.start_mark.line + 1}"
+        return result
+
+    def _error(self, node: yaml.Node, message: str) -> ScenarioError:
+        return ScenarioError(f"{self.shown}:{node.start_mark.line + 1}: {message}")

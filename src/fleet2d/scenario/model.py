@@ -1,0 +1,202 @@
+"""The scenario: everything that defines a run, validated."""
+
+import re
+from collections.abc import Mapping
+from datetime import date, datetime, timedelta
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    model_validator,
+)
+
+from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.component import Component, OneOf, Settings, ShortForm
+from fleet2d.entities.entity import Robot, User
+from fleet2d.errors import ScenarioError
+from fleet2d.problems import did_you_mean, problem, problem_at
+from fleet2d.scenario.compose import compose
+from fleet2d.scenario.explain import explain
+from fleet2d.units import Duration, PositiveDuration, format_duration, micros
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+def _local_time(value: Any) -> Any:
+    """Refuse what pydantic would read as seconds since 1970, and time zones."""
+    if not isinstance(value, str | date):
+        raise problem(f"found {value}; a date and time is wanted, like 2026-01-05T08:00")
+    try:
+        moment = datetime.fromisoformat(value) if isinstance(value, str) else value
+    except ValueError:
+        raise problem(
+            f"found '{value}'; a date and time is wanted, like 2026-01-05T08:00"
+        ) from None
+    if isinstance(moment, datetime) and moment.tzinfo is not None:
+        raise problem(
+            f"found {moment.isoformat()}; the clock on the home's wall is wanted, without a time "
+            "zone: a simulated day has 24 hours"
+        )
+    return moment
+
+
+def _named(entries: Any) -> Any:
+    """Refuse names that could not be part of a key path, a file name or a table name."""
+    if isinstance(entries, Mapping):
+        for name in entries:
+            if not _NAME.fullmatch(str(name)):
+                raise problem_at(
+                    (name,),
+                    f"the name {name!r} must be letters, digits, '_' and '-', a letter first",
+                )
+    return entries
+
+
+def _typed_by_name(entries: Any) -> Any:
+    """Let `ltp_error: {of: ltp}` stand for `ltp_error: {type: ltp_error, of: ltp}`."""
+    if not isinstance(entries, Mapping):
+        return entries
+    return {
+        name: {"type": name, **entry} if isinstance(entry, Mapping) else entry
+        for name, entry in entries.items()
+    }
+
+
+_Named = BeforeValidator(_named)
+_Typed = BeforeValidator(_typed_by_name)
+
+
+class SimulationSettings(Settings):
+    """When a run starts, how long it lasts, and how fast it goes."""
+
+    start: Annotated[datetime, BeforeValidator(_local_time)] = Field(
+        default=datetime(2026, 1, 5), description="The home's local time at step 0."
+    )
+    duration: Duration = Field(
+        description="Simulated time. A run stops at its last full step within it."
+    )
+    step: PositiveDuration = Field(
+        default=timedelta(seconds=1), description="The length of a step."
+    )
+    seed: int | None = Field(
+        default=None,
+        ge=0,
+        lt=2**63,
+        description="All randomness follows from it; null: one is drawn and stored.",
+    )
+    max_span: int | None = Field(
+        default=None,
+        ge=1,
+        description="The most steps that are computed in one go. It changes no result.",
+    )
+    speedup: float | None = Field(
+        default=None,
+        gt=0,
+        description="Run at this many times real time; null: as fast as possible.",
+    )
+
+    @model_validator(mode="after")
+    def _lasts_a_step(self) -> Self:
+        if self.duration < self.step:
+            raise problem_at(
+                ("duration",),
+                f"{format_duration(self.duration)} is shorter than one step, "
+                f"{format_duration(self.step)}",
+            )
+        return self
+
+    @property
+    def steps(self) -> int:
+        """The number of full steps in the duration."""
+        return self.duration // self.step
+
+    @property
+    def step_us(self) -> int:
+        """The length of a step [µs]."""
+        return micros(self.step)
+
+
+class Scenario(Settings):
+    """Everything that defines a run."""
+
+    name: str | None = Field(default=None, description="What this scenario is called in reports.")
+    simulation: SimulationSettings
+    floorplan: Annotated[Component, OneOf("floorplan")] = Field(description="The home's walls.")
+    users: Annotated[dict[str, Annotated[User, ShortForm()]], _Named] = Field(
+        default={}, description="The people, by name."
+    )
+    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _Named] = Field(
+        default={}, description="The robots, by name."
+    )
+    algorithms: Annotated[dict[str, Annotated[Component, OneOf("algorithm")]], _Named, _Typed] = (
+        Field(default={}, description="What computes during the run, by name.")
+    )
+    metrics: Annotated[dict[str, Annotated[Component, OneOf("metric")]], _Named, _Typed] = Field(
+        default={}, description="What is only recorded, by name."
+    )
+    artifacts: ArtifactSettings = Field(
+        default=ArtifactSettings(), description="What a run stores."
+    )
+    _folder: Path = PrivateAttr(default_factory=Path.cwd)
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        for name in self.users.keys() & self.robots.keys():
+            raise problem_at(("robots", name), f"there is a user named {name!r} already")
+        return self
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the file that the scenario was read from."""
+        return self._folder
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the whole scenario as plain JSON data that :func:`load_scenario` reads back."""
+        return self.model_dump(mode="json")
+
+
+def load_scenario(
+    source: str | Path | Mapping[str, Any] | Scenario | None = None,
+    /,
+    *overrides: str,
+    **settings: Any,
+) -> Scenario:
+    """Load a scenario, change it, and check all of it.
+
+    Args:
+        source: a YAML file, 'bundled:NAME', a mapping or a scenario; None: the bundled base.
+        overrides: texts like 'simulation.duration.days=60', the value in YAML.
+        settings: keys of ``simulation`` (``seed=4``) or whole sections (``name="night"``).
+
+    Raises:
+        ScenarioError: what is wrong, where it is written, and what is wanted; a line per problem.
+    """
+    folder = Path.cwd()
+    if isinstance(source, Scenario):
+        if not overrides and not settings:
+            return source
+        folder, source = source.folder, source.resolved()
+    elif isinstance(source, str | Path) and not str(source).startswith("bundled:"):
+        folder = Path(source).absolute().parent
+    document = compose(source, overrides, {_key(name): v for name, v in settings.items()})
+    try:
+        scenario = Scenario.model_validate(document.data)
+    except ValidationError as error:
+        raise explain(error, document) from None
+    scenario._folder = folder
+    return scenario
+
+
+def _key(name: str) -> tuple[str, ...]:
+    if name in SimulationSettings.model_fields:
+        return ("simulation", name)
+    if name not in Scenario.model_fields:
+        known = [*SimulationSettings.model_fields, *Scenario.model_fields]
+        raise ScenarioError(
+            f"unknown argument {name!r}{did_you_mean(name, known)} Known are: {', '.join(known)}"
+        )
+    return (name,)

@@ -1,0 +1,204 @@
+"""What a scenario can say: a JSON Schema for editors, a list of components for people."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_json_schema
+from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
+
+from fleet2d.component import PACKAGES, Component, aliases, components
+from fleet2d.scenario.compose import ENTRIES
+from fleet2d.scenario.model import Scenario
+
+
+class _Writer(GenerateJsonSchema):
+    """Writes defaults as a scenario does: '1 min', not pydantic's 'PT1M'."""
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """Dump the default as the field's own type does."""
+        result = super().default_schema(schema)
+        if "default" in result:
+            # What can't be dumped alone stays as it is, such as a default that is yet to be parsed.
+            with suppress(SchemaError, PydanticSerializationError):
+                default = self.get_default_value(schema)
+                result["default"] = SchemaSerializer(schema).to_python(default, mode="json")
+        return result
+
+
+@dataclass(frozen=True)
+class FieldDescription:
+    """One configuration key of a component; ``default`` is None where it has to be given."""
+
+    name: str
+    type: str
+    default: str | None
+    description: str
+
+
+@dataclass(frozen=True)
+class ComponentDescription:
+    """A registered component and its configuration."""
+
+    kind: str
+    type: str
+    aliases: tuple[str, ...]
+    summary: str
+    fields: tuple[FieldDescription, ...]
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a scenario file."""
+    found = {kind: components(kind) for kind in PACKAGES}
+    models: list[type[BaseModel]] = [
+        Scenario,
+        *(cls for classes in found.values() for cls in classes.values()),
+    ]
+    references, written = models_json_schema(
+        [(model, "validation") for model in models], schema_generator=_Writer
+    )
+    definitions = written["$defs"]
+    kinds = {
+        kind: {
+            name: definitions[_key(references[cls, "validation"])] for name, cls in classes.items()
+        }
+        for kind, classes in found.items()
+    }
+    for kind, types in kinds.items():
+        for name, definition in types.items():
+            properties = definition.get("properties", {})
+            definition.update(title=name, properties={"type": {"const": name}, **properties})
+        definitions[kind] = {"anyOf": _any_of(kind, references, found[kind])}
+    definitions = {
+        key: _without_required(_expanded(value, kinds)) for key, value in definitions.items()
+    }
+    result = definitions.pop(_key(references[Scenario, "validation"]))
+    _allow_composition(result["properties"])
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **result,
+        "$defs": definitions,
+    }
+
+
+def _key(reference: Mapping[str, Any]) -> str:
+    return str(reference["$ref"]).rpartition("/")[2]
+
+
+def _any_of(
+    kind: str, references: Mapping[Any, Any], classes: Mapping[str, type[Component]]
+) -> list[dict[str, Any]]:
+    """List the ways to write a component: each type, a bare name, and a user's own."""
+    own = {"type": "string", "pattern": ":", "description": f"your own {kind}: module:Class"}
+    return [
+        *({**references[cls, "validation"], "required": ["type"]} for cls in classes.values()),
+        {"type": "string", "enum": [n for c in classes for n in (c, *aliases(kind, c))]},
+        {"type": "object", "properties": {"type": own}, "required": ["type"]},
+        own,
+    ]
+
+
+def _expanded(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Replace the marks that `OneOf` and `ShortForm` leave in the schema of their fields."""
+    if isinstance(value, list):
+        return [_expanded(item, kinds) for item in value]
+    if not isinstance(value, dict):
+        return value
+    result = {k: _expanded(v, kinds) for k, v in value.items() if k != "x-short-form"}
+    if (kind := result.pop("x-kind", None)) is not None:
+        result["$ref"] = f"#/$defs/{kind}"
+    if (mark := value.get("x-short-form")) is not None:
+        result["anyOf"] += [
+            {
+                **definition,
+                "properties": definition["properties"] | mark["body"],
+                "required": ["type"],
+            }
+            for definition in kinds[mark["kind"]].values()
+        ]
+        result["anyOf"] += _any_of(mark["kind"], {}, {})[1:]
+    return result
+
+
+def _allow_composition(properties: dict[str, Any]) -> None:
+    """Add what a file may say and a composed scenario can't: 'extends', deletion by null."""
+    path = {"type": "string", "description": "a YAML file beside this one, or 'bundled:NAME'"}
+    properties["extends"] = {
+        "description": "What this file builds on.",
+        "anyOf": [path, {"type": "array", "items": path}],
+    }
+    deleted = {"type": "null", "description": "null deletes an entry of the extended file"}
+    for section in ENTRIES:
+        entry = properties[section]["additionalProperties"]
+        forms = [entry, {"type": "object", "not": {"required": ["type"]}}, deleted]
+        if section in ("users", "robots"):  # only algorithms and metrics are typed by their name
+            del forms[1]
+        properties[section]["additionalProperties"] = {"anyOf": forms}
+
+
+def describe_components() -> list[ComponentDescription]:
+    """Describe every component that a scenario can name: its fields, their units and defaults."""
+    return [
+        _describe(kind, name, cls) for kind in PACKAGES for name, cls in components(kind).items()
+    ]
+
+
+def _describe(kind: str, name: str, cls: type[Component]) -> ComponentDescription:
+    written = cls.model_json_schema(schema_generator=_Writer)
+    properties, needed = written.get("properties", {}), written.get("required", ())
+    return ComponentDescription(
+        kind,
+        name,
+        aliases(kind, name),
+        (cls.__doc__ or "").strip().partition("\n")[0],
+        tuple(
+            FieldDescription(
+                key,
+                _type_of(value),
+                None if key in needed else _shown(value.get("default")),
+                cls.model_fields[key].description or "",
+            )
+            for key, value in properties.items()
+        ),
+    )
+
+
+def _type_of(value: Mapping[str, Any]) -> str:
+    """Name the type of a JSON Schema as a person would."""
+    if mark := value.get("x-quantity", value.get("x-kind")):
+        return str(mark)
+    if "const" in value or "enum" in value:
+        return " | ".join(map(str, value.get("enum", [value.get("const")])))
+    if "$ref" in value:
+        return str(value["$ref"]).rpartition("/")[2]
+    arms = value.get("anyOf", value.get("oneOf"))
+    if arms:
+        return " | ".join(dict.fromkeys(_type_of(arm) for arm in arms))
+    if "prefixItems" in value:
+        return f"[{', '.join(map(_type_of, value['prefixItems']))}]"
+    if value.get("type") == "array":
+        return f"list of {_type_of(value.get('items', {}))}"
+    if value.get("type") == "object":
+        return f"mapping to {_type_of(value.get('additionalProperties') or {})}"
+    words = {"integer": "whole number", "string": "text", "boolean": "true | false"}
+    return words.get(value.get("type", "any"), str(value.get("type", "any")))
+
+
+def _shown(default: Any) -> str:
+    if isinstance(default, bool) or default is None:
+        return {None: "null", True: "true", False: "false"}[default]
+    return str(default)
+
+
+def _without_required(value: Any) -> Any:
+    """Drop 'required' except for ``type``: the file that one extends may give the rest."""
+    if isinstance(value, list):
+        return [_without_required(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    result = {k: _without_required(v) for k, v in value.items() if k != "required"}
+    if "type" in value.get("required", ()):
+        result["required"] = ["type"]
+    return result

@@ -1,0 +1,109 @@
+"""What is visible from one place in a home: its outline, its area, and whether it holds a point."""
+
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels.mesh import Mesh, locate
+from fleet2d.kernels.region import region_contains_points, region_outline
+from fleet2d.kernels.region import visible_region as visible_region_fast
+from fleet2d.kernels.sight import scratch_for
+
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+
+class Walled(Protocol):
+    """What a sight line needs to know of a floor plan."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The free space between the walls."""
+
+    @property
+    def lattice(self) -> Lattice:
+        """The way from metres to lattice units and back."""
+
+
+class VisibleRegion:
+    """Everything that is visible from one place: a star-shaped region, exact in lattice units.
+
+    A point is in the region if and only if the straight line from the eye to it touches no wall and
+    no corner, so the outline isn't part of the region.
+
+    Attributes:
+        eye: Where it is seen from, lattice units.
+        right: int32 (n,), for each piece of the region the mesh vertex on its right border.
+        wall: int32 (n,), the wall edge of each piece, 3 * triangle + k.
+
+    Example:
+        >>> import shapely
+        >>> from fleet2d.floorplan.plan import FloorPlan
+        >>> corners = [(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)]
+        >>> hall = FloorPlan.build("L", shapely.Polygon(corners))
+        >>> region = VisibleRegion(hall, x=1.0, y=3.0)
+        >>> round(region.area_m2, 3), region.contains([(1.0, 1.0), (3.5, 1.5)]).tolist()
+        (10.0, [True, False])
+    """
+
+    def __init__(self, plan: Walled, x: float, y: float) -> None:
+        """Find what is visible from (x, y).
+
+        Args:
+            plan: A floor plan.
+            x: Where the eye is [m].
+            y: Where the eye is [m].
+
+        Raises:
+            PlacementError: If the eye is outside free space or on a wall.
+        """
+        self._mesh, self._lattice = plan.mesh, plan.lattice
+        eye = self._lattice.to_lattice((x, y))
+        self.eye = (int(eye[0]), int(eye[1]))
+        wall, stack = scratch_for(self._mesh.vertices)
+        right = np.empty_like(wall)
+        triangle = locate(self._mesh, *self.eye)
+        pieces = visible_region_fast(self._mesh, *self.eye, triangle, right, wall, stack)
+        if pieces == 0:
+            raise PlacementError(
+                f"({x:g}, {y:g}) m is in a wall or outside the home, so nothing is visible from "
+                "there. Choose a place in free space."
+            )
+        self.right: Int32 = right[:pieces].copy()
+        self.wall: Int32 = wall[:pieces].copy()
+
+    @cached_property
+    def _outline(self) -> tuple[Float64, float]:
+        outline = np.empty((2 * len(self.right), 2))
+        area = region_outline(self._mesh, *self.eye, self.right, self.wall, outline)
+        return outline, area
+
+    @property
+    def area_m2(self) -> float:
+        """The area of the region, square metres."""
+        return self._outline[1] / self._lattice.units_per_m**2
+
+    def polygon(self) -> Float64:
+        """Return the corners of the outline, counter-clockwise: float64 (n, 2), metres."""
+        outline, _ = self._outline
+        moved = (outline != np.roll(outline, 1, axis=0)).any(axis=1)
+        return self._lattice.to_metres(outline[moved])
+
+    def contains(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Return which points are visible.
+
+        Args:
+            points: (…, 2), metres; each counts as the lattice point nearest to it.
+
+        Returns:
+            bool (…).
+        """
+        lattice_points = self._lattice.to_lattice(points)
+        flat = np.ascontiguousarray(lattice_points.reshape(-1, 2))
+        found = region_contains_points(self._mesh, *self.eye, self.right, self.wall, flat)
+        inside: npt.NDArray[np.bool_] = found.reshape(lattice_points.shape[:-1])
+        return inside

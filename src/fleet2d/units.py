@@ -1,0 +1,361 @@
+"""Quantities as people write them: types for the fields of a configuration.
+
+Each type takes a bare number in SI units (angles: degrees) or text with a unit, is exact while it
+converts, and refuses what is not finite. Models dump to JSON in the canonical spelling.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import time, timedelta
+from decimal import Decimal
+from fractions import Fraction
+from numbers import Real
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, PlainSerializer, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from fleet2d.paths import InputPath, Text, folder_of
+from fleet2d.problems import problem, shown
+
+__all__ = [
+    "LONGEST_DURATION",
+    "AngleDeg",
+    "Duration",
+    "InputPath",
+    "Length",
+    "PositiveDuration",
+    "PositiveLength",
+    "Quantity",
+    "Share",
+    "Speed",
+    "Text",
+    "TimeOfDay",
+    "TurnRateDeg",
+    "folder_of",
+    "format_duration",
+    "format_time_of_day",
+    "micros",
+    "parse_duration",
+    "parse_time_of_day",
+    "problem",
+]
+
+LONGEST_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
+MICROSECOND = timedelta(microseconds=1)
+
+# Exponents are short on purpose: Fraction("1e999999999") would fill the memory.
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_PART = re.compile(rf"\s*({_NUMBER})\s*([^\s\d.,+-][^\s\d,]*)?\s*,?")
+_TIME_OF_DAY = re.compile(r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:\.\d{1,6})?))?")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A physical quantity: how it is written, and how that becomes a number in its base unit."""
+
+    name: str
+    base: str
+    units: Mapping[str, Fraction]
+    examples: tuple[str, ...]
+
+    def parse(self, value: object) -> Fraction:
+        """Convert a number, text with units, or a mapping of units to numbers; exactly.
+
+        Raises:
+            PydanticCustomError: what was found, and how the quantity is written.
+        """
+        if isinstance(value, str):
+            return self._parse_text(value)
+        if isinstance(value, Mapping) and value:
+            return sum(
+                (self._number(n, value) * self._unit(u, value) for u, n in value.items()),
+                Fraction(0),
+            )
+        return self._number(value, value)
+
+    def _parse_text(self, text: str) -> Fraction:
+        total, position = Fraction(0), 0
+        while position < len(text) or not position:
+            part = _PART.match(text, position)
+            if part is None or (not part[2] and part.span() != (0, len(text))):
+                raise self._unreadable(text)
+            total += Fraction(part[1]) * (self._unit(part[2], text) if part[2] else 1)
+            position = part.end()
+        return total
+
+    def _number(self, value: object, found: object) -> Fraction:
+        if isinstance(value, bool) or not isinstance(value, Real | Decimal):
+            raise self._unreadable(found)
+        if not math.isfinite(value):
+            raise problem(f"found {value}; {self.name} is a finite number")
+        # repr, because the user who wrote 0.1 meant one tenth and not the nearest binary fraction
+        return Fraction(value if isinstance(value, Decimal) else repr(float(value)))
+
+    def _unit(self, unit: object, found: object) -> Fraction:
+        factor = self.units.get(str(unit))
+        if factor is None:
+            raise problem(
+                f"unknown unit {str(unit)!r} in {shown(found)}: {self.name} is written "
+                f"like {self._examples()}"
+            )
+        return factor
+
+    def _unreadable(self, found: object) -> PydanticCustomError:
+        number = f"a number in {self.base}, or " if self.base else "a number, or "
+        return problem(
+            f"found {shown(found)}; {self.name} is wanted: {number}like {self._examples()}"
+        )
+
+    def _examples(self) -> str:
+        return ", ".join(f"'{example}'" for example in self.examples)
+
+    def schema(self, **more: Any) -> WithJsonSchema:
+        """Describe the quantity for JSON Schema; ``x-quantity`` is its short name."""
+        kinds: list[dict[str, Any]] = [{"type": "number"}, {"type": "string"}]
+        if "mapping" in more:
+            kinds.append(more.pop("mapping"))
+        number = f"a number in {self.base}, or " if self.base else "a number, or "
+        return WithJsonSchema(
+            {
+                "description": f"{self.name}: {number}like {self._examples()}",
+                "x-quantity": self.name.split(" ", 1)[1] + (f" [{self.base}]" if self.base else ""),
+                "anyOf": kinds,
+                "examples": list(self.examples),
+                **more,
+            }
+        )
+
+
+def _spellings(**units: tuple[Fraction | int, str]) -> dict[str, Fraction]:
+    """Unfold {canonical: (factor, other spellings)} into {spelling: factor}."""
+    return {
+        spelling: Fraction(factor)
+        for canonical, (factor, others) in units.items()
+        for spelling in (canonical, *others.split())
+    }
+
+
+DURATION = Quantity(
+    "a duration",
+    "s",
+    _spellings(
+        us=(Fraction(1, 10**6), "µs microsecond microseconds"),
+        ms=(Fraction(1, 1000), "millisecond milliseconds"),
+        s=(1, "sec second seconds"),
+        min=(60, "minute minutes"),
+        h=(3600, "hour hours"),
+        d=(86_400, "day days"),
+        w=(604_800, "week weeks"),
+    ),
+    ("30 s", "5 min", "1 h", "14 d"),
+)
+LENGTH = Quantity(
+    "a length",
+    "m",
+    _spellings(
+        mm=(Fraction(1, 1000), ""), cm=(Fraction(1, 100), ""), m=(1, "metres meters"), km=(1000, "")
+    ),
+    ("0.2 m", "20 cm", "5 mm"),
+)
+SPEED = Quantity(
+    "a speed",
+    "m/s",
+    {"m/s": Fraction(1), "cm/s": Fraction(1, 100), "km/h": Fraction(5, 18)},
+    ("0.6 m/s", "3.6 km/h"),
+)
+_DEG_PER_RAD = Fraction(180 / math.pi)
+ANGLE = Quantity(
+    "an angle",
+    "degrees",
+    _spellings(deg=(1, "° degree degrees"), rad=(_DEG_PER_RAD, ""), turn=(360, "turns")),
+    ("108 deg", "1.9 rad"),
+)
+TURN_RATE = Quantity(
+    "a turn rate",
+    "degrees per second",
+    {"deg/s": Fraction(1), "°/s": Fraction(1), "rad/s": _DEG_PER_RAD},
+    ("90 deg/s", "1.5 rad/s"),
+)
+SHARE = Quantity("a share", "", {"%": Fraction(1, 100)}, ("0.95", "95 %"))
+
+
+def micros(duration: timedelta) -> int:
+    """Return a duration in whole microseconds, exactly.
+
+    >>> micros(timedelta(days=30))
+    2592000000000
+    """
+    return duration // MICROSECOND
+
+
+def parse_duration(value: object) -> timedelta:
+    """Read a duration: a timedelta, a number of seconds, text, or {unit: number}.
+
+    >>> parse_duration("1 h 30 min") == parse_duration({"hours": 1.5}) == timedelta(seconds=5400)
+    True
+
+    Raises:
+        PydanticCustomError: not a duration, negative, too long, or shorter than a microsecond.
+    """
+    if not isinstance(value, timedelta):
+        seconds = DURATION.parse(value)
+        count = round(seconds * 10**6)
+        if seconds and not count:
+            raise problem(f"found {shown(value)}; a duration is told to the microsecond")
+        if abs(count) > micros(LONGEST_DURATION):
+            raise problem(f"found {shown(value)}; 1000 years is the longest duration")
+        value = timedelta(microseconds=count)
+    if value < timedelta(0):
+        raise problem(f"found {format_duration(value)}; a duration can't be negative")
+    if value > LONGEST_DURATION:
+        raise problem(f"found {format_duration(value)}; 1000 years is the longest duration")
+    return value
+
+
+def format_duration(duration: timedelta) -> str:
+    """Write a duration in the largest unit that divides it, as :func:`parse_duration` reads it.
+
+    >>> [format_duration(timedelta(seconds=s)) for s in (2592000, 3600, 90, 0.5, 0)]
+    ['30 d', '1 h', '90 s', '0.5 s', '0 s']
+    """
+    count = micros(duration)
+    for unit, seconds in (("d", 86_400), ("h", 3600), ("min", 60)):
+        if count and count % (seconds * 10**6) == 0:
+            return f"{count // (seconds * 10**6)} {unit}"
+    return f"{_plain(Decimal(count).scaleb(-6))} s"
+
+
+def _plain(number: Decimal) -> str:
+    text = f"{number:f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def parse_time_of_day(value: object) -> timedelta:
+    """Read a time of day as the time since midnight; '24:00' is the end of the day.
+
+    >>> parse_time_of_day("07:30")
+    datetime.timedelta(seconds=27000)
+
+    Raises:
+        PydanticCustomError: not a time of day.
+    """
+    if isinstance(value, time) and value.tzinfo is None:
+        value = value.isoformat()
+    if isinstance(value, str) and (match := _TIME_OF_DAY.fullmatch(value.strip())):
+        seconds = Fraction(match[3] or 0)
+        count = (int(match[1]) * 3600 + int(match[2]) * 60 + seconds) * 10**6
+        value = timedelta(microseconds=int(count))
+    elif not isinstance(value, timedelta):
+        raise problem(f"found {shown(value)}; a time of day is wanted, like '07:30' or '22:15:30'")
+    if not timedelta(0) <= value <= timedelta(days=1):
+        raise problem(f"found {format_time_of_day(value)}; a time of day is 00:00 to 24:00")
+    return value
+
+
+def format_time_of_day(value: timedelta) -> str:
+    """Write a time since midnight as 'HH:MM', with seconds where there are any.
+
+    >>> format_time_of_day(timedelta(hours=7, minutes=30))
+    '07:30'
+    """
+    minutes, rest = divmod(micros(value), 60 * 10**6)
+    clock = f"{minutes // 60:02}:{minutes % 60:02}"
+    if not rest:
+        return clock
+    return f"{clock}:{Decimal(rest).scaleb(-6):09f}".rstrip("0").rstrip(".")
+
+
+def _to_float(quantity: Quantity) -> BeforeValidator:
+    def parse(value: object) -> float:
+        try:
+            return float(quantity.parse(value))
+        except OverflowError:
+            raise problem(f"found {shown(value)}; {quantity.name} is a finite number") from None
+
+    return BeforeValidator(parse)
+
+
+def _limit(holds: Callable[[Any], bool], wanted: str) -> AfterValidator:
+    def check(value: Any) -> Any:
+        if not holds(value):
+            found = format_duration(value) if isinstance(value, timedelta) else f"{value:g}"
+            raise problem(f"found {found}; {wanted}")
+        return value
+
+    return AfterValidator(check)
+
+
+Duration = Annotated[
+    timedelta,
+    BeforeValidator(parse_duration),
+    PlainSerializer(format_duration, return_type=str, when_used="json"),
+    DURATION.schema(
+        mapping={
+            "type": "object",
+            "properties": {
+                unit: {"type": "number"}
+                for unit in DURATION.units
+                if unit.endswith("s") and len(unit) > 3
+            },
+            "additionalProperties": {"type": "number"},
+        }
+    ),
+]
+"""A length of time, 0 or more, exact to the microsecond; a timedelta in Python."""
+
+PositiveDuration = Annotated[
+    Duration, _limit(lambda value: value > timedelta(0), "a duration longer than 0 is wanted")
+]
+"""A :data:`Duration` above 0."""
+
+Length = Annotated[float, _to_float(LENGTH), LENGTH.schema()]
+"""A length or a coordinate [m]."""
+
+PositiveLength = Annotated[Length, _limit(lambda value: value > 0, "a length above 0 is wanted")]
+"""A :data:`Length` above 0."""
+
+Speed = Annotated[
+    float,
+    _to_float(SPEED),
+    _limit(lambda value: value >= 0, "a speed is 0 or more"),
+    SPEED.schema(),
+]
+"""A speed, 0 or more [m/s]."""
+
+AngleDeg = Annotated[float, _to_float(ANGLE), ANGLE.schema()]
+"""An angle [degrees], counter-clockwise from +x where it is a heading."""
+
+TurnRateDeg = Annotated[
+    float,
+    _to_float(TURN_RATE),
+    _limit(lambda value: value >= 0, "a turn rate is 0 or more"),
+    TURN_RATE.schema(),
+]
+"""How fast a body turns, 0 or more [degrees/s]."""
+
+Share = Annotated[
+    float,
+    _to_float(SHARE),
+    _limit(lambda value: 0 <= value <= 1, "a share is 0 to 1, or '0 %' to '100 %'"),
+    SHARE.schema(),
+]
+"""A probability or a part of a whole, 0 to 1."""
+
+TimeOfDay = Annotated[
+    timedelta,
+    BeforeValidator(parse_time_of_day),
+    PlainSerializer(format_time_of_day, return_type=str, when_used="json"),
+    WithJsonSchema(
+        {
+            "description": "a time of day, like '07:30' or '22:15:30'; '24:00' ends the day",
+            "x-quantity": "time of day",
+            "type": "string",
+            "pattern": r"^\d{1,2}:[0-5]\d(:[0-5]\d(\.\d{1,6})?)?$",
+            "examples": ["07:30", "22:15:30"],
+        }
+    ),
+]
+"""A time of day: the time since midnight, 00:00 to 24:00; a timedelta in Python."""

@@ -1,0 +1,92 @@
+"""The manifest says what was run; a damaged one says so."""
+
+import datetime as dt
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fleet2d.artifacts.manifest import Manifest, file_record, plain, versions
+from fleet2d.errors import RunDirectoryError
+
+
+def test_manifest_round_trip(tmp_path: Path) -> None:
+    manifest = Manifest(status="complete", seed=4, steps=10, step_us=10**6, start="2026-01-05")
+    manifest.write(tmp_path)
+
+    assert manifest == Manifest.read(tmp_path)
+    assert ["manifest.json"] == [path.name for path in tmp_path.iterdir()]
+
+
+def test_manifest_is_sorted_and_strict_json(tmp_path: Path) -> None:
+    Manifest(metrics={"b": math.nan, "a": np.float64(math.inf)}).write(tmp_path)
+
+    def refuse(word: str) -> None:
+        pytest.fail(f"{word} is no JSON")
+
+    text = (tmp_path / "manifest.json").read_text()
+    content = json.loads(text, parse_constant=refuse)
+    assert {"a": None, "b": None} == content["metrics"]
+    assert sorted(content) == list(content)
+    assert text == json.dumps(content, indent=2, sort_keys=True) + "\n"
+
+
+def test_plain_has_words_for_what_models_hold() -> None:
+    given = {
+        "n": np.int32(3),
+        "a": np.array([1.5, np.nan]),
+        "d": dt.date(2026, 1, 5),
+        "t": dt.timedelta(minutes=1),
+        "p": Path("a"),
+        "s": {"b", "a"},
+        1: (True, None),
+    }
+
+    expected = {
+        "n": 3,
+        "a": [1.5, None],
+        "d": "2026-01-05",
+        "t": 60.0,
+        "p": "a",
+        "s": ["a", "b"],
+        "1": [True, None],
+    }
+    assert expected == plain(given)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "is damaged"),
+        ('{"format": 1, "status": "comp', "is damaged"),
+        ("[]", "does not say its format"),
+        ("{}", "does not say its format"),
+        ('{"format": 1, "status": "complete"}', "lacks digest"),
+        ('{"format": 2}', "written by a later Fleet2D"),
+        ("\x00\xff", "is damaged"),
+    ],
+)
+def test_damaged_manifest_is_named(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "manifest.json").write_bytes(text.encode("latin-1"))
+
+    with pytest.raises(RunDirectoryError, match=told):
+        Manifest.read(tmp_path)
+
+
+def test_file_record_hashes_the_bytes(tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_bytes(b"walls")
+
+    record = file_record(tmp_path / "plan.json")
+    expected = {"path": str(tmp_path / "plan.json"), "sha256": hashlib.sha256(b"walls").hexdigest()}
+    assert expected == record
+
+
+def test_versions_name_all_that_numbers_depend_on() -> None:
+    found = versions()
+
+    expected = {"fleet2d", "numba", "numpy", "platform", "pyarrow", "python", "shapely"}
+    assert expected == found.keys()
+    assert np.__version__ == found["numpy"]

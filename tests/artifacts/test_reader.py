@@ -1,0 +1,157 @@
+"""A stored run reads back, or says in plain words why not."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from fleet2d.artifacts.reader import Run, open_run
+from fleet2d.artifacts.store import RunStore
+from fleet2d.errors import ArtifactError, RunDirectoryError
+
+from .tables import EVERY_KIND, rows_of_every_kind, stored
+
+ROWS = rows_of_every_kind(300)
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> Path:
+    """A complete run."""
+    stored(ROWS, directory=tmp_path / "run", flush_rows=100)
+    return tmp_path / "run"
+
+
+def test_run_in_memory_reads_like_a_stored_one(directory: Path) -> None:
+    for run in (open_run(directory), stored(ROWS).run()):
+        assert "complete" == run.status
+        assert ["every_kind"] == list(run.tables)
+        assert "every_kind" in run.tables
+        assert 300 == run.tables["every_kind"].num_rows
+        assert 300 == run.manifest["tables"]["every_kind"]["rows"]
+        assert [] == run.notes
+        assert [] == run.verify()
+
+
+def test_pandas_and_polars(directory: Path) -> None:
+    pytest.importorskip("pandas")
+    pytest.importorskip("polars")
+    run = open_run(directory)
+
+    frame = run.pandas("every_kind")
+    assert ["hall", "kitchen", "bath"] == list(frame["room"].cat.categories)
+    assert ROWS["x"].tolist() == frame["x"].tolist()
+    assert ROWS["x"].tolist() == run.polars("every_kind")["x"].to_list()
+
+
+@pytest.mark.parametrize("package", ["pandas", "polars"])
+def test_package_that_is_not_installed(
+    directory: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+
+    with pytest.raises(ArtifactError, match=f"pip install {package}"):
+        getattr(open_run(directory), package)("every_kind")
+
+
+def test_unknown_table_names_the_nearest(directory: Path) -> None:
+    with pytest.raises(ArtifactError, match="did you mean 'every_kind'"):
+        open_run(directory).arrow("evry_kind")
+    with pytest.raises(KeyError):
+        open_run(directory).tables["evry_kind"]
+
+
+def test_tables_are_read_when_asked_for(directory: Path) -> None:
+    run = open_run(directory)
+    (directory / "every_kind.parquet").unlink()
+
+    with pytest.raises(ArtifactError, match="is missing"):
+        run.arrow("every_kind")
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("nowhere", "does not exist"), ("file", "is a file"), (".", "no manifest")]
+)
+def test_open_what_is_no_run(tmp_path: Path, name: str, told: str) -> None:
+    (tmp_path / "file").write_text("")
+
+    with pytest.raises(RunDirectoryError, match=told):
+        open_run(tmp_path / name)
+
+
+def test_truncated_table_is_named_and_the_rest_opens(directory: Path) -> None:
+    path = directory / "every_kind.parquet"
+    path.write_bytes(path.read_bytes()[:-100])
+
+    run = open_run(directory)
+    assert any("damaged or cut off" in note for note in run.notes)
+    with pytest.raises(ArtifactError, match=r"every_kind.parquet is damaged or cut off"):
+        run.arrow("every_kind")
+    assert ["every_kind"] == run.verify()
+
+
+def test_verify_sees_flipped_bytes(directory: Path) -> None:
+    path = directory / "every_kind.parquet"
+    content = bytearray(path.read_bytes())
+    content[200:240] = bytes(40)
+    path.write_bytes(content)
+
+    assert ["every_kind"] == open_run(directory).verify()
+
+
+def test_verify_sees_a_changed_value_and_not_a_new_layout(directory: Path) -> None:
+    path = directory / "every_kind.parquet"
+    table = open_run(directory).arrow("every_kind")
+
+    pq.write_table(table, path, compression="snappy", row_group_size=17)
+    assert [] == open_run(directory).verify()
+
+    x = ROWS["x"].copy()
+    x[-1] = np.nextafter(x[-1], 2)
+    pq.write_table(table.set_column(4, table.schema.field(4), [x]), path)
+    assert ["every_kind"] == open_run(directory).verify()
+
+
+def test_verify_sees_a_changed_manifest(directory: Path) -> None:
+    path = directory / "manifest.json"
+    content = json.loads(path.read_text())
+    content["digest"] = "0" * 64
+    path.write_text(json.dumps(content))
+
+    assert ["manifest.json"] == open_run(directory).verify()
+
+
+def test_missing_rows_are_noted(directory: Path) -> None:
+    path = directory / "every_kind.parquet"
+    pq.write_table(pq.read_table(path).slice(0, 299), path)
+
+    assert ["table 'every_kind' has 299 rows, but 300 were stored"] == open_run(directory).notes
+
+
+def test_crashed_run_opens_with_what_is_whole(tmp_path: Path) -> None:
+    store = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=50)
+    store.open()
+    store.append("every_kind", **ROWS)
+
+    run = open_run(tmp_path / "run")
+    assert ("running", None, []) == (run.status, run.digest, list(run.tables))
+    assert "crashed, or is still going on" in run.notes[0]
+    assert "every_kind.parquet.partial" in run.notes[1]
+    with pytest.raises(ArtifactError, match="nothing to compare"):
+        run.verify()
+    with pytest.raises(ArtifactError, match="It has none"):
+        run.arrow("every_kind")
+    store.discard()
+
+
+def test_run_before_close_is_refused() -> None:
+    with pytest.raises(ArtifactError, match="not closed yet"):
+        RunStore(None, [EVERY_KIND]).run()
+
+
+def test_run_says_where_and_how(directory: Path) -> None:
+    run: Run = open_run(directory)
+
+    assert f"<Run {directory}: complete, tables every_kind>" == repr(run)

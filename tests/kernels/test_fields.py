@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+from fleet2d.kernels.fields import squared_distance
+
+from tests.reference.fields import squared_distance as slow_squared_distance
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29), (40, 25)])
+@pytest.mark.parametrize("free", [0.0, 0.1, 0.5, 0.9, 0.99, 1.0])
+def test_squared_distance_of_random_masks_is_that_of_brute_force(
+    shape: tuple[int, int], free: float
+) -> None:
+    rng = np.random.default_rng([*shape, int(100 * free)])
+    for _ in range(10):
+        mask = rng.random(shape) < free
+
+        assert np.array_equal(slow_squared_distance(mask), squared_distance(mask))
+
+
+def test_squared_distance_with_one_cell_outside_is_exact_across_the_grid() -> None:
+    mask = np.ones((300, 500), np.bool_)
+    mask[299, 0] = False
+
+    depth = squared_distance(mask)
+
+    assert 299**2 + 499**2 == depth[0, 499]
+    assert depth[299, 0] == 0
+
+
+def test_squared_distance_of_a_mask_without_outside_is_the_stated_bound() -> None:
+    assert np.array_equal(np.full((3, 4), 49), squared_distance(np.ones((3, 4), np.bool_)))
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_squared_distance_is_the_same_on_every_side(turns: int) -> None:
+    """Known failure 15: erosion with even kernels left other clearance on each side."""
+    mask = np.random.default_rng(3).random((30, 41)) < 0.97
+
+    turned = squared_distance(np.ascontiguousarray(np.rot90(mask, turns)))
+    mirrored = squared_distance(np.ascontiguousarray(mask[:, ::-1]))
+
+    assert np.array_equal(np.rot90(squared_distance(mask), turns), turned)
+    assert np.array_equal(squared_distance(mask)[:, ::-1], mirrored)
+
+
+def test_squared_distance_compiles_once() -> None:
+    for shape in ((3, 5), (8, 2)):
+        squared_distance(np.ones(shape, np.bool_))
+
+    assert len(getattr(squared_distance, "signatures", [1])) == 1

@@ -1,0 +1,170 @@
+"""Slow, obvious twins of the sight kernels: every wall is looked at, and no mesh is needed.
+
+Walls are int64 (w, 4): ax, ay, bx, by. Nothing here may import the package under test.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+Int64 = npt.NDArray[np.int64]
+Point = tuple[int, int]
+
+
+def cross(ax: int, ay: int, bx: int, by: int) -> int:
+    """Return the cross product of two vectors."""
+    return ax * by - ay * bx
+
+
+def segments_touch(p: Point, q: Point, a: Point, b: Point) -> bool:
+    """Return whether the closed segments pq and ab share a point; plain Python integers."""
+    side_a = cross(q[0] - p[0], q[1] - p[1], a[0] - p[0], a[1] - p[1])
+    side_b = cross(q[0] - p[0], q[1] - p[1], b[0] - p[0], b[1] - p[1])
+    side_p = cross(b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1])
+    side_q = cross(b[0] - a[0], b[1] - a[1], q[0] - a[0], q[1] - a[1])
+    if side_a * side_b > 0 or side_p * side_q > 0:
+        return False
+    overlap = [
+        max(min(p[i], q[i]), min(a[i], b[i])) <= min(max(p[i], q[i]), max(a[i], b[i]))
+        for i in (0, 1)
+    ]
+    return all(overlap)
+
+
+def is_inside(walls: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+    """Return for each point whether a ray to the right crosses an odd number of walls."""
+    x, y = points[:, None, 0], points[:, None, 1]
+    ax, ay, bx, by = walls.T
+    spans = (ay > y) != (by > y)
+    turn = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    left_of_rising = np.where(by > ay, turn > 0, turn < 0)
+    odd: npt.NDArray[np.bool_] = (spans & left_of_rising).sum(axis=1) % 2 == 1
+    return odd
+
+
+def touches_any_wall(walls: Int64, eye: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+    """Return for each point whether the closed segment from `eye` to it touches a wall."""
+    (qx, qy), (px, py) = eye, points.T[:, :, None]
+    ax, ay, bx, by = walls.T
+    dx, dy = px - qx, py - qy
+    side_a = np.sign(dx * (ay - qy) - dy * (ax - qx))
+    side_b = np.sign(dx * (by - qy) - dy * (bx - qx))
+    side_q = np.sign((bx - ax) * (qy - ay) - (by - ay) * (qx - ax))
+    side_p = np.sign((bx - ax) * (py - ay) - (by - ay) * (px - ax))
+    boxes_meet = (
+        np.maximum(np.minimum(qx, px), np.minimum(ax, bx))
+        <= np.minimum(np.maximum(qx, px), np.maximum(ax, bx))
+    ) & (
+        np.maximum(np.minimum(qy, py), np.minimum(ay, by))
+        <= np.minimum(np.maximum(qy, py), np.maximum(ay, by))
+    )
+    touches = (side_a * side_b <= 0) & (side_q * side_p <= 0) & boxes_meet
+    found: npt.NDArray[np.bool_] = touches.any(axis=1)
+    return found
+
+
+def visible(walls: Int64, eye: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+    """Return for each point whether it is visible from `eye` by the strict rule."""
+    if not is_inside(walls, eye[None])[0]:
+        return np.zeros(len(points), bool)
+    return is_inside(walls, points) & ~touches_any_wall(walls, eye, points)
+
+
+def visible_exactly(walls: Sequence[Sequence[int]], eye: Point, point: Point) -> bool:
+    """Return the same for one point that lies inside, in plain Python integers."""
+    return not any(segments_touch(eye, point, (w[0], w[1]), (w[2], w[3])) for w in walls)
+
+
+def on_any_wall(walls: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+    """Return for each point whether it lies on a wall, ends included."""
+    return np.array([touches_any_wall(walls, point, point[None])[0] for point in points], bool)
+
+
+def blocks(p: Point, q: Point, a: Point, b: Point) -> bool:
+    """Return whether the wall ab keeps a straight way from leading from p to q.
+
+    It may touch the way at p and q; a wall along the way blocks only if it ends in between.
+    """
+    if not segments_touch(p, q, a, b):
+        return False
+    if all(cross(q[0] - p[0], q[1] - p[1], c[0] - p[0], c[1] - p[1]) == 0 for c in (a, b)):
+        return any(_is_between(p, q, c) for c in (a, b))
+    touch_at_end = any(
+        cross(b[0] - a[0], b[1] - a[1], end[0] - a[0], end[1] - a[1]) == 0 for end in (p, q)
+    )
+    return not touch_at_end
+
+
+def _is_between(p: Point, q: Point, c: Point) -> bool:
+    """Return whether c, in line with p and q, lies strictly between them."""
+    along = (c[0] - p[0]) * (q[0] - p[0]) + (c[1] - p[1]) * (q[1] - p[1])
+    return 0 < along < (q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2
+
+
+def vertices_seen(walls: Int64, start: Point) -> set[Point]:
+    """Return the ends of walls that a straight way leads to, from a point that isn't outside.
+
+    Between its ends the way meets no wall, unless it runs along one from end to end or to one end.
+    """
+    ends = {(int(x), int(y)) for x, y in walls.reshape(-1, 2)} - {start}
+    sides = [((a, b), (c, d)) for a, b, c, d in walls.tolist()]
+    seen = set()
+    for end in ends:
+        if any(blocks(start, end, a, b) for a, b in sides):
+            continue
+        along_wall = any(_covers(a, b, start) and _covers(a, b, end) for a, b in sides)
+        doubled_middle = np.array([[start[0] + end[0], start[1] + end[1]]])
+        if along_wall or is_inside(2 * walls, doubled_middle)[0]:
+            seen.add(end)
+    return seen
+
+
+def _covers(a: Point, b: Point, point: Point) -> bool:
+    """Return whether the point lies on the closed segment ab."""
+    return segments_touch(a, b, point, point)
+
+
+def visible_area(walls: Int64, eye: Point) -> Fraction:
+    """Return the exact area visible from a point strictly inside.
+
+    Between two neighboring directions in which a wall ends, one wall is the nearest all the way.
+    """
+    ends = {(int(x) - eye[0], int(y) - eye[1]) for x, y in walls.reshape(-1, 2)}
+    directions = sorted(ends, key=_Turn)
+    distinct = [
+        d for i, d in enumerate(directions) if i == 0 or _Turn(directions[i - 1]) < _Turn(d)
+    ]
+    moved = [((a - eye[0], b - eye[1]), (c - eye[0], d - eye[1])) for a, b, c, d in walls.tolist()]
+    area = Fraction(0)
+    for right, left in zip(distinct, distinct[1:] + distinct[:1], strict=True):
+        reached = []
+        for a, b in moved:
+            reaches = [_reach(ray, a, b) for ray in (right, left)]
+            spans = cross(*a, *right) >= 0 <= cross(*right, *b) and cross(*left, *b) >= 0
+            if spans and cross(*a, *left) >= 0 and None not in reaches and cross(*a, *b) > 0:
+                reached.append(reaches)
+        near = min(reached, key=sum)
+        area += cross(*right, *left) * near[0] * near[1] / 2
+    return area
+
+
+def _reach(ray: Point, a: Point, b: Point) -> Fraction | None:
+    """Return how many times its length the ray from (0, 0) reaches to the line through a and b."""
+    edge = (b[0] - a[0], b[1] - a[1])
+    down = cross(*ray, *edge)
+    return Fraction(cross(*a, *edge), down) if down else None
+
+
+class _Turn:
+    """Orders directions by their angle in [0, one turn), in integers."""
+
+    def __init__(self, direction: Point) -> None:
+        self.x, self.y = direction
+        self.half = 0 if self.y > 0 or (self.y == 0 and self.x > 0) else 1
+
+    def __lt__(self, other: "_Turn") -> bool:
+        if self.half != other.half:
+            return self.half < other.half
+        return cross(self.x, self.y, other.x, other.y) > 0

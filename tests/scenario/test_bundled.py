@@ -1,0 +1,59 @@
+"""The bundled base scenario, with the real components."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from fleet2d.scenario.compose import BUNDLED, ENTRIES
+from fleet2d.scenario.document import read_document
+from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.schema import schema
+
+
+@pytest.mark.parametrize("file", sorted(BUNDLED.glob("*.yaml")), ids=lambda file: file.stem)
+def test_bundled_scenario_loads_and_conforms_to_the_schema(file: Path) -> None:
+    written = json.dumps(read_document(file).data, default=str)  # an editor sees dates as text
+    jsonschema.validate(json.loads(written), schema())
+    scenario = load_scenario(f"bundled:{file.stem}")
+
+    assert scenario == load_scenario(scenario.resolved())
+
+
+def test_base_scenario_is_the_papers() -> None:
+    scenario = load_scenario()
+
+    assert 30 * 86_400 == scenario.simulation.steps
+    assert (1, 1) == (len(scenario.users), len(scenario.robots))
+
+
+@pytest.mark.parametrize("name", ["houseexpo", "he"])
+@pytest.mark.parametrize("order", [1, -1])
+def test_any_plan_goes_under_the_base_scenario(shared_data: Path, name: str, order: int) -> None:
+    plan = sorted((shared_data / "houseexpo").glob("*.json"))[0]
+    overrides = [f"floorplan.type={name}", f"floorplan.path={plan}"][::order]
+    scenario = load_scenario(None, *overrides, "simulation.duration.days=7")
+
+    assert "houseexpo" == scenario.floorplan.type_name
+    assert 7 == scenario.simulation.duration.days
+
+
+def test_resolved_scenario_conforms_to_the_schema() -> None:
+    resolved = load_scenario().resolved()
+
+    assert set(ENTRIES) < set(resolved)
+    jsonschema.validate(resolved, schema())
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"simulatoin": {}},
+        {"users": {"ana": {"type": "meander", "stops": []}}},
+        {"robots": {"astro": {"behaviors": [{"type": "nowhere"}]}}},
+    ],
+)
+def test_schema_refuses_what_loading_refuses(wrong: object) -> None:
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(wrong, schema())

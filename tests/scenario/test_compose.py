@@ -1,0 +1,211 @@
+"""Composition: extending files, overrides, and what a changed type leaves behind."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import ScenarioError
+from fleet2d.scenario import compose as compose_module
+from fleet2d.scenario.compose import compose, slot_kind
+
+pytestmark = pytest.mark.usefixtures("stand_ins")
+
+BASE: dict[str, Any] = {
+    "simulation": {"duration": {"days": 30}, "seed": 4},
+    "floorplan": {"type": "houseexpo", "path": "plan.json", "cell": 0.1, "border": 2},
+    "users": {"ana": {"type": "tour", "radius": 0.3, "stops": ["hall"]}, "ben": "drift"},
+    "robots": {"astro": {"behaviors": ["drift", {"type": "tour", "dwell": 9}]}},
+    "algorithms": {"count": {"margin": 0.9}},
+}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "section", "expected"),
+    [
+        (["simulation.duration.days=60"], "simulation", {"duration": {"days": 60}, "seed": 4}),
+        (["simulation.duration=1 h"], "simulation", {"duration": "1 h", "seed": 4}),
+        (["simulation.seed=5", "simulation.seed=6"], "simulation",
+         {"duration": {"days": 30}, "seed": 6}),
+        (["simulation.seed=null"], "simulation", {"duration": {"days": 30}, "seed": None}),
+        (["floorplan.type=empty"], "floorplan", {"type": "empty", "cell": 0.1}),
+        (["floorplan=empty"], "floorplan", {"type": "empty", "cell": 0.1}),
+        (["floorplan.width=3", "floorplan.type=empty"], "floorplan",
+         {"type": "empty", "cell": 0.1, "width": 3}),
+        (["floorplan.type=empty", "floorplan.path=x"], "floorplan",
+         {"type": "empty", "cell": 0.1, "path": "x"}),
+        (["floorplan.type=he"], "floorplan", {**BASE["floorplan"], "type": "he"}),
+        (["floorplan.path=x", "floorplan.type=he"], "floorplan",
+         {**BASE["floorplan"], "type": "he", "path": "x"}),
+        (["users.ana=null"], "users", {"ben": "drift"}),
+        (["users=null"], "users", None),
+        (["users.ana.type=drift", "users.ben=tour"], "users",
+         {"ana": {"type": "drift", "radius": 0.3}, "ben": "tour"}),
+        (["users.ana.behaviors=[drift]"], "users",
+         {"ana": {"radius": 0.3, "behaviors": ["drift"]}, "ben": "drift"}),
+        (["users.ben.sigma=1"], "users", {**BASE["users"], "ben": {"type": "drift", "sigma": 1}}),
+        (["users.cy={type: drift, sigma: 2}"], "users",
+         {**BASE["users"], "cy": {"type": "drift", "sigma": 2}}),
+        (["robots.astro.type=drift"], "robots", {"astro": {"type": "drift"}}),
+        (["robots.astro.behaviors=[tour]"], "robots", {"astro": {"behaviors": ["tour"]}}),
+        (["robots.astro.behaviors.1.dwell=5 min"], "robots",
+         {"astro": {"behaviors": ["drift", {"type": "tour", "dwell": "5 min"}]}}),
+        (["robots.astro.behaviors.1.type=drift"], "robots",
+         {"astro": {"behaviors": ["drift", {"type": "drift"}]}}),
+        (["robots.astro.behaviors.0.sigma=1"], "robots",
+         {"astro": {"behaviors": [{"type": "drift", "sigma": 1}, {"type": "tour", "dwell": 9}]}}),
+        (["algorithms.count.type=smooth"], "algorithms", {"count": {"type": "smooth"}}),
+        (["algorithms.count.type=count"], "algorithms",
+         {"count": {"type": "count", "margin": 0.9}}),
+        (["users.ana.color=#d62728"], "users",
+         {**BASE["users"], "ana": {**BASE["users"]["ana"], "color": "#d62728"}}),
+    ],
+)  # fmt: skip
+def test_overrides_change_a_scenario(overrides: list[str], section: str, expected: object) -> None:
+    assert expected == compose(BASE, overrides).data.get(section)
+
+
+def test_composition_leaves_its_source_as_it_was() -> None:
+    before = repr(BASE)
+    compose(BASE, ["floorplan.type=empty", "users.ana=null", "robots.astro.behaviors.0=tour"])
+
+    assert before == repr(BASE)
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("seed", "override 'seed': there is no '=' in it; write key.path=value"),
+        ("=4", "override '=4': a part of its key is empty"),
+        ("a..b=4", "override 'a..b=4': a part of its key is empty"),
+        ("a=", "override 'a=': no value; write a=null to delete an entry"),
+        ("a=[1", "override 'a=[1': not valid YAML"),
+        ("users.anna=null", "override 'users.anna=null': users.anna: null deletes an entry, and "
+         "there is none of this name: did you mean 'ana'? There are: ana, ben"),
+        ("robots.astro.behaviors.2.dwell=1", "there is no robots.astro.behaviors.2: the list has "
+                                             "2 entries, and the first is 0"),
+    ],
+)  # fmt: skip
+def test_override_that_makes_no_sense_is_refused(override: str, said: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        compose(BASE, [override])
+    assert said in str(caught.value)
+
+
+def write(folder: Path, **files: str) -> Path:
+    for name, content in files.items():
+        file = folder / f"{name}.yaml"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(content)
+    return folder
+
+
+def test_files_extend_files(tmp_path: Path) -> None:
+    write(tmp_path, base="simulation: {seed: 1, step: 1 s}\nusers: {ana: drift, ben: drift}")
+    write(tmp_path, night="simulation: {start: 2026-01-05T22:00:00}")
+    write(
+        tmp_path / "sub",
+        home="extends: [../base.yaml, ../night.yaml]\nsimulation: {seed: 2}\nusers: {ana: null}",
+    )
+    data = compose(tmp_path / "sub" / "home.yaml").data
+
+    assert ["seed", "step", "start"] == list(data["simulation"])
+    assert 2 == data["simulation"]["seed"]
+    assert {"ben": "drift"} == data["users"]
+
+
+def test_extended_file_can_change_a_type(tmp_path: Path) -> None:
+    write(tmp_path, base="floorplan: {type: he, path: plan.json, cell: 0.1}")
+    write(tmp_path, home="extends: base.yaml\nfloorplan: {type: empty, width: 3}")
+
+    assert {"type": "empty", "cell": 0.1, "width": 3} == compose(tmp_path / "home.yaml").data[
+        "floorplan"
+    ]
+
+
+def test_text_keeps_the_folder_of_the_file_it_came_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "a", base="floorplan: {type: he, path: plan.json}\nname: x")
+    write(tmp_path / "b", home="extends: ../a/base.yaml\nname: y")
+    monkeypatch.chdir(tmp_path)
+    data = compose("b/home.yaml", ["floorplan.note=z"]).data
+
+    assert (tmp_path / "a").resolve() == data["floorplan"]["path"].folder.resolve()
+    assert (tmp_path / "b").resolve() == data["name"].folder.resolve()
+    assert tmp_path == data["floorplan"]["note"].folder
+
+
+def test_places_follow_what_was_merged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path, base="simulation:\n  seed: 1\n  step: 1 s\nusers: {}")
+    write(tmp_path, home="extends: base.yaml\nsimulation:\n  seed: 2")
+    monkeypatch.chdir(tmp_path)
+    document = compose("home.yaml", ["users.ana.radius=1"], {("simulation", "speedup"): 3})
+
+    assert "home.yaml:3" == document.place(("simulation", "seed"))
+    assert "base.yaml:3" == document.place(("simulation", "step"))
+    assert "override 'users.ana.radius=1'" == document.place(("users", "ana"))
+    assert "argument speedup=3" == document.place(("simulation", "speedup"))
+
+
+def test_entry_left_empty_by_mistake_is_not_dropped_silently(tmp_path: Path) -> None:
+    write(tmp_path, home="metrics:\n  tally:\n")
+
+    with pytest.raises(ScenarioError, match=r"home.yaml:2: metrics.tally: null deletes an entry"):
+        compose(tmp_path / "home.yaml")
+
+
+def test_cycle_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path, a="extends: b.yaml", b="extends: c.yaml", c="name: x\nextends: [a.yaml]")
+    monkeypatch.chdir(tmp_path)
+
+    with pytest.raises(ScenarioError) as caught:
+        compose("a.yaml")
+    assert str(caught.value) == (
+        "a.yaml:1: extends: b.yaml:1: extends: c.yaml:2: extends: "
+        "a.yaml extends itself: a.yaml → b.yaml → c.yaml → a.yaml"
+    )
+
+
+@pytest.mark.parametrize(
+    ("extends", "said"),
+    [
+        ("gone.yaml", "home.yaml:1: extends: there is no file"),
+        ("3", "home.yaml:1: extends: found 3; the path of a YAML file is wanted"),
+        ("bundled:bse", "home.yaml:1: extends: no scenario 'bse' is bundled: did you mean 'base'?"),
+    ],
+)
+def test_extending_what_is_not_there_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, extends: str, said: str
+) -> None:
+    monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path / "bundled", base="name: x"))
+    monkeypatch.chdir(write(tmp_path, home=f"extends: {extends}"))
+
+    with pytest.raises(ScenarioError) as caught:
+        compose("home.yaml")
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("source", [None, "bundled:base", {"extends": "bundled:base"}])
+def test_bundled_scenario_is_found_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: Any
+) -> None:
+    monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path, base="name: x"))
+
+    assert {"name": "x"} == compose(source).data
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("floorplan", "floorplan"),
+        ("users.ana", "behavior"),
+        ("robots.astro.behaviors.0", "behavior"),
+        ("robots.astro.behaviors", None),
+        ("algorithms.ltp", "algorithm"),
+        ("metrics.error", "metric"),
+        ("simulation", None),
+    ],
+)
+def test_slot_kind(path: str, kind: str | None) -> None:
+    assert kind == slot_kind(tuple(path.split(".")))

@@ -1,0 +1,115 @@
+"""Reading YAML: values without traps, places, and what is wrong with a file."""
+
+from datetime import date, datetime
+from pathlib import Path
+
+import pytest
+
+from fleet2d.errors import ScenarioError
+from fleet2d.scenario.document import Document, parse_yaml, read_document
+from fleet2d.units import Text
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("12:30", "12:30"),
+        ("1:30:00", "1:30:00"),
+        ("on", "on"),
+        ("off", "off"),
+        ("yes", "yes"),
+        ("No", "No"),
+        ("true", True),
+        ("False", False),
+        ("1e-3", 1e-3),
+        ("1.", 1.0),
+        (".5", 0.5),
+        ("-.inf", float("-inf")),
+        ("010", 10),
+        ("0x10", 16),
+        ("0o10", 8),
+        ("-3", -3),
+        ("1_000", "1_000"),
+        ("null", None),
+        ("~", None),
+        ("", None),
+        ("=", "="),
+        ("'3'", "3"),
+        ("2026-01-05", date(2026, 1, 5)),
+        ("2026-01-05 08:00:00", datetime(2026, 1, 5, 8)),
+        ("2026-02-31", "2026-02-31"),
+        ("[1, [a]]", [1, ["a"]]),
+        ("{1: a, true: b}", {"1": "a", "true": "b"}),
+    ],
+)
+def test_value_is_read_as_written(written: str, value: object) -> None:
+    read = parse_yaml(written, Path(), "example")
+
+    assert (type(value), value) == (type(read) if not isinstance(read, Text) else str, read)
+
+
+def test_text_knows_the_folder_it_was_written_in() -> None:
+    assert Path("/homes") == parse_yaml("plan.json", Path("/homes"), "example").folder
+
+
+def test_merged_anchor_is_overridden_by_its_neighbours() -> None:
+    text = "base: &b {u: 1, v: 2}\nown: {v: 3, <<: *b}"
+
+    assert {"u": 1, "v": 3} == parse_yaml(text, Path(), "example")["own"]
+
+
+def test_places_are_lines(tmp_path: Path) -> None:
+    file = tmp_path / "home.yaml"
+    file.write_text("# a home\nusers:\n  ana:\n    stops:\n    - hall\n    - to: bath\n")
+    document = read_document(file, "home.yaml")
+
+    assert "home.yaml:2" == document.place(("users",))
+    assert "home.yaml:3" == document.place(("users", "ana", "speed"))
+    assert "home.yaml:5" == document.place(("users", "ana", "stops", 0))
+    assert "home.yaml:6" == document.place(("users", "ana", "stops", 1, "to"))
+    assert "" == Document().place(("users",))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"a: 1\nb: 2\na: 3", "home.yaml:3: the key 'a' is already in line 1"),
+        (b"a: 1\nb: [1,\n", "home.yaml:3: not valid YAML: while parsing"),
+        (b"a: 1\n\tb: 2", "home.yaml:2: not valid YAML: while scanning"),
+        (b"a: &x [*x]", "home.yaml:1: a value can't contain itself"),
+        (b"? [a]\n: 1", "home.yaml:1: a key must be plain text"),
+        (b"a: *b", "home.yaml:1: not valid YAML: found undefined alias 'b'"),
+        (b"a: !mine 3", "home.yaml:1: not valid YAML: could not determine a constructor"),
+        (b"a: !!int x", "home.yaml: not valid YAML: invalid literal"),
+        (b"a: 1\n---\nb: 2", "home.yaml:2: not valid YAML: expected a single document"),
+        (b"a: \x01", "home.yaml: not valid YAML: unacceptable character"),
+        (b"[" * 5000, "home.yaml: not valid YAML: "),
+        (b"", "home.yaml is empty"),
+        (b"# nothing yet\n", "home.yaml is empty"),
+        (b"- 1", "home.yaml: a scenario is a mapping (simulation: …, floorplan: …); "
+                 "this is a list"),
+        (b"hello", "this is the value 'hello'"),
+        (b"\x7fELF\x80\xff", "home.yaml is not a text file"),
+    ],
+)  # fmt: skip
+def test_file_that_is_no_scenario_is_refused(tmp_path: Path, content: bytes, said: str) -> None:
+    file = tmp_path / "home.yaml"
+    file.write_bytes(content)
+
+    with pytest.raises(ScenarioError) as caught:
+        read_document(file, "home.yaml")
+    assert said in str(caught.value)
+
+
+def test_missing_file_names_the_nearest(tmp_path: Path) -> None:
+    (tmp_path / "home.yaml").touch()
+
+    with pytest.raises(
+        ScenarioError, match=r"there is no file .*hom.yaml: did you mean .*home.yam"
+    ):
+        read_document(tmp_path / "hom.yaml")
+
+
+def test_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="is a folder"):
+        read_document(tmp_path)

@@ -1,0 +1,197 @@
+"""Loading a scenario: defaults, short forms, the resolved dump."""
+
+import copy
+import json
+from datetime import date, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import ScenarioError
+from fleet2d.scenario.model import Scenario, SimulationSettings, load_scenario
+
+pytestmark = pytest.mark.usefixtures("stand_ins")
+
+HOME = """\
+simulation: {start: 2026-01-05, duration: {days: 30}, step: 1 s, seed: 4}
+floorplan: {type: he, path: plan.json}
+users:
+  ana: {type: tour, radius: 30 cm, stops: [kitchen, hall]}
+  ben: {behaviors: [drift, {type: tour, dwell: 1 h}]}
+robots:
+  astro: drift
+algorithms:
+  count: {margin: 95 %}
+  calm: {type: smooth, inner: {type: own:Own}}
+metrics:
+  tally: {of: count}
+"""
+OWN = """
+from typing import ClassVar
+from fleet2d.component import Component
+
+class Own(Component):
+    kind: ClassVar[str] = "algorithm"
+"""
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "homes"
+    folder.mkdir()
+    (folder / "home.yaml").write_text(HOME)
+    (folder / "own.py").write_text(OWN)
+    (folder / "plan.json").touch()
+    monkeypatch.chdir(tmp_path)
+    return folder / "home.yaml"
+
+
+def simulation(**settings: Any) -> SimulationSettings:
+    return SimulationSettings.model_validate({"duration": "1 h", **settings})
+
+
+def said(source: Any, *overrides: str, **settings: Any) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(source, *overrides, **settings)
+    return str(caught.value)
+
+
+def test_simulation_defaults() -> None:
+    settings = simulation()
+
+    assert datetime(2026, 1, 5) == settings.start
+    assert (3600, 1_000_000) == (settings.steps, settings.step_us)
+    assert (None, None, None) == (settings.seed, settings.max_span, settings.speedup)
+
+
+def test_run_stops_at_the_last_full_step() -> None:
+    assert 3 == simulation(duration="10 s", step="3 s").steps
+
+
+@pytest.mark.parametrize("start", [date(2026, 1, 5), "2026-01-05", "2026-01-05T00:00"])
+def test_start_is_a_date_or_a_date_and_time(start: object) -> None:
+    assert datetime(2026, 1, 5) == simulation(start=start).start
+
+
+def test_loaded_scenario_is_what_the_file_says(home: Path) -> None:
+    scenario = load_scenario(home)
+
+    assert timedelta(days=30) == scenario.simulation.duration
+    assert ["ana", "ben"] == list(scenario.users)
+    assert 0.3 == scenario.users["ana"].radius
+    assert ["tour"] == [b.type_name for b in scenario.users["ana"].behaviors]
+    assert ["drift", "tour"] == [b.type_name for b in scenario.users["ben"].behaviors]
+    assert ["drift"] == [b.type_name for b in scenario.robots["astro"].behaviors]
+    assert "tally" == scenario.metrics["tally"].type_name
+    assert home.parent == scenario.folder
+
+
+def test_relative_paths_start_from_the_file_and_dump_as_absolute(home: Path) -> None:
+    assert (
+        str(home.parent / "plan.json")
+        == load_scenario("homes/home.yaml").resolved()["floorplan"]["path"]
+    )
+
+
+def test_resolved_scenario_reloads_to_an_equal_one(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = load_scenario(home)
+    resolved = json.loads(json.dumps(scenario.resolved()))
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    again = load_scenario(resolved)
+
+    assert scenario == again
+    assert resolved == again.resolved()
+    assert scenario == copy.deepcopy(scenario)
+
+
+def test_scenario_is_a_source_too(home: Path) -> None:
+    scenario = load_scenario(home)
+    changed = load_scenario(scenario, "users.ana=null", seed=5, name="night")
+
+    assert scenario is load_scenario(scenario)
+    assert (5, "night", ["ben"]) == (changed.simulation.seed, changed.name, list(changed.users))
+    assert home.parent == changed.folder
+
+
+def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
+    scenario = load_scenario(
+        home, "simulation.seed=1", seed=2, duration=timedelta(hours=1), robots=None
+    )
+
+    assert (2, 3600) == (scenario.simulation.seed, scenario.simulation.steps)
+    assert {} == scenario.robots
+
+
+@pytest.mark.parametrize(
+    ("overrides", "line"),
+    [
+        (["simulation.step=2 h", "simulation.duration=1 h"],
+         "simulation.duration: 1 h is shorter than one step, 2 h"),
+        (["simulation.start=2026-01-05T00:00:00Z"], "simulation.start: found 2026-01-05T00:00:00+00"
+         ":00; the clock on the home's wall is wanted, without a time zone"),
+        (["simulation.start=20260105"],
+         "simulation.start: found 20260105; a date and time is wanted"),
+        (["simulation.start=2026-02-31"], "simulation.start: found '2026-02-31'; a date and time"),
+        (["simulation.seed=-1"], "simulation.seed: found -1; 0 or more is wanted"),
+        (["simulation.max_span=0"], "simulation.max_span: found 0; 1 or more is wanted"),
+        (["simulation.speedup=0"], "simulation.speedup: found 0; more than 0 is wanted"),
+        (["simulation.speedup=.inf"], "simulation.speedup: found inf; a finite number is wanted"),
+        (["users.9x=drift"], "users.9x: the name '9x' must be letters"),
+        (["robots.ana=drift"], "robots.ana: there is a user named 'ana' already"),
+        (["floorplan=null"], "floorplan: missing, and has no default"),
+        (["floorplan.path=gone.json"], "floorplan.path: no such file"),
+        (["users.ana.sped=1"], "users.ana.sped: unknown key 'sped': did you mean 'speed'? Allowed "
+         "here: color, dwell, radius,"),
+        (["users.ana.stops=hall"], "users.ana.stops: found 'hall'; a list is wanted"),
+        (["users.ana.speed=fast"], "users.ana.speed: found 'fast'; a speed is wanted: a number in"),
+        (["users.ana.type=wander"], "users.ana.type: there is no behavior 'wander'"),
+        (["users.ben.behaviors.1.dwell=1 parsec"],
+         "users.ben.behaviors.1.dwell: unknown unit 'parsec' in '1 parsec'"),
+        (["algorithms.count.margin=2"], "algorithms.count.margin: found 2; a share is 0 to 1"),
+        (["algorithms.calm.inner.type=own:Gone"], "algorithms.calm.inner.type: can't import"),
+        (["algorithms.calm.inner=count"], None),
+        (["metrics.other={of: count}"], "metrics.other: there is no metric 'other'"),
+        (["artifacts.events=maybe"], "artifacts.events: found 'maybe'; true or false is wanted"),
+        (["sumulation.seed=1"], "sumulation: unknown key 'sumulation': did you mean 'simulation'?"),
+    ],
+)  # fmt: skip
+def test_override_error_says_where_and_what(
+    home: Path, overrides: list[str], line: str | None
+) -> None:
+    if line is None:
+        assert load_scenario(home, *overrides)
+    else:
+        assert f"override '{overrides[-1]}': {line}" in said(home, *overrides)
+
+
+def test_all_errors_of_a_file_are_told_with_their_lines(home: Path) -> None:
+    home.write_text(HOME.replace("30 cm", "wide").replace("margin: 95 %", "margn: 1"))
+
+    assert said("homes/home.yaml").splitlines() == [
+        "homes/home.yaml:4: users.ana.radius: found 'wide'; a length is wanted: a number in m, or "
+        "like '0.2 m', '20 cm', '5 mm'",
+        "homes/home.yaml:9: algorithms.count.margn: unknown key 'margn': did you mean 'margin'? "
+        "Allowed here: margin",
+    ]
+
+
+def test_unknown_keyword_is_refused(home: Path) -> None:
+    assert "unknown argument 'sed': did you mean 'seed'? Known are: start," in said(home, sed=3)
+
+
+def test_empty_scenario_names_what_is_missing() -> None:
+    assert said({}).splitlines() == [
+        "simulation: missing, and has no default",
+        "floorplan: missing, and has no default",
+    ]
+
+
+def test_scenario_is_frozen(home: Path) -> None:
+    scenario: Scenario = load_scenario(home)
+
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.name = "x"

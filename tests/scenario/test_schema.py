@@ -1,0 +1,68 @@
+"""The JSON Schema for editors and the list of components."""
+
+import json
+from typing import Any
+
+import pytest
+
+from fleet2d.scenario.schema import ComponentDescription, describe_components, schema
+
+pytestmark = pytest.mark.usefixtures("stand_ins")
+
+
+@pytest.fixture
+def written() -> dict[str, Any]:
+    return schema()
+
+
+def test_schema_is_json_and_refuses_unknown_keys(written: dict[str, Any]) -> None:
+    assert written == json.loads(json.dumps(written))
+    assert written["additionalProperties"] is False
+    assert "extends" in written["properties"]
+
+
+def test_schema_requires_nothing_that_an_extended_file_may_give(written: dict[str, Any]) -> None:
+    assert "required" not in written
+    assert "required" not in written["$defs"]["SimulationSettings"]
+
+
+def test_schema_completes_the_short_form(written: dict[str, Any]) -> None:
+    user = written["properties"]["users"]["additionalProperties"]["anyOf"]
+    tour = next(form for form in user[0]["anyOf"] if form.get("title") == "tour")
+
+    assert {"type", "stops", "dwell", "radius", "speed"} <= set(tour["properties"])
+    assert ["type"] == tour["required"]
+    assert "null" == user[1]["type"]
+
+
+def test_schema_offers_every_type_and_its_bare_name(written: dict[str, Any]) -> None:
+    plans = written["$defs"]["floorplan"]["anyOf"]
+
+    assert {"const": "houseexpo"} == written["$defs"]["File"]["properties"]["type"]
+    assert {"$ref": "#/$defs/File", "required": ["type"]} in plans
+    assert {"type": "string", "enum": ["empty", "houseexpo", "he"]} in plans
+
+
+def test_component_that_holds_its_own_kind_refers_to_it(written: dict[str, Any]) -> None:
+    assert "#/$defs/algorithm" == written["$defs"]["Smooth"]["properties"]["inner"]["$ref"]
+
+
+def test_every_reference_of_the_schema_resolves(written: dict[str, Any]) -> None:
+    references = json.dumps(written).split('"#/$defs/')[1:]
+
+    assert {text.partition('"')[0] for text in references} <= set(written["$defs"])
+
+
+def test_components_are_described_with_units_and_defaults() -> None:
+    described = {(d.kind, d.type): d for d in describe_components()}
+    plan = described["floorplan", "houseexpo"]
+    tour = described["behavior", "tour"]
+
+    assert ("he",) == plan.aliases
+    assert "A plan in a file." == plan.summary
+    assert [("cell", "length [m]", "0.05"), ("path", "path", None), ("border", "whole number", "4")
+            ] == [(f.name, f.type, f.default) for f in plan.fields]  # fmt: skip
+    assert [("stops", "list of text", "[]"), ("dwell", "duration [s]", "1 min")] == [
+        (f.name, f.type, f.default) for f in tour.fields
+    ]
+    assert all(isinstance(d, ComponentDescription) for d in described.values())

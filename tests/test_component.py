@@ -1,0 +1,310 @@
+"""Components: frozen configuration beside free run state, and finding classes by name."""
+
+import copy
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import pytest
+from pydantic import Field, TypeAdapter, ValidationError
+
+from fleet2d import component
+from fleet2d.component import (
+    Component,
+    OneOf,
+    Settings,
+    ShortForm,
+    base_of,
+    components,
+    lookup,
+    register,
+    split_short_form,
+)
+from fleet2d.errors import ScenarioError
+from fleet2d.units import Duration, Length, Text
+
+
+class Gadget(Component):
+    """Base of a kind for these tests."""
+
+    kind: ClassVar[str] = "gadget"
+    cell: Length = 0.05
+
+
+class Lamp(Gadget):
+    """A lamp."""
+
+    watts: int = Field(default=5, gt=0)
+    warm_up: Duration = "1 min"  # type: ignore[assignment]
+
+
+class Fan(Gadget):
+    """A fan."""
+
+    blades: tuple[int, ...]
+
+
+class Shelf(Settings):
+    """Holds gadgets."""
+
+    top: Annotated[Component, OneOf("gadget")]
+    others: tuple[Annotated[Component, OneOf("gadget")], ...] = ()
+
+
+class Body(Settings):
+    """What an entity looks like to the short form."""
+
+    radius: Length = 0.2
+    behaviors: tuple[Annotated[Component, OneOf("gadget")], ...] = ()
+
+
+@pytest.fixture(autouse=True)
+def gadgets(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(component, "_REGISTRY", {})
+    monkeypatch.setattr(component, "_ALIASES", {})
+    register("gadget", "lamp", aliases=("light",))(Lamp)
+    register("gadget", "fan")(Fan)
+    yield
+    sys.modules.pop("own", None)
+    sys.modules.pop("helpers", None)
+
+
+def errors(model: Any, data: object) -> dict[str, str]:
+    with pytest.raises(ValidationError) as caught:
+        TypeAdapter(model).validate_python(data)
+    return {".".join(map(str, e["loc"])): e["msg"] for e in caught.value.errors()}
+
+
+def test_configuration_is_frozen() -> None:
+    with pytest.raises(ValidationError, match="frozen"):
+        Lamp().watts = 7
+
+
+def test_class_variables_cannot_be_shadowed() -> None:
+    with pytest.raises(AttributeError):
+        Lamp().type_name = "torch"  # type: ignore[misc]
+
+
+def test_run_state_is_free_copied_and_not_dumped() -> None:
+    lamp = Lamp()
+    lamp.seen = [1]  # type: ignore[attr-defined]
+    twin = copy.deepcopy(lamp)
+    twin.seen.append(2)  # type: ignore[attr-defined]
+
+    assert [1] == lamp.seen  # type: ignore[attr-defined]
+    assert [1, 2] == twin.seen  # type: ignore[attr-defined]
+    assert lamp == twin
+    assert {"cell": 0.05, "watts": 5, "warm_up": "1 min"} == lamp.model_dump(mode="json")
+
+
+def test_equal_configurations_hash_alike() -> None:
+    assert hash(Lamp(watts=3)) == hash(Lamp(watts=3))
+
+
+def test_unknown_key_names_the_nearest_and_all() -> None:
+    assert errors(Lamp, {"wats": 3}) == {
+        "wats": "unknown key 'wats': did you mean 'watts'? Allowed here: cell, warm_up, watts"
+    }
+
+
+def test_lookup_by_name_and_alias() -> None:
+    assert Lamp is lookup("gadget", "lamp") is lookup("gadget", "light")
+    assert {"fan": Fan, "lamp": Lamp} == components("gadget")
+
+
+def test_lookup_of_an_unknown_name_lists_what_exists() -> None:
+    with pytest.raises(ScenarioError, match=r"'lmap': did you mean 'lamp'\? There are: fan, lamp"):
+        lookup("gadget", "lmap")
+
+
+@pytest.mark.parametrize("name", ["lamp", "light"])
+def test_register_refuses_a_taken_name(name: str) -> None:
+    with pytest.raises(ValueError, match="named"):
+        register("gadget", name)(Fan)
+
+
+def test_register_refuses_another_kind() -> None:
+    with pytest.raises(ValueError, match="can't be a metric"):
+        register("metric", "lamp")(Lamp)
+
+
+def test_base_is_the_class_that_declares_the_kind() -> None:
+    assert Gadget is base_of(Lamp)
+
+
+@pytest.mark.parametrize("name", ["meander", "schedule", "patrol"])
+def test_builtin_component_is_found_without_an_import(name: str) -> None:
+    code = f"from fleet2d.component import lookup; print(lookup('behavior', {name!r}).type_name)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert name == found.stdout.strip()
+
+
+OWN = """
+from typing import ClassVar
+from fleet2d.component import Component
+from {dots}helpers import SIZE
+
+class Own(Component):
+    kind: ClassVar[str] = "gadget"
+    size: int = SIZE
+"""
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> tuple[Path, Path]:
+    """Two scenario folders with equally named modules that differ."""
+    for number in (1, 2):
+        folder = tmp_path / str(number)
+        (folder / "parts").mkdir(parents=True)
+        (folder / "helpers.py").write_text(f"SIZE = {number}")
+        (folder / "parts" / "helpers.py").write_text(f"SIZE = {number * 10}")
+        (folder / "own.py").write_text(OWN.format(dots=""))
+        (folder / "parts" / "own.py").write_text(OWN.format(dots="."))
+    return tmp_path / "1", tmp_path / "2"
+
+
+@pytest.mark.parametrize(("name", "factor"), [("own:Own", 1), ("parts.own:Own", 10)])
+def test_equal_module_names_of_two_folders_stay_apart(
+    folders: tuple[Path, Path], name: str, factor: int
+) -> None:
+    first, second = (lookup("gadget", Text(name, folder)) for folder in folders)
+
+    assert (factor, 2 * factor) == (first().size, second().size)  # type: ignore[attr-defined]
+    assert first is lookup("gadget", Text(name, folders[0]))
+    assert "helpers" not in sys.modules
+
+
+def test_own_component_is_found_again_by_the_name_it_dumps(folders: tuple[Path, Path]) -> None:
+    cls = lookup("gadget", Text("parts.own:Own", folders[1]))
+
+    assert f"{folders[1]}/parts.own:Own" == cls.type_name
+    assert cls is lookup("gadget", cls.type_name)
+
+
+def test_own_component_copies_and_pickles(folders: tuple[Path, Path]) -> None:
+    own = lookup("gadget", Text("own:Own", folders[1]))()
+
+    assert own == copy.deepcopy(own) == pickle.loads(pickle.dumps(own))
+
+
+def test_module_that_is_imported_already_is_not_loaded_twice(
+    folders: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(folders[0])
+    import own  # type: ignore[import-not-found]
+
+    assert own.Own is lookup("gadget", Text("own:Own", folders[0]))
+    assert own.Own is not lookup("gadget", Text("own:Own", folders[1]))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("nowhere:Own", "no module named 'nowhere' in"),
+        ("own:Missing", "has no attribute 'Missing'"),
+        ("broken:Own", "ZeroDivisionError in its module"),
+        ("unparsable:Own", "SyntaxError in its module"),
+        ("pathlib:Path", "'pathlib:Path' is not a gadget"),
+        ("fleet2d.component:Component", "is not a gadget"),
+        (":", "can't import ':'"),
+    ],
+)
+def test_own_component_that_cannot_be_had_is_explained(
+    folders: tuple[Path, Path], name: str, said: str
+) -> None:
+    (folders[0] / "broken.py").write_text("1 / 0")
+    (folders[0] / "unparsable.py").write_text("class Own(")
+
+    with pytest.raises(ScenarioError) as caught:
+        lookup("gadget", Text(name, folders[0]))
+    assert said in str(caught.value)
+    assert str(folders[0]) not in sys.path
+
+
+def test_one_of_reads_a_mapping_a_name_and_an_instance() -> None:
+    fan = Fan(blades=(1,))
+    shelf = Shelf.model_validate({"top": {"type": "light", "watts": 3}, "others": ["lamp", fan]})
+
+    assert Lamp(watts=3) == shelf.top
+    assert (Lamp(), fan) == shelf.others
+
+
+def test_one_of_dumps_what_validates_to_an_equal_model() -> None:
+    shelf = Shelf(top=Fan(blades=(1, 2)), others=(Lamp(warm_up="90 s"),))  # type: ignore[arg-type]
+    dumped = shelf.model_dump(mode="json")
+
+    assert {"type": "fan", "cell": 0.05, "blades": [1, 2]} == dumped["top"]
+    assert "90 s" == dumped["others"][0]["warm_up"]
+    assert shelf == Shelf.model_validate(dumped)
+
+
+def test_one_of_places_nested_errors() -> None:
+    assert errors(
+        Shelf,
+        {
+            "top": {"type": "fan", "blades": [1, "x"], "speed": 3},
+            "others": ["lmap", {"watts": 0}, {"type": "lamp", "watts": 0}, 3, Shelf],
+        },
+    ) == {
+        "top.blades.1": "Input should be a valid integer, unable to parse string as an integer",
+        "top.speed": "unknown key 'speed'. Allowed here: blades, cell",
+        "others.0.type": "there is no gadget 'lmap': did you mean 'lamp'? There are: fan, lamp; "
+        "your own is written 'package.module:Class'",
+        "others.1.type": "'type' is needed to tell which gadget this is: fan, lamp",
+        "others.2.watts": "Input should be greater than 0",
+        "others.3": "found 3; a mapping with 'type', or a type's name, is wanted",
+        "others.4": f"found {Shelf}; a mapping with 'type', or a type's name, is wanted",
+    }
+
+
+def test_one_of_refuses_an_instance_of_another_kind() -> None:
+    class Stranger(Component):
+        kind: ClassVar[str] = "stranger"
+
+    assert errors(Shelf, {"top": Stranger()}) == {"top": "found a Stranger; a gadget is wanted"}
+
+
+SHORT = Annotated[Body, ShortForm()]
+
+
+@pytest.mark.parametrize(
+    ("written", "split"),
+    [
+        ({"type": "lamp", "radius": 1, "watts": 2},
+         {"radius": 1, "behaviors": [{"type": "lamp", "watts": 2}]}),
+        ("lamp", {"behaviors": ["lamp"]}),
+        ({"radius": 1}, {"radius": 1}),
+        ({"behaviors": ["lamp"]}, {"behaviors": ["lamp"]}),
+        (3, 3),
+    ],
+)  # fmt: skip
+def test_split_short_form(written: object, split: object) -> None:
+    assert split == split_short_form(written, ["radius"])
+
+
+def test_short_form_equals_long_form() -> None:
+    adapter: TypeAdapter[Body] = TypeAdapter(SHORT)
+
+    assert adapter.validate_python(
+        {"radius": 1, "behaviors": [{"type": "lamp", "watts": 2}]}
+    ) == adapter.validate_python({"type": "lamp", "radius": 1, "watts": 2})
+
+
+def test_short_form_errors_name_keys_as_written() -> None:
+    assert errors(SHORT, {"type": "lamp", "radius": "x", "watts": 0, "radiu": 1}) == {
+        "radius": "found 'x'; a length is wanted: a number in m, or like '0.2 m', '20 cm', '5 mm'",
+        "watts": "Input should be greater than 0",
+        "radiu": "unknown key 'radiu': did you mean 'radius'? "
+        "Allowed here: cell, radius, warm_up, watts",
+    }
+    assert ["type"] == list(errors(SHORT, {"type": "lmap"}))
+
+
+def test_short_form_beside_behaviors_is_refused() -> None:
+    assert errors(SHORT, {"type": "lamp", "behaviors": []}) == {
+        "behaviors": "give 'type' (one behavior) or 'behaviors', not both"
+    }

@@ -1,0 +1,78 @@
+"""Errors keep their type, place and words when they are rewritten."""
+
+from datetime import date, datetime
+from decimal import Decimal
+from enum import Enum
+from typing import Annotated, Any, Literal
+
+import pytest
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
+from pydantic_core import PydanticCustomError
+
+from fleet2d.problems import did_you_mean, problem_at, rewritten, unknown_key
+
+
+class Side(Enum):
+    """Two values."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+
+def _refuse(_: object) -> object:
+    raise ValueError("never good enough")
+
+
+def _refuse_specially(_: object) -> object:
+    raise PydanticCustomError("special", "{what} {{x}}", {"what": "it is {what}"})
+
+
+class Everything(BaseModel):
+    """One field per sort of error."""
+
+    whole: int
+    real: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    limited: Annotated[Decimal, Field(max_digits=3)]
+    word: Annotated[str, Field(pattern="^a")]
+    side: Side
+    choice: Literal["a", "b"]
+    day: date
+    moment: datetime
+    pair: tuple[int, int]
+    several: Annotated[list[int], Field(min_length=2)]
+    mapping: dict[str, int]
+    nested: "Everything | None"
+    judged: Annotated[int, AfterValidator(_refuse)]
+    special: Annotated[int, AfterValidator(_refuse_specially)]
+
+
+@pytest.mark.parametrize("value", ["x", -1, [1], None, {"a": "b"}, float("nan"), b"\xff", True])
+def test_rewritten_error_says_the_same(value: Any) -> None:
+    with pytest.raises(ValidationError) as caught:
+        Everything.model_validate(dict.fromkeys(Everything.model_fields, value))
+    again = rewritten(caught.value, lambda line: line)
+
+    assert [(e["type"], e["loc"], e["msg"]) for e in caught.value.errors()] == [
+        (e["type"], e["loc"], e["msg"]) for e in again.errors()
+    ]
+
+
+def test_rewriting_moves_an_error() -> None:
+    error = rewritten(problem_at(("a", "b"), "no {b}"), lambda line: {**line, "loc": ("c",)})
+
+    assert [(("c",), "no {b}")] == [(e["loc"], e["msg"]) for e in error.errors()]
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("sped", "unknown key 'sped': did you mean 'speed'? Allowed here: radius, speed"),
+        (3, "unknown key 3. Allowed here: radius, speed"),
+    ],
+)
+def test_unknown_key_names_the_known(key: object, said: str) -> None:
+    assert said == str(unknown_key(key, ["speed", "radius"]))
+
+
+def test_nothing_near_is_not_guessed() -> None:
+    assert "." == did_you_mean("xyz", ["speed"])

@@ -1,0 +1,221 @@
+"""Quantities: what they accept, exactly, and what they say about the rest."""
+
+import copy
+import pickle
+from datetime import timedelta
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from fleet2d.units import (
+    LONGEST_DURATION,
+    AngleDeg,
+    Duration,
+    InputPath,
+    Length,
+    PositiveDuration,
+    PositiveLength,
+    Share,
+    Speed,
+    Text,
+    TimeOfDay,
+    TurnRateDeg,
+    format_duration,
+    micros,
+    parse_duration,
+)
+
+
+def read(type_: Any, value: object) -> Any:
+    return TypeAdapter(type_).validate_python(value)
+
+
+def message(type_: Any, value: object) -> str:
+    with pytest.raises(ValidationError) as caught:
+        read(type_, value)
+    return str(caught.value.errors()[0]["msg"])
+
+
+@pytest.mark.parametrize(
+    ("written", "microseconds"),
+    [
+        (timedelta(hours=1), 3_600_000_000),
+        (1, 1_000_000),
+        (0.1, 100_000),
+        (0.1 + 0.2, 300_000),
+        ("1 s", 1_000_000),
+        ("14 d", 1_209_600_000_000),
+        ("1.5 h", 5_400_000_000),
+        ("500 ms", 500_000),
+        ("2 weeks", 1_209_600_000_000),
+        ("1 h 30 min", 5_400_000_000),
+        ("1h30min", 5_400_000_000),
+        ("1 day, 1 s", 86_401_000_000),
+        ("1e-3 s", 1000),
+        ("7 µs", 7),
+        ("90", 90_000_000),
+        ({"days": 30, "hours": 2}, 2_599_200_000_000),
+        ({"minutes": 0.1}, 6_000_000),
+        (0, 0),
+    ],
+)
+def test_duration_is_read_exactly(written: object, microseconds: int) -> None:
+    assert microseconds == micros(read(Duration, written))
+
+
+@given(st.integers(0, micros(LONGEST_DURATION)))
+def test_duration_survives_its_canonical_spelling(count: int) -> None:
+    duration = timedelta(microseconds=count)
+
+    assert duration == parse_duration(format_duration(duration))
+
+
+@pytest.mark.parametrize(
+    ("written", "dumped"),
+    [("30 d", "30 d"), ("60 min", "1 h"), (90, "90 s"), ("500 ms", "0.5 s"), (0, "0 s"),
+     ("2 weeks", "14 d"), ("1 us", "0.000001 s"), ("36 h", "36 h"), ("100 s", "100 s")],
+)  # fmt: skip
+def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dumped: str) -> None:
+    class Model(BaseModel):
+        value: Duration
+
+    assert {"value": dumped} == Model(value=written).model_dump(mode="json")
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ("1 parsec", "unknown unit 'parsec' in '1 parsec': a duration is written like '30 s', "
+                     "'5 min', '1 h', '14 d'"),
+        ({"fortnights": 1}, "unknown unit 'fortnights' in"),
+        ("fast", "found 'fast'; a duration is wanted: a number in s, or like '30 s'"),
+        ("", "found ''; a duration is wanted"),
+        ("5 3", "found '5 3'; a duration is wanted"),
+        ("1 h 30", "found '1 h 30'; a duration is wanted"),
+        (True, "found True; a duration is wanted"),
+        (None, "found None; a duration is wanted"),
+        ({}, "found {}; a duration is wanted"),
+        ({"days": "3"}, "found {'days': '3'}; a duration is wanted"),
+        (-1, "found -1 s; a duration can't be negative"),
+        (timedelta(-1), "a duration can't be negative"),
+        (1e-7, "found 1e-07; a duration is told to the microsecond"),
+        ("1e300 s", "found '1e300 s'; 1000 years is the longest duration"),
+        (timedelta.max, "1000 years is the longest duration"),
+        (float("nan"), "found nan; a duration is a finite number"),
+        (float("inf"), "found inf; a duration is a finite number"),
+    ],
+)  # fmt: skip
+def test_duration_says_what_is_wrong(written: object, said: str) -> None:
+    assert said in message(Duration, written)
+
+
+def test_huge_exponent_is_refused_before_it_fills_the_memory() -> None:
+    assert "a length is wanted" in message(Length, "1e999999999 m")
+
+
+def test_positive_duration_refuses_zero() -> None:
+    assert "found 0 s; a duration longer than 0 is wanted" == message(PositiveDuration, 0)
+
+
+@pytest.mark.parametrize(
+    ("type_", "written", "number"),
+    [
+        (Length, 0.2, 0.2),
+        (Length, "0.2 m", 0.2),
+        (Length, "20 cm", 0.2),
+        (Length, "5 mm", 0.005),
+        (Length, -1, -1.0),
+        (Length, Fraction(1, 4), 0.25),
+        (Speed, "0.6 m/s", 0.6),
+        (Speed, "3.6 km/h", 1.0),
+        (AngleDeg, "108 deg", 108.0),
+        (AngleDeg, "-90°", -90.0),
+        (AngleDeg, "1 turn", 360.0),
+        (TurnRateDeg, "90 deg/s", 90.0),
+        (Share, 1, 1.0),
+        (Share, "95 %", 0.95),
+    ],
+)
+def test_quantity_is_read_in_its_base_unit(type_: Any, written: object, number: float) -> None:
+    assert number == read(type_, written)
+
+
+@pytest.mark.parametrize(
+    ("type_", "written", "said"),
+    [
+        (Length, "3 ft", "unknown unit 'ft' in '3 ft': a length is written like '0.2 m'"),
+        (Length, float("nan"), "found nan; a length is a finite number"),
+        (Length, "1e400", "found '1e400'; a length is a finite number"),
+        (PositiveLength, 0, "found 0; a length above 0 is wanted"),
+        (Speed, -1, "found -1; a speed is 0 or more"),
+        (Speed, "fast", "found 'fast'; a speed is wanted: a number in m/s, or like '0.6 m/s'"),
+        (TurnRateDeg, -1, "found -1; a turn rate is 0 or more"),
+        (Share, 1.5, "found 1.5; a share is 0 to 1, or '0 %' to '100 %'"),
+        (Share, "95", "found 95; a share is 0 to 1"),
+    ],
+)
+def test_quantity_says_what_is_wrong(type_: Any, written: object, said: str) -> None:
+    assert said in message(type_, written)
+
+
+@pytest.mark.parametrize(
+    ("written", "seconds", "dumped"),
+    [("07:30", 27_000, "07:30"), ("7:30", 27_000, "07:30"), ("07:30:15", 27_015, "07:30:15"),
+     ("00:00:05.25", 5.25, "00:00:05.25"), ("24:00", 86_400, "24:00"),
+     (timedelta(hours=1), 3600, "01:00")],
+)  # fmt: skip
+def test_time_of_day_is_the_time_since_midnight(
+    written: object, seconds: float, dumped: str
+) -> None:
+    adapter: TypeAdapter[timedelta] = TypeAdapter(TimeOfDay)
+    value = adapter.validate_python(written)
+
+    assert (timedelta(seconds=seconds), dumped) == (value, adapter.dump_python(value, mode="json"))
+
+
+@pytest.mark.parametrize("written", ["24:01", "25:00", "7", "07:60", 450, "noon", None, "07:30 pm"])
+def test_time_of_day_refuses_what_no_clock_shows(written: object) -> None:
+    assert "a time of day is" in message(TimeOfDay, written)
+
+
+@pytest.mark.parametrize(
+    "type_",
+    [Duration, PositiveDuration, Length, Speed, AngleDeg, TurnRateDeg, Share, TimeOfDay, InputPath],
+)
+def test_json_schema_describes_each_quantity(type_: Any) -> None:
+    schema = TypeAdapter(type_).json_schema()
+
+    assert schema["description"]
+    assert schema["x-quantity"]
+
+
+def test_path_starts_from_the_folder_of_its_file(tmp_path: Path) -> None:
+    (tmp_path / "plan.json").touch()
+
+    assert tmp_path / "plan.json" == read(InputPath, Text("plan.json", tmp_path))
+
+
+def test_path_starts_from_the_current_folder_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "plan.json").touch()
+    monkeypatch.chdir(tmp_path)
+
+    assert tmp_path / "plan.json" == read(InputPath, "plan.json")
+
+
+def test_path_that_is_no_file_is_refused(tmp_path: Path) -> None:
+    assert f"no such file: {tmp_path / 'x'}" == message(InputPath, Text("x", tmp_path))
+    assert f"a folder, not a file: {tmp_path}" == message(InputPath, tmp_path)
+    assert "found 3; the path of a file is wanted" == message(InputPath, 3)
+
+
+def test_text_keeps_its_folder_in_copies() -> None:
+    text = Text("plan.json", Path("/homes"))
+
+    assert Path("/homes") == copy.deepcopy(text).folder == pickle.loads(pickle.dumps(text)).folder
