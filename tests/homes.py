@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -69,7 +69,7 @@ def walls_of(polygons: Sequence[Polygon]) -> Int64:
     return np.array(walls, np.int64)
 
 
-def home_of(polygons: Sequence[Polygon]) -> Home:
+def home_of(polygons: Sequence[Any]) -> Home:
     """Return the home with this free space: even, positive lattice units."""
     walls = walls_of(polygons)
     columns, rows = (walls.reshape(-1, 2).max(axis=0) // SUB + 3).tolist()
@@ -156,8 +156,8 @@ def meshed(mesh: Mesh, triangles: list[list[int]]) -> Mesh:
 def awkward_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
     """Return about seven times `count` points, most of them where rounding would go wrong.
 
-    Centres of free cells, middles of inner edges of the mesh, points in line with two corners, points
-    on walls, corners, even lattice points anywhere.
+    Centres of free cells, middles of inner edges of the mesh, points in line with two corners,
+    points on walls, corners, even lattice points anywhere.
     """
     vertices, cells = home.mesh.vertices, home.cells
     triangle, k = np.nonzero(home.mesh.neighbors >= 0)
@@ -185,3 +185,8 @@ def behind_corners(home: Home, eye: Int64, rng: np.random.Generator, count: int)
     corners = rng.choice(home.mesh.vertices, count)
     away = corners - eye
     return np.concatenate([corners, corners + away, corners + away // 2, eye + away // 2])
+
+
+def times_compiled(function: Any) -> int:
+    """Return for how many combinations of argument types a kernel was compiled."""
+    return len(function.signatures)

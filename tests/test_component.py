@@ -210,6 +210,7 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
         ("unparsable:Own", "SyntaxError in its module"),
         ("pathlib:Path", "'pathlib:Path' is not a gadget"),
         ("fleet2d.component:Component", "is not a gadget"),
+        ("fleet2d.floorplan.source:FloorPlanSource", "is not a gadget"),
         (":", "can't import ':'"),
     ],
 )
@@ -223,6 +224,11 @@ def test_own_component_that_cannot_be_had_is_explained(
         lookup("gadget", Text(name, folders[0]))
     assert said in str(caught.value)
     assert str(folders[0]) not in sys.path
+
+
+def test_component_that_lacks_a_method_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="is not a whole floorplan: it lacks load"):
+        lookup("floorplan", "fleet2d.floorplan.source:FloorPlanSource")
 
 
 def test_one_of_reads_a_mapping_a_name_and_an_instance() -> None:

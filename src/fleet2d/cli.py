@@ -4,6 +4,7 @@ import json
 import os
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -78,8 +79,8 @@ def validate(arguments: Arguments = None) -> None:
     simulation = Simulation(scenario, *overrides)
     plan, settings = simulation.home.plan, simulation.scenario.simulation
     typer.echo(
-        f"ok: {len(simulation.scenario.users)} users and {len(simulation.scenario.robots)} robots in"
-        f" {plan.name} ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
+        f"ok: {len(simulation.scenario.users)} users and {len(simulation.scenario.robots)} robots"
+        f" in {plan.name} ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
         f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
     )
     for note in plan.notes:
@@ -103,22 +104,24 @@ def components(
 
     described = describe_components()
     if as_json:
-        typer.echo(json.dumps(described, indent=2))
+        typer.echo(json.dumps([asdict(component) for component in described], indent=2))
         return
     for component in described:
-        typer.echo(f"{component['kind']}: {component['name']}\n    {component['description']}")
-        for field in component["fields"]:
-            default = "required" if field["required"] else f"= {json.dumps(field['default'])}"
-            typer.echo(f"    {field['name']}: {field['type']} {default}")
-            if field["description"]:
-                typer.echo(f"        {field['description']}")
+        names = " or ".join((component.type, *component.aliases))
+        typer.echo(f"{component.kind}: {names}\n    {component.summary}")
+        for field in component.fields:
+            default = "required" if field.default is None else f"= {field.default or repr('')}"
+            typer.echo(f"    {field.name}: {field.type} {default}")
+            if field.description:
+                typer.echo(f"        {field.description}")
         typer.echo("")
 
 
 @app.command()
 def show(
     what: Annotated[
-        Path | None, typer.Argument(metavar="[FLOORPLAN|RUN_DIR]", help="Left out: the bundled home.")
+        Path | None,
+        typer.Argument(metavar="[FLOORPLAN|RUN_DIR]", help="Left out: the bundled home."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Picture to write, .png or .svg.")] = None,
 ) -> None:
@@ -253,7 +256,8 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
     seconds = wall["setup"] + wall["simulate"] + wall["save"]
     console.print(
         f"{days:g} days in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
-        f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s, save {wall['save']:.2f} s;"
+        f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
+        f" save {wall['save']:.2f} s;"
         f" whole process {wall['total']:.2f} s, {summary['peak_rss_mb']:.0f} MB)",
         highlight=False,
     )
@@ -261,7 +265,7 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
     for metric, result in summary["metrics"].items():
         for name, value in _flat(result):
             table.add_row(metric, name, f"{value:.4g}" if isinstance(value, float) else str(value))
-            metric = ""  # noqa: PLW2901  (named once)
+            metric = ""
     if table.row_count:
         console.print(table)
     for note in stored.notes or stored.manifest["notes"]:
@@ -274,7 +278,9 @@ def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
     if not isinstance(result, dict):
         return [(prefix, result)]
     return [
-        row for key, value in result.items() for row in _flat(value, f"{prefix} · {key}" if prefix else key)
+        row
+        for key, value in result.items()
+        for row in _flat(value, f"{prefix} · {key}" if prefix else key)
     ]
 
 
@@ -283,7 +289,12 @@ def _since_start() -> float:
     try:
         ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
         return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
-    except (OSError, AttributeError, ValueError, IndexError):  # not Linux: since this module was loaded
+    except (
+        OSError,
+        AttributeError,
+        ValueError,
+        IndexError,
+    ):  # not Linux: since this module was loaded
         return time.perf_counter() - _LOADED
 
 

@@ -210,6 +210,8 @@ def _checked(kind: str, name: str, found: object) -> type[Component]:
             f"{name!r} is not a {kind}: it must be a class derived from the "
             f"{kind} base class of fleet2d"
         )
+    if missing := sorted(getattr(found, "__abstractmethods__", ())):
+        raise ScenarioError(f"{name!r} is not a whole {kind}: it lacks {', '.join(missing)}")
     return found
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from fleet2d.kernels.fields import squared_distance
-
 from tests.reference.fields import squared_distance as slow_squared_distance
+
+from fleet2d.kernels.fields import squared_distance
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29), (40, 25)])

@@ -48,9 +48,10 @@ class Present:
 class Algorithm(Component):
     """Base of what computes from history and state; a subclass writes `update`.
 
-    It is updated after every full `period`, with the history of exactly that period. What it returns (a
-    RoomDistribution, or a mapping of names to numbers or arrays; None for nothing) is stored as rows of a
-    table of its own, and everybody reads it from the next step on. Run state is set in `start`.
+    It is updated after every full `period`, with the history of exactly that period. What it
+    returns (a RoomDistribution, or a mapping of names to numbers or arrays; None for nothing) is
+    stored as rows of a table of its own, and everybody reads it from the next step on. Run state is
+    set in `start`.
 
     Example:
         >>> import numpy as np
@@ -60,7 +61,8 @@ class Algorithm(Component):
         ...     def start(self, home):
         ...         self.counts = np.zeros(len(home.rooms))
         ...     def update(self, history, state):
-        ...         self.counts += np.bincount(history.observations.room, minlength=len(self.counts))
+        ...         rooms = history.observations.room
+        ...         self.counts += np.bincount(rooms, minlength=len(self.counts))
         ...         return RoomDistribution(self.counts)
         >>> SightingShare(period="30 min").period.total_seconds()
         1800.0

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 
 from fleet2d.entities.plan import Motion, State
 from fleet2d.errors import ComponentError
+from fleet2d.kernels.measure import count_rooms, sum_moves
 from fleet2d.kernels.mesh import SUB
-from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -33,14 +35,65 @@ class Observations(NamedTuple):
     room: NDArray[np.int16]
 
 
-class BodyPoses(NamedTuple):
-    """Poses of one body, one entry per step."""
+class BodyPoses:
+    """Poses of one body, one entry per step; columns are worked out when they are asked for.
 
-    x: NDArray[np.float64]  # [m]
-    y: NDArray[np.float64]
-    heading: NDArray[np.int64]  # 1/4096 turn
-    away: NDArray[np.bool_]
-    room: NDArray[np.int16]  # NOWHERE while away
+    Attributes:
+        heading: int64 [1/4096 turn].
+    """
+
+    def __init__(self, home: "Home", poses: Poses) -> None:
+        self._home, self._poses = home, poses
+        self.heading = poses.heading
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.heading)
+
+    @cached_property
+    def xy(self) -> NDArray[np.float64]:
+        """Positions (n, 2) [m]; where it left while it is away."""
+        lattice = self._home.plan.lattice
+        return lattice.to_metres(np.stack([self._poses.x, self._poses.y], axis=-1))
+
+    def at(self, index: int) -> tuple[float, float]:
+        """Return the position (x, y) [m] at one step; -1 is the last."""
+        point = self._poses.x[index], self._poses.y[index]
+        x, y = self._home.plan.lattice.to_metres(point).tolist()
+        return x, y
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Positions along x [m]."""
+        return self.xy[:, 0]
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Positions along y [m]."""
+        return self.xy[:, 1]
+
+    @cached_property
+    def away(self) -> NDArray[np.bool_]:
+        """Whether it is out of the home."""
+        return self._poses.away.astype(bool)
+
+    @cached_property
+    def room(self) -> NDArray[np.int16]:
+        """Index of the room, NOWHERE while it is away."""
+        room = self._home.plan.room_of_cell[self._poses.y // SUB, self._poses.x // SUB]
+        return np.where(self.away, np.int16(NOWHERE), room)
+
+    @cached_property
+    def time_in_rooms(self) -> NDArray[np.int64]:
+        """Number of steps in each room, and last away: int64 (rooms + 1,)."""
+        counts = np.zeros(len(self._home.rooms) + 1, np.int64)
+        count_rooms(self._poses, self._home.plan.room_of_cell, counts)
+        return counts
+
+    @cached_property
+    def distance(self) -> float:
+        """Length of the way from the first to the last step [m]."""
+        return float(sum_moves(self._poses)) / self._home.plan.lattice.units_per_m
 
 
 @dataclass(frozen=True)
@@ -60,9 +113,11 @@ class Log:
         self.index = {actor.name: i for i, actor in enumerate(actors)}
         self.pieces: list[list[Piece]] = [[] for _ in actors]
         self.observations: list[Observations] = []
+        self._traced: dict[tuple[str, int, int], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
         """Drop what is only needed for steps earlier than `before`."""
+        self._traced.clear()
         for pieces in self.pieces:
             keep = max((i for i, piece in enumerate(pieces) if piece.first <= before), default=0)
             del pieces[:keep]
@@ -70,28 +125,35 @@ class Log:
 
     def poses(self, name: str, first: int, end: int) -> BodyPoses:
         """Return the poses of a body in the steps from `first` to `end` - 1."""
+        key = (name, first, end)
+        if key not in self._traced:  # whoever is updated at the same time asks for the same
+            self._traced[key] = BodyPoses(self.home, self._trace(name, first, end))
+        return self._traced[key]
+
+    def _trace(self, name: str, first: int, end: int) -> Poses:
         count = end - first
-        out = Poses(*(np.empty(count, np.int64) for _ in range(3)), np.empty(count, np.uint8))
+        out = empty_poses(count)
         pieces = self.pieces[self.index[name]]
         for i, piece in enumerate(pieces):
             stop = pieces[i + 1].first if i + 1 < len(pieces) else end
             begin, stop = max(first, piece.first), min(end, stop)
             if begin < stop:
                 skipped = begin - piece.first
-                part = Poses(*(np.empty(stop - piece.first, a.dtype) for a in out))
+                part = empty_poses(stop - piece.first)
                 piece.motion.trace(piece.first, piece.start, part)
-                for whole, values in zip(out, part, strict=True):
-                    whole[begin - first : stop - first] = values[skipped:]
-        return _in_metres(self.home, out)
+                paste_poses(out, begin - first, part, slice(skipped, None))
+        return out
 
     def seen(self, first: int, end: int) -> Observations:
         """Return the observations of the steps from `first` to `end` - 1."""
-        blocks = [b for b in self.observations if len(b.step) and b.step[-1] >= first and b.step[0] < end]
+        blocks = [
+            b for b in self.observations if len(b.step) and b.step[-1] >= first and b.step[0] < end
+        ]
         if not blocks:
             blocks = [no_observations()]
-        joined = Observations(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))
+        joined = join_observations(blocks)
         keep = slice(*np.searchsorted(joined.step, (first, end)).tolist())
-        return Observations(*(column[keep] for column in joined))
+        return Observations._make(column[keep] for column in joined)
 
 
 @dataclass(frozen=True)
@@ -128,9 +190,18 @@ class History:
         """
         if name not in self.visible:
             known = ", ".join(sorted(self.visible))
-            why = "only metrics know where users are" if name in self.log.index else "there is no such body"
+            why = (
+                "only metrics know where users are"
+                if name in self.log.index
+                else "there is no such body"
+            )
             raise ComponentError(f"poses of {name!r} were asked for, but {why}; available: {known}")
         return self.log.poses(name, self.first, self.end)
+
+
+def join_observations(blocks: Sequence[Observations]) -> Observations:
+    """Return observations one behind the other."""
+    return Observations._make(np.concatenate(columns) for columns in zip(*blocks, strict=True))
 
 
 def no_observations() -> Observations:
@@ -139,10 +210,3 @@ def no_observations() -> Observations:
         np.empty(0, np.int64), np.empty(0, np.int32), np.empty(0, np.int32),
         np.empty(0, np.float64), np.empty(0, np.float64), np.empty(0, np.int16),
     )  # fmt: skip
-
-
-def _in_metres(home: "Home", poses: Poses) -> BodyPoses:
-    room = home.plan.room_of_cell[poses.y // SUB, poses.x // SUB]
-    xy = home.plan.lattice.to_metres(np.stack([poses.x, poses.y], axis=-1))
-    away = poses.away.astype(bool)
-    return BodyPoses(xy[:, 0], xy[:, 1], poses.heading, away, np.where(away, NOWHERE, room))

@@ -26,9 +26,13 @@ class RoomDistribution:
     def __init__(self, weights: ArrayLike) -> None:
         values = np.array(weights, dtype=np.float64)
         if values.ndim != 1 or not len(values):
-            raise ComponentError(f"a room distribution has one weight per room; found shape {values.shape}")
+            raise ComponentError(
+                f"a room distribution has one weight per room; found shape {values.shape}"
+            )
         if not (np.isfinite(values).all() and (values >= 0).all()):
-            raise ComponentError(f"a room distribution needs finite weights of at least 0; found {values}")
+            raise ComponentError(
+                f"a room distribution needs finite weights of at least 0; found {values}"
+            )
         total = values.sum()
         self.share: NDArray[np.float64] = (
             values / total if total > 0 else np.full(len(values), 1 / len(values))
@@ -43,8 +47,8 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
     """Return an output as columns of equal length: a distribution, one row, or arrays.
 
     Args:
-        output: A RoomDistribution (columns room, share), a mapping of names to numbers or strings (one
-            row), or a mapping of names to arrays of one length.
+        output: A RoomDistribution (columns room, share), a mapping of names to numbers or strings
+            (one row), or a mapping of names to arrays of one length.
         rooms: The names of the rooms.
         where: The component's path, for errors.
 
@@ -63,18 +67,24 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
         return {"room": np.array(rooms, dtype=object), "share": output.share}
     if not isinstance(output, Mapping) or not output:
         raise ComponentError(
-            f"{where} put out {output!r}; a RoomDistribution, or a mapping of names to numbers or to"
-            " arrays of one length, is wanted"
+            f"{where} put out {output!r}; a RoomDistribution, or a mapping of names to numbers"
+            " or to arrays of one length, is wanted"
         )
-    columns = {str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()}
+    columns = {
+        str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()
+    }
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         raise ComponentError(f"{where} put out arrays of different lengths: {lengths}")
     for name, values in columns.items():
         if values.dtype.kind not in "biufO":
-            raise ComponentError(f"{where} put out {name!r} of dtype {values.dtype}; numbers or strings are wanted")
+            raise ComponentError(
+                f"{where} put out {name!r} of dtype {values.dtype}; numbers or strings are wanted"
+            )
         if values.dtype.kind == "f" and not np.isfinite(values).all():
-            raise ComponentError(f"{where} put out {name!r} with a value that is not finite: {values}")
+            raise ComponentError(
+                f"{where} put out {name!r} with a value that is not finite: {values}"
+            )
     return columns
 
 

@@ -80,7 +80,7 @@ class Manifest:
             file.write(self.to_json())
             file.flush()
             os.fsync(file.fileno())
-        os.replace(partial, directory / FILE_NAME)
+        partial.replace(directory / FILE_NAME)
 
     @classmethod
     def read(cls, directory: Path) -> Manifest:
@@ -134,7 +134,7 @@ def file_record(path: Path | str) -> dict[str, str]:
     Raises:
         OSError: The file can't be read.
     """
-    with open(path, "rb") as file:
+    with Path(path).open("rb") as file:
         return {"path": str(path), "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
 
 

@@ -139,7 +139,8 @@ class Run:
             every: Time between two poses, a multiple of the step.
 
         Raises:
-            ArtifactError: The run stored no key frames, there is no such body, or `every` doesn't fit.
+            ArtifactError: The run stored no key frames, there is no such body, or `every` doesn't
+                fit.
         """
         from fleet2d.engine.rebuild import rebuild_path
 
@@ -166,7 +167,7 @@ class Run:
             ArtifactError: pandas is not installed, or see `arrow`.
         """
         try:
-            import pandas  # noqa: F401 - only to see whether it is there
+            import pandas as pd  # noqa: F401 - only to see whether it is there
         except ImportError as error:
             raise _not_installed("pandas") from error
         return self.arrow(name).to_pandas()

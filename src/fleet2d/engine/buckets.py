@@ -55,7 +55,8 @@ class Eye:
     """A robot's camera in a run: what it carries from span to span, and its latest findings."""
 
     def __init__(self, robot: Actor, row: int, users: Sequence[Actor], capacity: int) -> None:
-        assert isinstance(robot.entity, Robot) and robot.entity.camera is not None
+        assert isinstance(robot.entity, Robot)
+        assert robot.entity.camera is not None
         self.robot = robot
         self.row = row
         self.users = users
@@ -64,13 +65,20 @@ class Eye:
         # A stream per user, named: a user more leaves the draws for the others as they were.
         keys = [stream_key(robot.seed, robot.path, f"detect {user.name}") for user in users]
         count = len(users)
-        self.memory = Memory(np.array(keys, np.uint64), np.zeros(count, np.int64), np.zeros(count, np.uint8))
+        self.memory = Memory(
+            np.array(keys, np.uint64), np.zeros(count, np.int64), np.zeros(count, np.uint8)
+        )
         self.perceived = np.zeros((count, 2), np.int64)
         rows = capacity * max(1, count)
         self.sightings = Sightings(
-            np.empty(rows, np.int64), np.empty(rows, np.int32), np.empty(rows, np.int64), np.empty(rows, np.int64)
+            np.empty(rows, np.int64),
+            np.empty(rows, np.int32),
+            np.empty(rows, np.int64),
+            np.empty(rows, np.int64),
         )
-        self.events = SightEvents(np.empty(rows, np.int64), np.empty(rows, np.int32), np.empty(rows, np.int32))
+        self.events = SightEvents(
+            np.empty(rows, np.int64), np.empty(rows, np.int32), np.empty(rows, np.int32)
+        )
         self.found = self.happened = 0
 
     @property

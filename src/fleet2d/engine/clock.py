@@ -40,7 +40,9 @@ class Clock:
 
     def moments(self, elapsed_us: NDArray[np.int64]) -> NDArray[np.datetime64]:
         """Return the local times of moments given in microseconds since the start."""
-        times: NDArray[np.datetime64] = np.datetime64(self.start, "us") + elapsed_us.astype("m8[us]")
+        times: NDArray[np.datetime64] = np.datetime64(self.start, "us") + elapsed_us.astype(
+            "m8[us]"
+        )
         return times
 
     def elapsed(self, moment: datetime) -> int:

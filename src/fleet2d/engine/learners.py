@@ -119,7 +119,8 @@ class Learners:
         visible = frozenset((*self.users, *self.robots) if knows_truth else self.robots)
         history = History(log, learner.since, end, self.clock.step_us / 1e6, visible)
         state = Present(
-            learner.path, end - 1, self.clock.time(end - 1), self.home, self.users, self.robots, outputs, self.seed
+            learner.path, end - 1, self.clock.time(end - 1), self.home, self.users, self.robots,
+            outputs, self.seed
         )  # fmt: skip
         with _blame(learner.path, end - 1):
             output = learner.component.update(history, state)
@@ -136,7 +137,9 @@ class Learners:
         steps = np.full(len(next(iter(columns.values()))), step, np.int64)
         if table not in self.store.names:
             kinds = [Column(n, KINDS[values.dtype.kind]) for n, values in columns.items()]
-            self.store.add_table(TableSpec(table, (Column("step", "step"), Column("time", "time"), *kinds)))
+            self.store.add_table(
+                TableSpec(table, (Column("step", "step"), Column("time", "time"), *kinds))
+            )
         self.store.append(table, step=steps, time=self.clock.times(steps), **columns)
 
 
@@ -153,8 +156,8 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
         for read in algorithm.reads:
             if read not in algorithms:
                 raise ScenarioError(
-                    f"algorithms.{name}.reads names {read!r}, which is no algorithm of the scenario;"
-                    f" there are: {', '.join(algorithms)}{did_you_mean(read, algorithms)}"
+                    f"algorithms.{name}.reads names {read!r}, which is no algorithm of the"
+                    f" scenario; there are: {', '.join(algorithms)}{did_you_mean(read, algorithms)}"
                 )
     sorter = TopologicalSorter({name: algorithm.reads for name, algorithm in algorithms.items()})
     try:

@@ -17,7 +17,14 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import SUB
-from fleet2d.kernels.motion import Breakpoints, Poses, trace_meander, trace_track
+from fleet2d.kernels.motion import (
+    Breakpoints,
+    Poses,
+    empty_poses,
+    paste_poses,
+    trace_meander,
+    trace_track,
+)
 from fleet2d.scenario.model import load_scenario
 from fleet2d.units import micros
 
@@ -60,22 +67,25 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
         every: Time between two poses, a multiple of the step.
 
     Raises:
-        ArtifactError: The run stored no key frames, there is no such body, or `every` is no multiple.
+        ArtifactError: The run stored no key frames, there is no such body, or `every` is no
+            multiple.
     """
     manifest = run.manifest
     clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
     stride, rest = divmod(micros(every), clock.step_us)
     if rest or stride < 1:
-        raise ArtifactError(f"every is {every}: it must be a multiple of the step, {clock.step_us / 1e6:g} s")
+        raise ArtifactError(
+            f"every is {every}: it must be a multiple of the step, {clock.step_us / 1e6:g} s"
+        )
     if "key_frames" not in run.tables:
         raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
     keys = _keys_of(run, plan, entity, clock)
     steps = np.arange(0, clock.steps, stride, dtype=np.int64)
-    out = Poses(*(np.zeros(len(steps), np.int64) for _ in range(3)), np.zeros(len(steps), np.uint8))
+    out = empty_poses(len(steps))
     _trace(run, plan, entity, clock, keys, stride, out)
     xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
     room = np.where(out.away, -1, plan.room_of_cell[out.y // SUB, out.x // SUB])
-    radians = out.heading * (2 * np.pi / TURN)
+    radians = (out.heading * (2 * np.pi / TURN)).astype(np.float64)
     return Path(steps, clock.times(steps), xy[:, 0], xy[:, 1], radians, out.away.astype(bool), room)
 
 
@@ -92,7 +102,9 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
     return {
         "step": column["step"],
-        "time": (column["time"].astype("M8[us]") - np.datetime64(clock.start, "us")).astype(np.int64),
+        "time": (column["time"].astype("M8[us]") - np.datetime64(clock.start, "us")).astype(
+            np.int64
+        ),
         "kind": np.array([KEY_KINDS.index(k) for k in kind], np.int64),
         "x": np.ascontiguousarray(xy[:, 0]),
         "y": np.ascontiguousarray(xy[:, 1]),
@@ -102,10 +114,16 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str
 
 
 def _trace(
-    run: "Run", plan: FloorPlan, entity: str, clock: Clock, keys: dict[str, Any], stride: int, out: Poses
+    run: "Run",
+    plan: FloorPlan,
+    entity: str,
+    clock: Clock,
+    keys: dict[str, Any],
+    stride: int,
+    out: Poses,
 ) -> None:
     """Follow the key frames, stretch by stretch, each until the next key frame that was reached."""
-    kind, time, step = keys["kind"], keys["time"], keys["step"]
+    kind, step = keys["kind"], keys["step"]
     walker = None
     begin = 0
     while begin < len(kind):
@@ -131,21 +149,27 @@ def _follow_track(
     first = -(-int(keys["step"][begin]) // stride)
     last = -(-stop // stride)
     if last > first:
-        row = Poses(*(array[first:last] for array in out))
+        row = Poses(
+            out.x[first:last], out.y[first:last], out.heading[first:last], out.away[first:last]
+        )
         trace_track(part, first * stride * clock.step_us, stride * clock.step_us, last - first, row)
 
 
 def _follow_walk(
-    walker: tuple[Home, Actor, Meander], keys: dict[str, Any], begin: int, stop: int, stride: int, out: Poses
+    walker: tuple[Home, Actor, Meander],
+    keys: dict[str, Any],
+    begin: int,
+    stop: int,
+    stride: int,
+    out: Poses,
 ) -> None:
     home, actor, behavior = walker
     step = int(keys["step"][begin])
     state = State(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
-    row = Poses(*(np.empty(stop - step, array.dtype) for array in out))
+    row = empty_poses(stop - step)
     trace_meander(home.plan.mesh, actor.space.mesh, behavior.rule, step, np.array(state[:3]), row)
-    first, last = -(-step // stride), -(-stop // stride)
-    for whole, values in zip(out, row, strict=True):
-        whole[first:last] = values[first * stride - step :: stride]
+    first = -(-step // stride)
+    paste_poses(out, first, row, slice(first * stride - step, None, stride))
 
 
 def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
@@ -157,5 +181,7 @@ def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Hom
     actor = Actor(entity, f"{bucket}.{entity}", configured, home, clock, run.manifest["seed"])
     walks = [behavior for behavior in actor.behaviors if isinstance(behavior, Meander)]
     if not walks:
-        raise ArtifactError(f"{entity} walked at random by a behavior that is not 'meander': it can't be rebuilt")
+        raise ArtifactError(
+            f"{entity} walked at random by a behavior that is not 'meander': it can't be rebuilt"
+        )
     return home, actor, walks[0]

@@ -1,7 +1,7 @@
 """What a run writes down: samples, key frames, observations and events, in an order of their own.
 
-Rows are gathered over spans and handed to the store sorted by (step, entity), so that a table is the
-same however the run was cut into spans.
+Rows are gathered over spans and handed to the store sorted by (step, entity), so that a table is
+the same however the run was cut into spans.
 """
 
 import time
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.history import Observations
+from fleet2d.algorithms.history import Observations, join_observations
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
@@ -26,8 +26,8 @@ from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.units import micros
 
-# How a row of key_frames is to be read: a breakpoint that was reached, the end of a segment that was
-# broken off before it, or a state from which a random walk is drawn on.
+# How a row of key_frames is to be read: a breakpoint that was reached, the end of a segment that
+# was broken off before it, or a state from which a random walk is drawn on.
 TRACK, PLANNED, WALK = 0, 1, 2
 KEY_KINDS = ("track", "planned", "walk")
 # A random walk is rebuilt from the last hour's key frame.
@@ -60,11 +60,10 @@ def table_specs(
         user = Column("user", "category", categories=tuple(users))
         specs.append(TableSpec("observations", (STEP, TIME, robot, user, X, Y, room)))
     if settings.events:
-        user = Column("user", "category", nullable=True, categories=tuple(users)) if users else None
-        event = Column("event", "category")
-        detail = Column("detail", "string")
-        columns = (STEP, TIME, entity, event, user, detail)
-        specs.append(TableSpec("events", tuple(column for column in columns if column)))
+        event, detail = Column("event", "category"), Column("detail", "string")
+        user = Column("user", "category", nullable=True, categories=tuple(users))
+        whom = (user,) if users else ()
+        specs.append(TableSpec("events", (STEP, TIME, entity, event, *whom, detail)))
     return specs
 
 
@@ -92,7 +91,8 @@ class Recorder:
         self._keeps_events = "events" in names
         self._every = _steps_between_samples(settings, clock)
         self._walk_every = max(1, WALK_KEY_US // clock.step_us)
-        # Breakpoints of the present plan already gathered; the plan before the first has none to tell.
+        # Breakpoints of the present plan already gathered; the plan before the first has none to
+        # tell.
         self._emitted = [1] * len(actors)
         self._told_until = [-1] * len(actors)
         self._notes_told = [0] * len(actors)
@@ -110,7 +110,9 @@ class Recorder:
         motion = self.actors[row].motion
         track = motion.breakpoints if isinstance(motion, Track) else None
         self._told_until[row] = (
-            int(track.time[-1]) if track is not None and self._emitted[row] == len(track.time) else -1
+            int(track.time[-1])
+            if track is not None and self._emitted[row] == len(track.time)
+            else -1
         )
 
     def after_plan(self, row: int, step: int) -> None:
@@ -123,7 +125,9 @@ class Recorder:
             self._keys.append(_key(step, row, WALK, step * self.clock.step_us, actor.state))
         self._tell_plan(row, step)
 
-    def span(self, block: PoseBlock, first: int, count: int, eyes: Sequence[Eye]) -> Observations | None:
+    def span(
+        self, block: PoseBlock, first: int, count: int, eyes: Sequence[Eye]
+    ) -> Observations | None:
         """Gather a span; return its observations."""
         for row in range(len(self.actors)):
             self._tell_plan(row, first + count - 1)
@@ -160,7 +164,10 @@ class Recorder:
         moment = step * self.clock.step_us
         if self._keeps_events:
             notes = actor.plan.notes
-            while self._notes_told[row] < len(notes) and notes[self._notes_told[row]].time_us <= moment:
+            while (
+                self._notes_told[row] < len(notes)
+                and notes[self._notes_told[row]].time_us <= moment
+            ):
                 note = notes[self._notes_told[row]]
                 at = self.clock.step_at_or_after(note.time_us)
                 self._events.append((at, row, 0, note.event, -1, note.detail))
@@ -180,7 +187,9 @@ class Recorder:
         if self._keeps_keys and isinstance(motion, Track):
             begin = self._emitted[row]
             if begin < len(motion.breakpoints.time):
-                planned = _keys(motion.breakpoints, begin, begin + 1, row, PLANNED, self.clock.step_us)
+                planned = _keys(
+                    motion.breakpoints, begin, begin + 1, row, PLANNED, self.clock.step_us
+                )
                 planned[:, 0] = step
                 self._keys.append(planned)
 
@@ -285,7 +294,7 @@ class Recorder:
     def _store_observations(self) -> None:
         if not self._observations:
             return
-        o = Observations(*(np.concatenate(c) for c in zip(*self._observations, strict=True)))
+        o = join_observations(self._observations)
         self._observations = []
         self.store.append(
             "observations",
@@ -335,8 +344,8 @@ def _steps_between_samples(settings: ArtifactSettings, clock: Clock) -> int:
     every, rest = divmod(micros(settings.trajectories), clock.step_us)
     if rest or not every:
         raise ScenarioError(
-            f"artifacts.trajectories is {settings.trajectories}, which is no multiple of simulation.step"
-            f" ({clock.step_us / 1e6:g} s): choose a multiple, 'every step' or 'off'"
+            f"artifacts.trajectories is {settings.trajectories}, which is no multiple of"
+            f" simulation.step ({clock.step_us / 1e6:g} s): choose one, 'every step' or 'off'"
         )
     return every
 
@@ -358,10 +367,11 @@ def _keys(
 
 
 def _in_order(blocks: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    """Join blocks of rows (step, entity, …) and sort them, rows of one entity in the order gathered."""
+    """Join blocks of rows (step, entity, …) and sort them; ties stay in the order gathered."""
     rows = np.concatenate(blocks)
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
 
 
 def _radians(heading: NDArray[np.int64]) -> NDArray[np.float64]:
-    return heading * (2 * np.pi / TURN)
+    radians: NDArray[np.float64] = heading * np.float64(2 * np.pi / TURN)
+    return radians

@@ -22,7 +22,8 @@ def run(
     """Run a scenario to its end.
 
     Args:
-        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base scenario.
+        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
+            scenario.
         overrides: Texts like 'simulation.duration.days=60'.
         out: Directory to store the run in; None keeps it in memory.
         settings: Keys of `simulation` or of the scenario, such as seed=4.
@@ -77,7 +78,9 @@ def reproduce(directory: str | Path) -> Reproduction:
         again = Simulation(scenario, out=Path(folder) / "run").run()
         before, after = stored.manifest["tables"], again.manifest["tables"]
     names = sorted(before.keys() | after.keys())
-    differing = [n for n in names if before.get(n, {}).get("digest") != after.get(n, {}).get("digest")]
+    differing = [
+        n for n in names if before.get(n, {}).get("digest") != after.get(n, {}).get("digest")
+    ]
     return Reproduction(stored.digest, again.digest, differing, causes)
 
 
@@ -86,7 +89,9 @@ def _differences(stored: Run) -> list[str]:
     for record in stored.manifest["inputs"]:
         path = Path(record["path"])
         if not path.exists():
-            raise RunDirectoryError(f"the run read {path}, which is gone: put it back to reproduce the run")
+            raise RunDirectoryError(
+                f"the run read {path}, which is gone: put it back to reproduce the run"
+            )
         if file_record(path)["sha256"] != record["sha256"]:
             causes.append(f"{path} has changed since")
     return causes

@@ -1,8 +1,9 @@
 """The simulation: steps taken a span at a time, in the order that the design fixes.
 
-In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps at which somebody
-must decide, nothing but arithmetic happens, so the engine takes the whole *span* between them at once.
-What a span is never shows in a result: every draw is addressed by step, and every plan by time.
+In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps at which
+somebody must decide, nothing but arithmetic happens, so the engine takes the whole *span* between
+them at once. What a span is never shows in a result: every draw is addressed by step, and every
+plan by time.
 """
 
 import json
@@ -11,7 +12,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
@@ -46,7 +47,7 @@ class Simulation:
     Example:
         >>> import copy
         >>> from datetime import timedelta
-        >>> simulation = Simulation("base", "simulation.duration=1 d", seed=4)
+        >>> simulation = Simulation("bundled:base", "simulation.duration=1 d", seed=4)
         >>> simulation.run_until(timedelta(hours=12))
         >>> futures = [copy.deepcopy(simulation).run() for _ in range(2)]
         >>> futures[0].digest == futures[1].digest
@@ -63,8 +64,8 @@ class Simulation:
         """Set everything up; with `out`, store in that directory, else in memory.
 
         Raises:
-            InputError: The scenario, its floor plan, a place in it or the directory is wrong. Nothing is
-                written then.
+            InputError: The scenario, its floor plan, a place in it or the directory is wrong.
+                Nothing is written then.
         """
         began = time.perf_counter()
         self.scenario = load_scenario(scenario, *overrides, **settings)
@@ -120,6 +121,11 @@ class Simulation:
         return {actor.name: self._state_of(actor) for actor in self._all}
 
     @property
+    def actors(self) -> dict[str, Actor]:
+        """Everybody in the run, by name: configuration, behaviors and plan."""
+        return {actor.name: actor for actor in self._all}
+
+    @property
     def directory(self) -> Path | None:
         """Where the run is stored; None in memory."""
         return self._store.directory
@@ -136,12 +142,23 @@ class Simulation:
         self._run_to(min(self.clock.steps, self.step + steps))
 
     def run_until(self, when: int | datetime | timedelta) -> None:
-        """Simulate up to a step, a local time, or a time since the start; that step is the next then."""
+        """Simulate up to a step, a local time or a time since the start; that step is next then."""
         if isinstance(when, datetime):
             when = when - self.clock.start
         if isinstance(when, timedelta):
             when = self.clock.step_at_or_after(when // timedelta(microseconds=1))
         self._run_to(min(self.clock.steps, when))
+
+    def replan(self, name: str) -> None:
+        """Let a body's behaviors decide anew at the next step, whatever it is doing.
+
+        For scripts that changed something that its behaviors go by. The run can't be reproduced
+        from its manifest then, which says so.
+        """
+        self.actors[name].ask_at = self.step
+        notes, text = self._store.manifest.notes, "steered by a script: reproduce it by that script"
+        if text not in notes:
+            notes.append(text)
 
     def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
         """Simulate to the end, store, and return the run.
@@ -321,11 +338,9 @@ class Simulation:
         self._stopping = True
 
     def _fail(self) -> None:
-        """Leave what was stored before the failure readable; the first error is the one to report."""
-        try:
+        """Leave what was stored before the failure readable; the first error is reported."""
+        with suppress(Exception):
             self.finish("failed")
-        except Exception:  # noqa: BLE001, S110
-            pass
 
     def _state_of(self, actor: Actor) -> dict[str, Any]:
         state = actor.state
@@ -348,7 +363,7 @@ def _deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
         return
     before = signal.getsignal(signal.SIGINT)
 
-    def on_interrupt(number: int, frame: Any) -> None:
+    def on_interrupt(*_: Any) -> None:
         stop()
         signal.signal(signal.SIGINT, before)
 

@@ -1,7 +1,8 @@
 """Random streams: one for each component and purpose, addressed by step.
 
-A draw is a function of (seed, component's path in the scenario, purpose, step, number of the draw). It depends
-neither on the order in which components run, nor on which others there are, nor on how often they drew.
+A draw is a function of (seed, component's path in the scenario, purpose, step, number of the draw).
+It depends neither on the order in which components run, nor on which others there are, nor on how
+often they drew.
 """
 
 import hashlib

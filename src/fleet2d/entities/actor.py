@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import timedelta
 
 import numpy as np
 
@@ -89,7 +89,8 @@ class Actor:
     ) -> tuple[int, int]:
         """Return the lattice point of a place: the point itself, or a spot drawn in the room.
 
-        Of several rooms of a kind, a body has its own for the whole run; of ``any`` room, it draws one.
+        Of several rooms of a kind, a body has its own for the whole run; of ``any`` room, it draws
+        one.
 
         Raises:
             PlacementError: There is no such room, or it can't be reached.
@@ -106,7 +107,7 @@ class Actor:
         return self.home.plan.lattice.cell_centre(row, column)
 
     def middle(self, room: Room) -> tuple[int, int]:
-        """Return the free lattice point nearest to the deepest inside of a room that it can reach."""
+        """Return the point of a room that it can reach, nearest to the room's deepest inside."""
         x, y = self.home.plan.lattice.to_lattice(room.anchor_xy).tolist()
         found = self.space.nearest(x, y, self.part, room.index)
         if found is None:
@@ -131,7 +132,9 @@ class Actor:
             if part >= 0
             else f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
         )
-        raise PlacementError(f"{self.path}: the point {list(xy)} {why}; the nearest free point is {there}")
+        raise PlacementError(
+            f"{self.path}: the point {list(xy)} {why}; the nearest free point is {there}"
+        )
 
     def decide(self, step: int, events: tuple[object, ...], outputs: dict[str, object]) -> None:
         """Ask the behaviors, in order, for a plan that begins at `step`."""
@@ -145,7 +148,9 @@ class Actor:
             plan = now.plan()
             plan = plan.stay(PAUSE) if self.behaviors else plan.stay()
         if not isinstance(plan, Plan):
-            raise ComponentError(f"{self.path}: decide() returned {plan!r}; a plan or None is wanted")
+            raise ComponentError(
+                f"{self.path}: decide() returned {plan!r}; a plan or None is wanted"
+            )
         self.plan, self.motion, self.planned_at = plan, plan.finish(), step
         # A plan that takes no time would be asked for again and again at the same step.
         over = max(self.clock.step_at_or_after(plan.time_us), step + 1)

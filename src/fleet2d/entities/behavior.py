@@ -62,8 +62,18 @@ class Situation:
         """The room that the body is in; None when it is away."""
         return None if self.actor.state.away else self.home.plan.room_at(*self.xy)
 
+    def nearest_free(self, x: float, y: float) -> tuple[float, float]:
+        """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
+        actor, lattice = self.actor, self.home.plan.lattice
+        at_x, at_y = lattice.to_lattice((x, y)).tolist()
+        found = (at_x, at_y)
+        if actor.space.part_at(at_x, at_y) != actor.part:
+            found = actor.space.nearest(at_x, at_y, actor.part) or (actor.state.x, actor.state.y)
+        near_x, near_y = lattice.to_metres(found).tolist()
+        return near_x, near_y
+
     def random(self, purpose: str) -> Draws:
-        """Return the random draws of this body, for a purpose of the behavior's own, at this step."""
+        """Return random draws of this body, for a purpose of the behavior's own, at this step."""
         return Draws(self.actor.stream(purpose), self.step)
 
     def plan(self) -> Plan:

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 class Meander(Behavior):
     """Walk at random, for good: two-dimensional Brownian motion with a steady pace.
 
-    In each step the body turns by a normally distributed angle, no faster than its turn rate, and goes
-    forward at its speed; where a wall is in the way it only turns (the walk of the published Fleet2D).
+    In each step the body turns by a normally distributed angle, no faster than its turn rate, and
+    goes forward at its speed; where a wall is in the way it only turns (the walk of the published
+    Fleet2D).
     """
 
     turn_std_deg: AngleDeg = Field(

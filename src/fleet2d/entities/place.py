@@ -35,7 +35,8 @@ def parse_place(value: object) -> RoomChoice | Point:
                 return x, y
     raise problem(
         f"found {value!r}; a place is wanted: a room or kind of room like 'kitchen',"
-        " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in metres"
+        " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in"
+        " metres"
     )
 
 
@@ -49,8 +50,8 @@ Place = Annotated[
     PlainSerializer(_dump),
     WithJsonSchema(
         {
-            "description": "a room, a kind of room, a list of those to try in turn, or [x, y] in metres;"
-            " 'any' is any room",
+            "description": "a room, a kind of room, a list of those to try in turn,"
+            " or [x, y] in metres; 'any' is any room",
             "x-quantity": "place",
             "anyOf": [
                 {"type": "string"},
@@ -68,7 +69,9 @@ def is_point(place: RoomChoice | Point) -> bool:
     return not isinstance(place[0], str)
 
 
-def matching_rooms(names: RoomChoice, rooms: Sequence[Room], reachable: Sequence[Room]) -> list[Room]:
+def matching_rooms(
+    names: RoomChoice, rooms: Sequence[Room], reachable: Sequence[Room]
+) -> list[Room]:
     """Return the reachable rooms of the first name that has any.
 
     Raises:
@@ -84,12 +87,13 @@ def matching_rooms(names: RoomChoice, rooms: Sequence[Room], reachable: Sequence
     wanted = " or ".join(repr(name) for name in names)
     listed = ", ".join(room.name for room in reachable)
     if known:
-        raise PlacementError(f"{wanted} can't be reached from where it starts; it can reach: {listed}")
+        raise PlacementError(
+            f"{wanted} can't be reached from where it starts; it can reach: {listed}"
+        )
     choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
     close = difflib.get_close_matches(names[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     raise PlacementError(
-        f"there is no room {wanted}{hint} The rooms are: {listed}. A list that ends in 'any' works in every home"
-        if hint
-        else f"there is no room {wanted}. The rooms are: {listed}. A list that ends in 'any' works in every home"
+        f"there is no room {wanted}{hint or '.'} The rooms are: {listed}."
+        " A list that ends in 'any' works in every home"
     )

@@ -109,7 +109,9 @@ class Plan:
         clock = self._actor.clock
         return clock.start + timedelta(microseconds=self.time_us)
 
-    def go_to(self, place: "RoomChoice | Point | str | Iterable[object]", purpose: str = "spot") -> Self:
+    def go_to(
+        self, place: "RoomChoice | Point | str | Iterable[object]", purpose: str = "spot"
+    ) -> Self:
         """Walk to a place by the shortest path, turning on the spot towards every leg.
 
         In a room, the place is a spot drawn from its free cells; `purpose` names the random stream.
@@ -137,7 +139,7 @@ class Plan:
         return self
 
     def turn_by(self, turns: float) -> Self:
-        """Turn on the spot by a number of turns, counter-clockwise if positive, at the body's rate."""
+        """Turn on the spot by a number of turns, counter-clockwise if positive."""
         whole = round(turns * TURN)
         sign = 1 if whole > 0 else -1
         left = abs(whole)
@@ -200,7 +202,9 @@ class Plan:
         unknown = set(events) - INTERRUPTS
         if unknown:
             allowed = ", ".join(sorted(INTERRUPTS))
-            raise ComponentError(f"{self._actor.path}: no event {sorted(unknown)[0]!r}; there are: {allowed}")
+            raise ComponentError(
+                f"{self._actor.path}: no event {sorted(unknown)[0]!r}; there are: {allowed}"
+            )
         self.interrupts |= frozenset(events)
         return self
 
@@ -214,4 +218,6 @@ class Plan:
         return self._motion
 
     def _mark(self) -> None:
-        self._rows.append(np.array([[self.time_us, self.x, self.y, self.heading, self.away]], np.int64))
+        self._rows.append(
+            np.array([[self.time_us, self.x, self.y, self.heading, self.away]], np.int64)
+        )

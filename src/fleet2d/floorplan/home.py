@@ -45,11 +45,13 @@ class Home:
         """
         found = space.nearest(*self._door(space, part), part)
         if found is None:
-            raise PlacementError(f"a body of radius {space.radius:g} m fits nowhere in {self.plan.name}")
+            raise PlacementError(
+                f"a body of radius {space.radius:g} m fits nowhere in {self.plan.name}"
+            )
         return found
 
     def _door(self, space: Space, part: int) -> tuple[int, int]:
-        """Return the plan's entrance, or the middle of the room that one most likely leaves from."""
+        """Return the plan's entrance, or the middle of the room that one likely leaves from."""
         at = self.plan.entrance
         if at is None:
             rooms = [room for kind in WAYS_OUT for room in self.rooms if room.type == kind]

@@ -79,8 +79,8 @@ def build_mesh(polygons: Sequence[Polygon], columns: int, rows: int) -> Mesh:
         mesh = _meshed(_split_at_touching_vertices(rings), columns, rows)
     if mesh is None:
         raise FloorPlanError(
-            "The walls don't bound a free space that can be cut into triangles: two outlines "
-            "cross, overlap or share a piece of wall. Merge outlines that share a wall."
+            "The free space can't be cut into triangles that end at its walls. Send the outlines "
+            "to snap_polygon first."
         )
     return mesh
 
@@ -90,6 +90,12 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
     if not polygons or any(polygon.area <= 0 for polygon in polygons):
         raise FloorPlanError(
             "The floor plan has no free space: there is no polygon, or one without an area."
+        )
+    whole = MultiPolygon(list(polygons))
+    if not whole.is_valid:
+        raise FloorPlanError(
+            "The outlines cross, overlap or share a piece of wall: "
+            f"{shapely.is_valid_reason(whole)} (lattice units). Merge outlines that overlap."
         )
     found = []
     for polygon in polygons:

@@ -27,14 +27,14 @@ I64 = NDArray[np.int64]
 class Space:
     """The places where the centre of a body of one radius may be (its configuration space).
 
-    The walls are grown by a regular octagon round the body: a body keeps its radius from every wall, on
-    all sides alike, and at most 8 % more from slanted ones.
+    The walls are grown by a regular octagon round the body: a body keeps its radius from every
+    wall, on all sides alike, and at most 8 % more from slanted ones.
 
     Attributes:
         radius: The body's radius [m].
         mesh: Triangles of the space [lattice]; empty when the body fits nowhere.
-        part_of_cell: int32 (rows, columns), the connected part that holds each cell's centre, -1 where
-            the body can't be.
+        part_of_cell: int32 (rows, columns), the connected part that holds each cell's centre, -1
+            where the body can't be.
         parts: Number of connected parts; part 0 holds the most cells.
     """
 
@@ -49,8 +49,8 @@ class Space:
         polygons = _shrunk(plan.polygons, radius * lattice.units_per_m)
         if not polygons:
             raise FloorPlanError(
-                f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller radius"
-                " or check the scale of the plan"
+                f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
+                " radius or check the scale of the plan"
             )
         self._polygons = polygons
         self.mesh: Mesh = build_mesh(polygons, lattice.columns, lattice.rows)
@@ -91,7 +91,7 @@ class Space:
     def _find_nearest(
         self, x: int, y: int, part: int | None = None, room: int | None = None
     ) -> tuple[int, int] | None:
-        """Return the centre of the free cell nearest to a lattice point; ties: lowest row, column."""
+        """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
         found = self._by_distance(x, y, part, room)
         return self.plan.lattice.cell_centre(*found[0].tolist()) if len(found) else None
 
@@ -121,9 +121,7 @@ class Space:
                 return target
         return None
 
-    def _by_distance(
-        self, x: int, y: int, part: int | None = None, room: int | None = None
-    ) -> I64:
+    def _by_distance(self, x: int, y: int, part: int | None = None, room: int | None = None) -> I64:
         mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
         if room is not None:
             mask = mask & (self.plan.room_of_cell == room)
@@ -169,7 +167,10 @@ def _shrunk(polygons: list[shapely.Polygon], radius: float) -> list[shapely.Poly
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
     shrunk: list[shapely.Polygon] = []
     for polygon in polygons:
-        grown = [_grown_walls(np.asarray(r.coords), octagon) for r in (polygon.exterior, *polygon.interiors)]
+        grown = [
+            _grown_walls(np.asarray(r.coords), octagon)
+            for r in (polygon.exterior, *polygon.interiors)
+        ]
         rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
         for part in shapely.get_parts(rest):
             if part.geom_type == "Polygon" and part.area > 0:
@@ -180,8 +181,7 @@ def _shrunk(polygons: list[shapely.Polygon], radius: float) -> list[shapely.Poly
 def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:
     """Return every wall of a ring, grown by the octagon, as convex polygons."""
     ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
-    hulls: NDArray[np.object_] = shapely.convex_hull(shapely.multipoints(ends))
-    return hulls
+    return np.asarray(shapely.convex_hull(shapely.multipoints(ends)))
 
 
 def _even_at_least(value: float) -> int:

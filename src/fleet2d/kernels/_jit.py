@@ -21,8 +21,8 @@ FLAGS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "nogil": Tru
 def cache_directory() -> Path:
     """Return the folder of the compiled kernels of exactly these sources.
 
-    Numba notices a change in the file of a cached function, but not in the files that it calls into.
-    A folder named after the content of *all* kernel sources makes a stale kernel impossible.
+    Numba notices a change in the file of a cached function, but not in the files that it calls
+    into. A folder named after the content of *all* kernel sources makes a stale kernel impossible.
     """
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):

@@ -26,9 +26,9 @@ def half_sine(half: int) -> int:
     """Return UNIT * sine of `half` / 8192 of a turn."""
     h = half & (2 * TURN - 1)
     if h < TURN:
-        return SINES[h] if h <= 2 * QUARTER else SINES[TURN - h]
+        return int(SINES[h] if h <= 2 * QUARTER else SINES[TURN - h])
     h -= TURN
-    return -SINES[h] if h <= 2 * QUARTER else -SINES[TURN - h]
+    return -int(SINES[h] if h <= 2 * QUARTER else SINES[TURN - h])
 
 
 @kernel

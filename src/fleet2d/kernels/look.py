@@ -10,7 +10,7 @@ from fleet2d.kernels.headings import QUARTER, TURN, half_sine
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.random import random_bits
-from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.sight import walk_line_of_sight
 
 I64 = NDArray[np.int64]
 
@@ -63,7 +63,7 @@ class SightEvents(NamedTuple):
 
 @kernel
 def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
-    """Tell whether (dx, dy) lies within `half_angle` [1/8192 turn] of a heading, border included."""
+    """Tell whether (dx, dy) lies within `half_angle` [1/8192 turn] of a heading, or on it."""
     if half_angle >= TURN:
         return True
     right, left = 2 * heading - half_angle, 2 * heading + half_angle
@@ -92,35 +92,43 @@ def look(
     `stops` says whether (USER_LOST, USER_SEEN) stop. Returns the steps done (the stopping one
     included) and the numbers of sightings and events written.
     """
-    users = crowd.x.shape[0]
+    # Taking an array out of a tuple costs a counted reference, so it is done once, not per step.
+    robot_x, robot_y, robot_heading, robot_away = robot.x, robot.y, robot.heading, robot.away
+    user_x, user_y, user_away = crowd.x, crowd.y, crowd.away
+    key, last, seen = memory.key, memory.noticed, memory.seen
+    vertices, triangles, neighbors = walls.vertices, walls.triangles, walls.neighbors
     found = happened = 0
-    for j in range(robot.x.shape[0]):
+    for j in range(robot_x.shape[0]):
         stop = False
-        x, y, heading = robot.x[j], robot.y[j], robot.heading[j]
+        x, y = robot_x[j], robot_y[j]
         triangle = -1
-        for u in range(users):
+        for u in range(user_x.shape[0]):
             noticed = False
-            dx, dy = crowd.x[u, j] - x, crowd.y[u, j] - y
+            dx, dy = user_x[u, j] - x, user_y[u, j] - y
             squared = dx * dx + dy * dy
-            if lens.near_squared <= squared <= lens.far_squared and not (crowd.away[u, j] or robot.away[j]):
-                if in_wedge(heading, lens.half_angle, dx, dy):
+            in_range = lens.near_squared <= squared <= lens.far_squared
+            if in_range and not (user_away[u, j] or robot_away[j]):
+                if in_wedge(robot_heading[j], lens.half_angle, dx, dy):
                     if triangle < 0:
                         triangle = locate(walls, x, y)
-                    if line_of_sight(walls, x, y, triangle, crowd.x[u, j], crowd.y[u, j]):
-                        draw = random_bits(memory.key[u], first + j) >> np.uint64(11)
-                        noticed = np.int64(draw) < lens.chance
+                    if walk_line_of_sight(
+                        vertices, triangles, neighbors, x, y, triangle, x + dx, y + dy
+                    ):
+                        draw = random_bits(key[u], first + j) >> np.uint64(11)
+                        noticed = bool(np.int64(draw) < lens.chance)
             if noticed:
-                memory.noticed[u] = first + j
+                last[u] = first + j
                 sightings.step[found], sightings.user[found] = first + j, u
-                sightings.x[found], sightings.y[found] = crowd.x[u, j], crowd.y[u, j]
+                sightings.x[found], sightings.y[found] = x + dx, y + dy
                 found += 1
-            is_seen = noticed or (memory.seen[u] == 1 and first + j - memory.noticed[u] < lens.patience)
-            if is_seen != (memory.seen[u] == 1):
-                memory.seen[u] = is_seen
+            is_seen = noticed or (seen[u] == 1 and first + j - last[u] < lens.patience)
+            if is_seen != (seen[u] == 1):
+                seen[u] = is_seen
                 kind = USER_SEEN if is_seen else USER_LOST
-                events.step[happened], events.user[happened], events.kind[happened] = first + j, u, kind
+                events.step[happened], events.user[happened] = first + j, u
+                events.kind[happened] = kind
                 happened += 1
                 stop = stop or stops[kind]
         if stop:
             return j + 1, found, happened
-    return robot.x.shape[0], found, happened
+    return robot_x.shape[0], found, happened

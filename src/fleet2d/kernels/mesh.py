@@ -78,6 +78,20 @@ def contains_triangle(mesh: Mesh, triangle: int, x: int, y: int) -> bool:
 
 
 @kernel
+def inside_triangle(vertices: Int64, triangles: Int32, triangle: int, x: int, y: int) -> bool:
+    """Return whether the point lies in the triangle, and not on its border."""
+    a, b, c = triangles[triangle, 0], triangles[triangle, 1], triangles[triangle, 2]
+    ax, ay = vertices[a, 0], vertices[a, 1]
+    bx, by = vertices[b, 0], vertices[b, 1]
+    cx, cy = vertices[c, 0], vertices[c, 1]
+    return bool(
+        orient(ax, ay, bx, by, x, y) > 0
+        and orient(bx, by, cx, cy, x, y) > 0
+        and orient(cx, cy, ax, ay, x, y) > 0
+    )
+
+
+@kernel
 def touches_wall(
     vertices: Int64, triangles: Int32, neighbors: Int32, triangle: int, x: int, y: int
 ) -> bool:

@@ -1,8 +1,8 @@
 """Poses over time: tracks between breakpoints, and the random walk of a meandering body.
 
-A *track* is five arrays over its breakpoints i: time [us], x, y [lattice], heading [1/4096 turn], and
-away (1 = not at home). Between two breakpoints the pose moves in a straight line and turns the
-shorter way, both at constant rate; after the last one it stays.
+A *track* is five arrays over its breakpoints i: time [us], x, y [lattice], heading [1/4096 turn],
+and away (1 = not at home). Between two breakpoints the pose moves in a straight line and turns the
+shorter way, both at constant rate; before the first and after the last one it stays.
 """
 
 from typing import NamedTuple
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from fleet2d.kernels._jit import kernel
 from fleet2d.kernels.headings import TURN, cosine, heading_of, sine, turn_between
-from fleet2d.kernels.mesh import Mesh, locate, strictly_inside
+from fleet2d.kernels.mesh import Mesh, inside_triangle, locate, strictly_inside
 from fleet2d.kernels.random import random_bell
-from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.sight import line_of_sight, walk_line_of_sight
 
 I64 = NDArray[np.int64]
 
@@ -36,6 +36,19 @@ class Poses(NamedTuple):
     y: I64
     heading: I64
     away: NDArray[np.uint8]
+
+
+def empty_poses(count: int) -> Poses:
+    """Return poses to be filled."""
+    x, y, heading = (np.empty(count, np.int64) for _ in range(3))
+    return Poses(x, y, heading, np.empty(count, np.uint8))
+
+
+def paste_poses(out: Poses, begin: int, part: Poses, taken: slice) -> None:
+    """Write the taken poses of `part` to `out`, from `begin` on."""
+    count = len(part.x[taken])
+    for name in Poses._fields:
+        getattr(out, name)[begin : begin + count] = getattr(part, name)[taken]
 
 
 @kernel
@@ -60,32 +73,36 @@ def last_breakpoint(time: I64, moment: int) -> int:
 @kernel
 def trace_track(track: Breakpoints, begin: int, step: int, count: int, out: Poses) -> None:
     """Write the poses at times begin, begin + step, … [us] to out[0:count]."""
-    last = track.time.shape[0] - 1
-    i = last_breakpoint(track.time, begin)
+    # Taking an array out of a tuple costs a counted reference, so it is done once, not per step.
+    xs, ys, headings, aways = out.x, out.y, out.heading, out.away
+    time = track.time
+    last = time.shape[0] - 1
+    i = last_breakpoint(time, begin)
     j = 0
     while j < count:
         moment = begin + j * step
-        while i < last and track.time[i + 1] <= moment:
+        while i < last and time[i + 1] <= moment:
             i += 1
-        x, y, heading = track.x[i], track.y[i], track.heading[i]
+        x, y, heading, away = track.x[i], track.y[i], track.heading[i], track.away[i]
         stop = count
-        dx = dy = turn = whole = np.int64(0)
-        if i < last:
-            whole = track.time[i + 1] - track.time[i]
-            stop = min(count, j + (track.time[i + 1] - moment + step - 1) // step)
-            dx, dy = track.x[i + 1] - x, track.y[i + 1] - y
+        dx = dy = turn = whole = 0
+        if time[i] > moment:  # not begun: it stands where it will start
+            stop = min(count, j + (time[i] - moment + step - 1) // step)
+        elif i < last:
+            whole = int(time[i + 1] - time[i])
+            stop = min(count, j + (time[i + 1] - moment + step - 1) // step)
+            dx, dy = int(track.x[i + 1] - x), int(track.y[i + 1] - y)
             turn = turn_between(heading, track.heading[i + 1])
-        away = track.away[i]
         if dx == 0 and dy == 0 and turn == 0:  # standing still: most of a life
             for s in range(j, stop):
-                out.x[s], out.y[s], out.heading[s], out.away[s] = x, y, heading, away
+                xs[s], ys[s], headings[s], aways[s] = x, y, heading, away
         else:
             for s in range(j, stop):
-                elapsed = begin + s * step - track.time[i]
-                out.x[s] = interpolate(x, dx, elapsed, whole)
-                out.y[s] = interpolate(y, dy, elapsed, whole)
-                out.heading[s] = interpolate(heading, turn, elapsed, whole) & (TURN - 1)
-                out.away[s] = away
+                elapsed = begin + s * step - time[i]
+                xs[s] = interpolate(x, dx, elapsed, whole)
+                ys[s] = interpolate(y, dy, elapsed, whole)
+                headings[s] = interpolate(heading, turn, elapsed, whole) & (TURN - 1)
+                aways[s] = away
         j = stop
 
 
@@ -109,12 +126,12 @@ def time_route(
         towards = heading_of(dx, dy)
         turn = abs(turn_between(heading, towards))
         if turn > 0:
-            now += np.int64(np.ceil(turn * 1e6 / turn_rate))
+            now += int(np.ceil(turn * 1e6 / turn_rate))
             heading = towards
             out[rows, 0], out[rows, 1], out[rows, 2] = now, route[i - 1, 0], route[i - 1, 1]
             out[rows, 3] = heading
             rows += 1
-        now += np.int64(np.ceil(np.sqrt(np.float64(dx * dx + dy * dy)) * 1e6 / speed))
+        now += int(np.ceil(np.sqrt(np.float64(dx * dx + dy * dy)) * 1e6 / speed))
         out[rows, 0], out[rows, 1], out[rows, 2] = now, route[i, 0], route[i, 1]
         out[rows, 3] = heading
         rows += 1
@@ -137,26 +154,30 @@ def trace_meander(
     """Walk at random from `start` (x, y, heading at step `first`) for len(out.x) steps.
 
     In each step the body turns by a bell-shaped random angle and goes one stride forward, unless
-    that would leave `space`, the places its centre may be; then it only turns. out[j] is the pose at
-    step first + j.
+    that would leave `space`, the places its centre may be; then it only turns. out[j] is the pose
+    at step first + j.
     """
     x, y, heading = start[0], start[1], start[2]
+    # Taking an array out of a tuple costs a counted reference, so it is done once, not per step.
+    xs, ys, headings, aways = out.x, out.y, out.heading, out.away
+    vertices, triangles, neighbors = space.vertices, space.triangles, space.neighbors
     triangle = locate(space, x, y)
     # A walked path may end on the very border of the space; from there any way in is allowed.
     inside = triangle >= 0 and strictly_inside(space, x, y)
-    for j in range(out.x.shape[0]):
-        out.x[j], out.y[j], out.heading[j], out.away[j] = x, y, heading, 0
+    for j in range(xs.shape[0]):
+        xs[j], ys[j], headings[j], aways[j] = x, y, heading, 0
         turn = (random_bell(rule.key, first + j) * rule.sway + 32768) >> 16
         turn = min(max(turn, -rule.turn_limit), rule.turn_limit)
         heading = (heading + turn) & (TURN - 1)
         nx = x + ((rule.stride * cosine(heading) + (1 << 37)) >> 38)
         ny = y + ((rule.stride * sine(heading) + (1 << 37)) >> 38)
         if inside:
-            if line_of_sight(space, x, y, triangle, nx, ny):
+            if inside_triangle(vertices, triangles, triangle, nx, ny):  # most steps are small
+                x, y = nx, ny
+            elif walk_line_of_sight(vertices, triangles, neighbors, x, y, triangle, nx, ny):
                 x, y = nx, ny
                 triangle = locate(space, x, y)
-        else:
-            start = locate(walls, x, y)
-            if strictly_inside(space, nx, ny) and line_of_sight(walls, x, y, start, nx, ny):
+        elif strictly_inside(space, nx, ny):
+            if line_of_sight(walls, x, y, locate(walls, x, y), nx, ny):
                 x, y, inside = nx, ny, True
                 triangle = locate(space, x, y)

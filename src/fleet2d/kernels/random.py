@@ -15,7 +15,7 @@ ODD_BYTES = np.uint64(0x00FF00FF00FF00FF)
 FOUR_LANES = np.uint64(0x0001000100010001)
 # The sum of eight uniform bytes: mean 1020, variance 8 * (256**2 - 1) / 12 = 43690.
 BELL_MEAN = 1020
-BELL_STD = 209.0215300071
+BELL_STD = 209.0215299915
 
 
 @kernel
@@ -31,7 +31,7 @@ def random_bits(key: np.uint64, counter: int) -> np.uint64:
 def random_below(key: np.uint64, counter: int, bound: int) -> int:
     """Return an integer in [0, bound), 0 < bound < 2**31, by multiply and shift."""
     high = random_bits(key, counter) >> np.uint64(32)
-    return np.int64((high * np.uint64(bound)) >> np.uint64(32))
+    return int((high * np.uint64(bound)) >> np.uint64(32))
 
 
 @kernel
@@ -49,4 +49,4 @@ def random_bell(key: np.uint64, counter: int) -> int:
     """
     word = random_bits(key, counter)
     lanes = (word & ODD_BYTES) + ((word >> np.uint64(8)) & ODD_BYTES)
-    return np.int64((lanes * FOUR_LANES) >> np.uint64(48)) - BELL_MEAN
+    return int((lanes * FOUR_LANES) >> np.uint64(48)) - BELL_MEAN

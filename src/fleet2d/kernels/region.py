@@ -111,8 +111,6 @@ def region_contains(
     y: int,
     right: Int32,
     wall: Int32,
-    start: int,
-    stop: int,
     px: int,
     py: int,
 ) -> bool:
@@ -122,20 +120,19 @@ def region_contains(
         mesh: Free space.
         x: Where the eye is, lattice units.
         y: Where the eye is, lattice units.
-        right: The vertex on each piece's right border; the region is `right[start:stop]`.
-        wall: The wall edge of each piece.
-        start: First piece of the region.
-        stop: End of the region's pieces.
+        right: int32 (n,), the vertex on each piece's right border, exactly the region's pieces.
+        wall: int32 (n,), the wall edge of each piece.
         px: The looked-for point, lattice units.
         py: The looked-for point, lattice units.
     """
     dx, dy = px - x, py - y
-    if start == stop or (dx == 0 and dy == 0):
-        return start != stop
+    pieces = right.shape[0]
+    if pieces == 0 or (dx == 0 and dy == 0):
+        return bool(pieces > 0)
     vertices = mesh.vertices
     half = _half(dx, dy)
     # The last piece whose right border is at or before p; the last of all if p precedes the first.
-    low, high = start - 1, stop
+    low, high = -1, pieces
     while high - low > 1:
         middle = (low + high) >> 1
         vertex = right[middle]
@@ -145,7 +142,7 @@ def region_contains(
             low = middle
         else:
             high = middle
-    piece = low if low >= start else stop - 1
+    piece = low if low >= 0 else pieces - 1
     vertex = right[piece]
     vx, vy = vertices[vertex, 0] - x, vertices[vertex, 1] - y
     if vx * dy - vy * dx == 0 and vx * dx + vy * dy > 0:
@@ -166,7 +163,7 @@ def region_contains_points(
     found = np.zeros(points.shape[0], np.bool_)
     for i in range(points.shape[0]):
         px, py = points[i, 0], points[i, 1]
-        found[i] = region_contains(mesh, x, y, right, wall, 0, right.shape[0], px, py)
+        found[i] = region_contains(mesh, x, y, right, wall, px, py)
     return found
 
 

@@ -2,8 +2,8 @@
 
 A shortest path in a polygonal space bends only at its reflex corners (Lozano-Pérez and Wesley,
 Communications of the ACM 22, 1979). The space is the free space shrunk by a body's radius, so a
-path may touch its border. Which corners see each other is decided in integers; lengths are the only floats
-(sums of correctly rounded square roots, the same on every machine).
+path may touch its border. Which corners see each other is decided in integers; lengths are the only
+floats (sums of correctly rounded square roots, the same on every machine).
 """
 
 from typing import NamedTuple
@@ -51,7 +51,7 @@ class RouteGraph(NamedTuple):
 def distance(ax: int, ay: int, bx: int, by: int) -> float:
     """Return the distance of two lattice points."""
     dx, dy = bx - ax, by - ay
-    return np.sqrt(np.float64(dx * dx + dy * dy))
+    return float(np.sqrt(np.float64(dx * dx + dy * dy)))
 
 
 @kernel
@@ -67,9 +67,7 @@ def is_taut(mesh: Mesh, corners: Corners, node: int, x: int, y: int) -> bool:
 
 
 @kernel
-def legs_of_corner(
-    mesh: Mesh, fans: Fans, corners: Corners, node: int, seen: I32
-) -> int:
+def legs_of_corner(mesh: Mesh, fans: Fans, corners: Corners, node: int, seen: I32) -> int:
     """Write the nodes that one taut leg connects with `node` to `seen`; return their number."""
     v = corners.vertex[node]
     legs = 0
@@ -111,9 +109,7 @@ def build_route_graph(mesh: Mesh, corners: Corners) -> RouteGraph:
 
 
 @kernel
-def corners_seen(
-    mesh: Mesh, corners: Corners, x: int, y: int, triangle: int, seen: I32
-) -> int:
+def corners_seen(mesh: Mesh, corners: Corners, x: int, y: int, triangle: int, seen: I32) -> int:
     """Write the corners that a taut string from (x, y) can reach to `seen`; return their number."""
     count = 0
     for i in range(vertices_seen_from_point(mesh, x, y, triangle, seen)):
@@ -125,9 +121,7 @@ def corners_seen(
 
 
 @kernel
-def find_route(
-    mesh: Mesh, graph: RouteGraph, ax: int, ay: int, bx: int, by: int, out: I64
-) -> int:
+def find_route(mesh: Mesh, graph: RouteGraph, ax: int, ay: int, bx: int, by: int, out: I64) -> int:
     """Write the shortest path from (ax, ay) to (bx, by) to `out` (nodes + 2, 2).
 
     Returns the number of its points, or 0 when there is no way or an end lies outside the space.
@@ -178,7 +172,7 @@ def search_corners(
     vertices, vertex = mesh.vertices, graph.corners.vertex
     best, last = np.inf, -1
     while True:
-        node = np.argmin(bound) if bound.shape[0] > 0 else -1
+        node = int(np.argmin(bound)) if bound.shape[0] > 0 else -1
         if node < 0 or not bound[node] < best:
             return best, last
         bound[node] = np.inf
@@ -195,10 +189,8 @@ def search_corners(
 
 
 @kernel
-def unwind(
-    mesh: Mesh, corners: Corners, before: I32, last: int, bx: int, by: int, out: I64
-) -> int:
-    """Write the corners up to `last` and then the goal behind out[0]; return the number of points."""
+def unwind(mesh: Mesh, corners: Corners, before: I32, last: int, bx: int, by: int, out: I64) -> int:
+    """Write the corners up to `last` and the goal behind out[0]; return the number of points."""
     count = 1
     node = last
     while node >= 0:

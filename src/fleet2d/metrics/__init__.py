@@ -1,0 +1,1 @@
+"""What measures a run: one metric a module."""

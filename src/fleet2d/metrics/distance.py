@@ -1,8 +1,7 @@
 """How far everybody goes."""
 
+from math import dist
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
@@ -20,14 +19,16 @@ class Distance(Metric):
     def start(self, home: "Home") -> None:
         """Begin counting."""
         self.metres: dict[str, float] = {}
+        self.last: dict[str, tuple[float, float]] = {}
         self.days = 0.0
 
     def update(self, history: History, state: "Present") -> Any:
         """Add up the moves."""
         for name in (*state.users, *state.robots):
             poses = history.poses(name)
-            moves = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)
-            self.metres[name] = self.metres.get(name, 0.0) + float(moves.sum())
+            between = dist(self.last[name], poses.at(0)) if name in self.last else 0.0
+            self.metres[name] = self.metres.get(name, 0.0) + between + poses.distance
+            self.last[name] = poses.at(-1)
         self.days += len(history) * history.step_s / 86400
 
     def result(self) -> dict[str, Any]:

@@ -1,10 +1,9 @@
 """Metrics: algorithms that only record. They know the truth, and nobody acts on what they say."""
 
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
-
-from datetime import timedelta
 
 from fleet2d.algorithms.history import History
 from fleet2d.component import Component

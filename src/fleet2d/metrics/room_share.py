@@ -31,9 +31,7 @@ class RoomShare(Metric):
         """Count the steps per room."""
         users, shares = [], []
         for user in state.users:
-            room = history.poses(user).room.astype(np.int64)
-            # Away is -1 and comes last.
-            steps = np.bincount(room % len(self.names), minlength=len(self.names))
+            steps = history.poses(user).time_in_rooms
             self.seconds[user] = self.seconds.get(user, 0) + steps
             users.append(user)
             shares.append(steps / steps.sum())

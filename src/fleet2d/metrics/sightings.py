@@ -28,9 +28,13 @@ class Sightings(Metric):
         for index, user in enumerate(state.users):
             steps = np.unique(observations.step[observations.user == index])
             self.seen[user] = self.seen.get(user, 0) + len(steps)
-            at_home = int(np.count_nonzero(~history.poses(user).away))
+            at_home = int(history.poses(user).time_in_rooms[:-1].sum())
             self.at_home[user] = self.at_home.get(user, 0) + at_home
 
     def result(self) -> dict[str, Any]:
         """Return {user: share}; a user who was never at home has none."""
-        return {user: seen / self.at_home[user] for user, seen in self.seen.items() if self.at_home[user]}
+        return {
+            user: seen / self.at_home[user]
+            for user, seen in self.seen.items()
+            if self.at_home[user]
+        }

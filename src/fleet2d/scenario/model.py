@@ -14,10 +14,13 @@ from pydantic import (
     model_validator,
 )
 
+from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.component import Component, OneOf, Settings, ShortForm
+from fleet2d.component import OneOf, Settings, ShortForm
 from fleet2d.entities.entity import Robot, User
 from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean, problem, problem_at
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.explain import explain
@@ -125,17 +128,19 @@ class Scenario(Settings):
 
     name: str | None = Field(default=None, description="What this scenario is called in reports.")
     simulation: SimulationSettings
-    floorplan: Annotated[Component, OneOf("floorplan")] = Field(description="The home's walls.")
+    floorplan: Annotated[FloorPlanSource, OneOf("floorplan")] = Field(
+        description="The home's walls."
+    )
     users: Annotated[dict[str, Annotated[User, ShortForm()]], _Named] = Field(
         default={}, description="The people, by name."
     )
     robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _Named] = Field(
         default={}, description="The robots, by name."
     )
-    algorithms: Annotated[dict[str, Annotated[Component, OneOf("algorithm")]], _Named, _Typed] = (
+    algorithms: Annotated[dict[str, Annotated[Algorithm, OneOf("algorithm")]], _Named, _Typed] = (
         Field(default={}, description="What computes during the run, by name.")
     )
-    metrics: Annotated[dict[str, Annotated[Component, OneOf("metric")]], _Named, _Typed] = Field(
+    metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _Named, _Typed] = Field(
         default={}, description="What is only recorded, by name."
     )
     artifacts: ArtifactSettings = Field(

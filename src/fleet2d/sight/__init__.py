@@ -1,0 +1,1 @@
+"""What robots see: cameras, and the region that is visible from a place."""

@@ -15,16 +15,20 @@ from fleet2d.units import AngleDeg, Duration, Length, Share, micros, problem
 class Camera(Settings):
     """A camera at the centre of the body that looks where the body heads.
 
-    A user is in view when the user's centre is between the two ranges, within the angle, and no wall
-    touches the line between the centres: exactly when it lies in the visibility region of the robot's
-    position. Ranges are rounded to the lattice, the half angle to 1/8192 of a turn (0.044 degrees).
+    A user is in view when the user's centre is between the two ranges, within the angle, and no
+    wall touches the line between the centres: exactly when it lies in the visibility region of the
+    robot's position. Ranges are rounded to the lattice, the half angle to 1/8192 of a turn (0.044
+    degrees).
     """
 
     range: tuple[Length, Length] = Field(
         default=(0.0, 4.5), description="nearest and farthest distance it sees at [m]"
     )
     angle_deg: AngleDeg = Field(
-        default=108.0, gt=0, le=360, description="width of the field of view, centred on the heading"
+        default=108.0,
+        gt=0,
+        le=360,
+        description="width of the field of view, centred on the heading",
     )
     detection: Share = Field(
         default=1.0, description="probability that a user in view is noticed, in each step"
@@ -38,7 +42,9 @@ class Camera(Settings):
     def _range_is_ordered(self) -> Self:
         near, far = self.range
         if not 0 <= near < far:
-            raise problem(f"range is [{near:g}, {far:g}]: the nearest distance must be below the farthest")
+            raise problem(
+                f"range is [{near:g}, {far:g}]: the nearest distance must be below the farthest"
+            )
         return self
 
     def lens(self, units_per_m: float, step_us: int) -> Lens:

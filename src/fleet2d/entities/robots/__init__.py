@@ -1,0 +1,1 @@
+"""Behaviors of robots, one a module."""

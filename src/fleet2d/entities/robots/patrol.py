@@ -28,7 +28,9 @@ class Patrol(Behavior):
     waypoints: tuple[Point, ...] = Field(
         default=(), description="points [x, y] in metres to go to instead of rooms"
     )
-    dwell: Duration = Field(default=timedelta(minutes=5), description="how long it stays at each stop")
+    dwell: Duration = Field(
+        default=timedelta(minutes=5), description="how long it stays at each stop"
+    )
     order: Literal["fixed", "random"] = Field(
         default="fixed", description="stops in the order given, or shuffled anew for each round"
     )

@@ -1,0 +1,1 @@
+"""Behaviors of users, one a module."""

@@ -1,7 +1,8 @@
 """Schedule: a fixed daily or weekly agenda of places."""
 
+from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -9,7 +10,8 @@ from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point
 from fleet2d.entities.plan import Plan
-from fleet2d.units import Duration, TimeOfDay, problem
+from fleet2d.problems import problem, problem_at
+from fleet2d.units import Duration, TimeOfDay, format_time_of_day
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -30,7 +32,9 @@ class Item(Settings):
     at: TimeOfDay | None = Field(
         default=None, description="when it begins; left out: when the item before is over"
     )
-    place: Place | None = Field(default=None, description="where: a room, a kind of room, or a point")
+    place: Place | None = Field(
+        default=None, description="where: a room, a kind of room, or a point"
+    )
     away: bool = Field(default=False, description="out of the home instead of at a place")
     dwell: Duration | None = Field(
         default=None, description="how long it takes; left out: until the next item begins"
@@ -47,7 +51,9 @@ class Item(Settings):
 class Day(Settings):
     """An agenda, and the days on which it holds."""
 
-    on: Days | tuple[Days, ...] = Field(default="daily", description="the days on which it holds")
+    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = Field(
+        default="daily", description="the days on which it holds"
+    )
     items: tuple[Item, ...] = Field(min_length=1, description="what happens, in order")
 
     @property
@@ -73,25 +79,28 @@ class Entry(NamedTuple):
 class Schedule(Behavior):
     """Be at fixed places at fixed times, daily or by weekday.
 
-    At an item's time the body walks to its place by the shortest path, to a spot drawn anew in a room.
-    When an item with a dwell is over and nothing is due, it goes to the place `rest`. A later day of
-    the list replaces an earlier one on the weekdays they share.
+    At an item's time the body walks to its place by the shortest path, to a spot drawn anew in a
+    room. When an item with a dwell is over and nothing is due, it goes to the place `rest`. A later
+    day of the list replaces an earlier one on the weekdays they share.
     """
 
     days: tuple[Day, ...] = Field(min_length=1, description="the agendas of the days of the week")
     rest: Place = Field(
-        default=("living_room", "any"), description="where it goes when an item is over and nothing is due"
+        default=("living_room", "any"),
+        description="where it goes when an item is over and nothing is due",
     )
 
     @model_validator(mode="after")
     def _days_work_out(self) -> Self:
-        for day in self.days:
-            _entries(day, self.rest)
+        for number, day in enumerate(self.days):
+            _entries(day, self.rest, number)
         return self
 
     def start(self, actor: "Actor") -> None:
         """Work out the week, and check that every place exists and can be reached."""
         self.week = self._week()
+        self.plan: Plan | None = None  # the last one it made, and the midnight up to which it is
+        self.until = actor.clock.start
         for entry in {entry for day in self.week for entry in day}:
             if entry.place and is_point(entry.place):
                 actor.point(entry.place)  # type: ignore[arg-type]
@@ -104,20 +113,27 @@ class Schedule(Behavior):
         return entry.place if entry else None
 
     def decide(self, now: Situation) -> Plan:
-        """Plan the rest of the day."""
+        """Plan the rest of the day; after another behavior's turn, first go where it should be."""
         plan = now.plan()
-        midnight = datetime.combine(now.time.date(), datetime.min.time())
-        for entry in self.week[now.time.weekday()]:
-            if midnight + entry.begins < now.time:
-                continue
-            plan.stay(until=midnight + entry.begins)
-            if not entry.place:
-                plan.leave_home()
-            else:
-                plan.go_to(entry.place)
-            if entry.activity:
-                plan.note("activity", entry.activity)
-        return plan.stay(until=midnight + DAY)
+        since = now.time
+        if now.actor.plan is self.plan:  # its own, which may be over later than planned
+            since = self.until
+        elif now.step and (entry := self._current(self.week, now.time)):
+            _add(plan, entry)
+        self.until = datetime.combine(now.time.date(), datetime.min.time()) + DAY
+        for begins, entry in self._between(since, self.until):
+            _add(plan.stay(until=begins), entry)
+        self.plan = plan.stay(until=self.until)
+        return self.plan
+
+    def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, Entry]]:
+        """Yield what begins from `since` on and before the midnight `until`."""
+        midnight = datetime.combine(since.date(), datetime.min.time())
+        while midnight < until:
+            for entry in self.week[midnight.weekday()]:
+                if midnight + entry.begins >= since:
+                    yield midnight + entry.begins, entry
+            midnight += DAY
 
     def _week(self) -> list[list[Entry]]:
         week: list[list[Entry]] = [[] for _ in range(7)]
@@ -138,23 +154,39 @@ class Schedule(Behavior):
         return None
 
 
-def _entries(day: Day, rest: RoomChoice | Point) -> list[Entry]:
+def _add(plan: Plan, entry: Entry) -> None:
+    if entry.place:
+        plan.go_to(entry.place)
+    else:
+        plan.leave_home()
+    if entry.activity:
+        plan.note("activity", entry.activity)
+
+
+def _entries(day: Day, rest: RoomChoice | Point, number: int = 0) -> list[Entry]:
     """Work out when each item of a day begins, and when one goes to rest.
 
     Raises:
-        PydanticCustomError: The items don't follow each other within a day.
+        ValidationError: The items don't follow each other within the day, `number` of the list.
     """
     entries: list[Entry] = []
     over: timedelta | None = None  # when the item before is over, if it says so
-    for number, item in enumerate(day.items):
+    for index, item in enumerate(day.items):
+        where = ("days", number, "items", index)
         begins = item.at if item.at is not None else over
         if begins is None:
-            raise problem(f"items.{number} needs 'at', or a 'dwell' in the item before it")
+            raise problem_at(where, "it needs 'at', or a 'dwell' in the item before it")
         earliest = over if over is not None else entries[-1].begins if entries else timedelta(0)
-        if not earliest <= begins < DAY:
-            raise problem(
-                f"items.{number} begins at {begins}, but the item before it lasts until {earliest}:"
-                " list the items of a day in order, and within the day"
+        if begins < earliest:
+            raise problem_at(
+                where,
+                f"it begins at {format_time_of_day(begins)}, but the item before it lasts until"
+                f" {format_time_of_day(earliest)}: list the items of a day in order",
+            )
+        if begins >= DAY:
+            raise problem_at(
+                where,
+                f"it begins at {format_time_of_day(begins)}: an item begins before 24:00 of its day",
             )
         if over is not None and begins > over:
             entries.append(Entry(over, rest, "rest"))

@@ -1,0 +1,47 @@
+"""One history, many futures: where should the robot wait to see Ana most this evening?
+
+The simulation is copied as it stands, random streams included. In each copy the robot is sent to
+another room and the evening runs to its end; the history before is computed once.
+
+    python examples/branching.py
+"""
+
+import copy
+from datetime import datetime
+
+from fleet2d import Behavior, Plan, Simulation, Situation
+
+
+class Errand(Behavior):
+    """Wait where the script says."""
+
+    room: str = "entryway"
+
+    def start(self, actor: object) -> None:
+        """Begin with the room of the configuration."""
+        self.goal = self.room  # not a field, so it is run state, and may change
+
+    def decide(self, now: Situation) -> Plan:
+        """Go there and stay for good."""
+        return now.plan().go_to(self.goal).stay()
+
+
+def main() -> None:
+    """Run a day, branch it in the afternoon, and tell which room was best."""
+    robot = {"behaviors": [Errand()], "camera": {"angle_deg": 360}}
+    history = Simulation(None, "simulation.duration.days=1", robots={"astro": robot})
+    history.run_until(datetime(2026, 1, 5, 17, 0))
+    print(f"{history.time:%A %H:%M}, the robot is in {history.state['astro']['room']}")
+
+    shares = {}
+    for room in history.actors["astro"].reachable_rooms():
+        future = copy.deepcopy(history)
+        future.actors["astro"].behaviors[0].goal = room.name
+        future.replan("astro")
+        shares[room.name] = future.run().metrics["sightings"]["ana"]
+    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
+        print(f"  waiting in {name:14} sees Ana {share:6.1%} of her time at home that day")
+
+
+if __name__ == "__main__":
+    main()

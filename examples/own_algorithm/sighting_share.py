@@ -1,0 +1,59 @@
+"""An algorithm of one's own, and a behavior that acts on its output."""
+
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d import (
+    Algorithm,
+    Behavior,
+    Duration,
+    History,
+    Home,
+    Plan,
+    Present,
+    RoomDistribution,
+    Situation,
+)
+
+
+class SightingShare(Algorithm):
+    """Share of sightings per room, where what is long past counts less."""
+
+    forget: Duration = Field(
+        default=timedelta(days=14), description="about how long a sighting counts"
+    )
+
+    def start(self, home: Home) -> None:
+        """Begin without a sighting."""
+        self.counts = np.zeros(len(home.rooms))
+
+    def update(self, history: History, state: Present) -> RoomDistribution:
+        """Let the past fade, add the sightings since the last update."""
+        self.counts *= max(0.0, 1 - self.period / self.forget)
+        room = history.observations.room
+        self.counts += np.bincount(room[room >= 0], minlength=len(self.counts))
+        return RoomDistribution(self.counts)  # uniform as long as nobody was seen
+
+
+class VisitMostSeen(Behavior):
+    """Every other time wait where people were seen most, according to an algorithm."""
+
+    of: str = Field(default="share", description="the algorithm to go by")
+    dwell: Duration = Field(default=timedelta(hours=1), description="how long it waits")
+
+    def start(self, actor: Any) -> None:
+        """Begin with a turn of the next behavior."""
+        self.came_last = True
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Go to the likeliest room; None leaves it to the next behavior."""
+        output: Any = now.outputs.get(self.of)
+        self.came_last = not self.came_last
+        if output is None or not self.came_last:
+            return None
+        room = now.home.rooms[int(np.argmax(output.share))]
+        plan = now.plan().note("visit", room.name)
+        return plan.go_to([room.name, "any"]).turn_by(1).stay(self.dwell)

@@ -1,0 +1,31 @@
+"""Sums over poses: how long in which room, and how far."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.kernels._jit import kernel
+from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.motion import Poses
+
+
+@kernel
+def count_rooms(poses: Poses, room_of_cell: NDArray[np.int16], counts: NDArray[np.int64]) -> None:
+    """Add the number of poses in each room to counts (rooms + 1,); the last entry is away."""
+    x, y, away = poses.x, poses.y, poses.away
+    last = counts.shape[0] - 1
+    for j in range(x.shape[0]):
+        # Room -1, a cell that a wall cuts, also counts as the last entry.
+        room = -1 if away[j] else int(room_of_cell[y[j] // SUB, x[j] // SUB])
+        counts[room if room >= 0 else last] += 1
+
+
+@kernel
+def sum_moves(poses: Poses) -> float:
+    """Return the summed length of the moves from pose to pose [lattice units]."""
+    x, y = poses.x, poses.y
+    total = 0.0
+    for j in range(1, x.shape[0]):
+        dx, dy = x[j] - x[j - 1], y[j] - y[j - 1]
+        if dx != 0 or dy != 0:
+            total += np.sqrt(np.float64(dx * dx + dy * dy))
+    return total

@@ -1,0 +1,175 @@
+"""Convert a file: read it, check what comes of it, write that."""
+
+import os
+import textwrap
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fleet2d.artifacts.directory import is_disk_full
+from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.houseexpo import read_houseexpo
+from fleet2d.scenario.document import Document, Keys, read_document
+from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.published.entities import body_keys, convert_robot, convert_users, free_name
+from fleet2d.scenario.published.reader import Reader
+from fleet2d.scenario.published.sections import (
+    convert_floorplan,
+    convert_outputs,
+    convert_simulation,
+    read_step,
+)
+
+
+def convert_file(old: Path, new: Path) -> list[str]:
+    """Write a configuration of the published Fleet2D as a scenario.
+
+    Args:
+        old: The configuration, a YAML file with `simulation`, `floorplan`, `users`, `robot`.
+        new: The scenario to write; it must not exist.
+
+    Returns:
+        What could not be carried over or means something else now, each with the old key first.
+
+    Raises:
+        InputError: `old` can't be read or is no such configuration, or `new` exists or can't be
+            written.
+        ArtifactError: The disk is full. In either case nothing is left in the place of `new`.
+    """
+    old, new = Path(old), Path(new)
+    _check_target(new)
+    reader = Reader(_read(old), str(old))
+    reader.check_kind()
+    data = _convert(reader, old, new)
+    remarks = reader.finish()
+    _write_new(new, _header(old, remarks) + _dump(data))
+    return remarks
+
+
+def _read(old: Path) -> Document:
+    try:
+        return read_document(old)
+    except ScenarioError as error:
+        hint = "; a !!python tag runs code, so none is read: write the value itself"
+        raise ScenarioError(f"{error}{hint if ':python/' in str(error) else ''}") from None
+
+
+def _convert(reader: Reader, old: Path, new: Path) -> dict[str, Any]:
+    """Return the scenario as plain data; starts that a body can't have are moved."""
+    step = read_step(reader)
+    floorplan, found = convert_floorplan(reader, old, new)
+    users, paths = convert_users(reader, step)
+    data: dict[str, Any] = {
+        "simulation": convert_simulation(reader, step),
+        "floorplan": floorplan,
+        "users": users,
+        "robots": {},
+        "artifacts": convert_outputs(reader, step),
+    }
+    if reader.get(("robot",)) is None:
+        reader.remark(("robot",), "missing; the scenario has no robot")
+    else:
+        name = free_name("robot", users)
+        if name != "robot":
+            reader.remark(("robot",), f"called {name}: there is a user robot")
+        paths[name] = body_keys(reader, ("robot",))
+        data["robots"][name] = convert_robot(reader, paths[name], step)
+    scenario = _validate(data, found, reader.shown_as)
+    if found:
+        _move_starts(reader, data, scenario, found, paths)
+    return {key: value for key, value in data.items() if value}
+
+
+def _validate(data: dict[str, Any], found: Path | None, shown_as: str) -> Scenario:
+    """Return the scenario, checked in full; without a file for its plan, with another plan."""
+    plan = {"type": "houseexpo", "path": str(found)} if found else {"type": "bundled"}
+    try:
+        return load_scenario({**data, "floorplan": {**plan, "cell": data["floorplan"]["cell"]}})
+    except ScenarioError as error:
+        raise ScenarioError(f"what would come of {shown_as} is no scenario: {error}") from None
+
+
+def _move_starts(
+    reader: Reader, data: dict[str, Any], scenario: Scenario, plan: Path, paths: Mapping[str, Keys]
+) -> None:
+    """Move every start where its body can't be to the nearest point where it can."""
+    home = Home(read_houseexpo(plan, data["floorplan"]["cell"]))
+    lattice = home.plan.lattice
+    for name, entity in [*scenario.users.items(), *scenario.robots.items()]:
+        start = data["users" if name in data["users"] else "robots"][name].get("start")
+        if start is None:
+            continue
+        try:
+            space = home.space(entity.radius)
+        except InputError as error:
+            raise reader.wrong((*paths[name], "radius"), str(error)) from None
+        x, y = lattice.to_lattice(start).tolist()
+        near = space.nearest(x, y, 0)
+        if space.part_at(x, y) >= 0 or near is None:
+            continue
+        there = [round(value, 4) for value in lattice.to_metres(near).tolist()]
+        reader.remark(
+            (*paths[name], "pose_config", "init_pose"),
+            f"{start} is in a wall or nearer to one than its radius, {entity.radius:g} m: it starts"
+            f" at {there}, the nearest free point",
+        )
+        start[:] = there
+
+
+# The new file
+
+
+def _dump(data: Mapping[str, Any]) -> str:
+    dumped: str = yaml.safe_dump(
+        data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
+    )
+    return dumped
+
+
+def _header(old: Path, remarks: list[str]) -> str:
+    """Return the comment on top: what the scenario came from, and all that changed by it."""
+    text = (
+        f"Converted by `fleet2d convert` from {old.name}, a configuration of the published Fleet2D."
+    )
+    lines = [text, *(["What changed:"] if remarks else []), *(f"- {remark}" for remark in remarks)]
+    # Only what can be printed: a line break in a key would end the comment.
+    printable = ("".join(c if c.isprintable() else "?" for c in line) for line in lines)
+    wrapped = (
+        textwrap.wrap(line, 97, subsequent_indent="  " * line.startswith("- "))
+        for line in printable
+    )
+    return "".join(f"# {line}\n" for part in wrapped for line in part) + "\n"
+
+
+def _check_target(new: Path) -> None:
+    if os.path.lexists(new):
+        raise InputError(f"{new} exists: choose another name, or remove it")
+    if not new.absolute().parent.is_dir():
+        raise InputError(f"{new} can't be written: there is no folder {new.absolute().parent}")
+
+
+def _write_new(new: Path, text: str) -> None:
+    """Write a file that must not exist, whole or not at all."""
+    part = new.with_name(f".{new.name}.{os.getpid()}")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        _check_target(new)
+        part.replace(new)
+    except OSError as error:
+        raise _cannot_write(new, error) from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _cannot_write(new: Path, error: OSError) -> Fleet2DError:
+    if is_disk_full(error):
+        return ArtifactError(f"the disk is full: {new} can't be written; free some space")
+    return InputError(f"{new} can't be written: {error.strerror or error}; choose another place")

@@ -1,0 +1,207 @@
+"""What becomes of the users and the robot of the published Fleet2D.
+
+Poses there are metres in the plan's own coordinates and degrees counter-clockwise from +x, as here;
+pixels come in only where it rounds walls and looks up where one may go.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from datetime import timedelta
+from fractions import Fraction
+from itertools import count
+from typing import Any
+
+from fleet2d.problems import shown
+from fleet2d.scenario.document import Keys
+from fleet2d.scenario.published.reader import Reader, tidy
+from fleet2d.sight.camera import Camera
+from fleet2d.units import micros
+
+# A random turn is cut at 4.88 standard deviations (kernels.random): this limit never cuts one.
+_TURN_LIMIT_STD = 5
+_FASTEST_TURN_DEG_S = 36_000
+_WIDEST_TURN_DEG = 3600
+_FASTEST_M_S = 20
+_WIDEST_M = 2
+# An entity needs a speed. One that went nowhere gets this: it rounds to no move in any step.
+_STANDSTILL_M_S = 1e-9
+
+
+def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict[str, Keys]]:
+    """Return the users by name, and where each stands in the old file."""
+    keys: Keys = ("users", "names")
+    names = reader.get(keys, whole=True)
+    if isinstance(names, str):
+        names = names.split(",")
+    if not isinstance(names, list | None) or not all(isinstance(n, str) for n in names or []):
+        raise reader.wrong(keys, f"found {shown(names)}; names with commas between them are wanted")
+    old_names = dict.fromkeys(stripped for name in names or [] if (stripped := name.strip()))
+    if not old_names:
+        reader.remark(keys, "nobody is named; the scenario has no users")
+    users: dict[str, Any] = {}
+    paths: dict[str, Keys] = {}
+    for old_name in old_names:
+        if reader.get(("users", old_name)) is None:
+            raise reader.wrong(
+                keys, f"{old_name!r} has no section users.{old_name}: add or unname it"
+            )
+        where = body_keys(reader, ("users", old_name))
+        name = free_name(old_name, users)
+        if name != old_name:
+            reader.remark(("users", old_name), f"called {name}: names are letters, digits, _ and -")
+        users[name], paths[name] = _body(reader, where, step), where
+    for name in reader.get(("users",)) or {}:
+        if name != "names" and name not in old_names:
+            reader.get(("users", name), whole=True)
+            reader.remark(
+                ("users", name), "left out: users.names doesn't have it, so it was not used"
+            )
+    return users, paths
+
+
+def body_keys(reader: Reader, keys: Keys) -> Keys:
+    """Return where an entity's settings are: in the section that its `type` names."""
+    kind = reader.text((*keys, "type")) or "base"
+    if reader.get((*keys, kind)) is None:
+        raise reader.wrong(keys, f"its type is {kind!r}, and it has no section of that name")
+    if kind != "base":
+        reader.remark(
+            (*keys, "type"), f"{kind} is no type of the published Fleet2D: read as if it were base"
+        )
+    return (*keys, kind)
+
+
+def _body(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
+    """Return what users and the robot have in common."""
+    result: dict[str, Any] = {}
+    radius = reader.number((*keys, "radius"), least=0, most=_WIDEST_M)
+    if radius:
+        result["radius"] = radius
+    else:
+        result["radius"] = 0.01
+        reader.remark(
+            (*keys, "radius"), "missing or 0; a body has a radius, and this one has 0.01 m"
+        )
+    pose: Keys = (*keys, "pose_config", "init_pose")
+    x, y, theta = (reader.number((*pose, key)) for key in ("x", "y", "theta"))
+    if x is None or y is None:
+        reader.remark(pose, "has no x and y; where it starts is drawn")
+    else:
+        result["start"] = [x, y]
+    if theta is not None:
+        result["start_heading_deg"] = theta
+    color = reader.text((*keys, "color"))
+    if color:
+        result["color"] = color
+    if reader.get((*keys, "seed")) is not None:
+        reader.remark(
+            (*keys, "seed"),
+            "left out: everybody has random numbers of their own, from simulation.seed",
+        )
+    return result | _walk(reader, (*keys, "pose_config", "meander_strategy"), step)
+
+
+def _walk(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
+    """Return the keys of the random walk."""
+    if reader.get(keys) is None:
+        reader.remark(keys, "missing; it stands still")
+        return {}
+    step_s = Fraction(micros(step), 10**6)
+    return {
+        "type": "meander",
+        **_pace(reader, (*keys, "lin_speed"), step_s),
+        **_sway(reader, (*keys, "ang_speed"), step_s),
+    }
+
+
+def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
+    """Return how fast it walks; it is written in metres per step."""
+    stride = reader.number(keys, least=0)
+    if not stride:
+        reader.remark(keys, "missing or 0; a speed is above 0, and 1e-9 m/s moves nobody")
+        return {"speed": _STANDSTILL_M_S}
+    speed = float(Fraction(repr(stride)) / step_s)
+    if speed > _FASTEST_M_S:
+        raise reader.wrong(
+            keys,
+            f"{stride:g} m in a step of {float(step_s):g} s is {speed:g} m/s; {_FASTEST_M_S} m/s at"
+            " most is wanted",
+        )
+    reader.remark(
+        keys,
+        "metres per step there, a speed here, and the same walk at this step; a move across a wall"
+        " is never made, where the published Fleet2D looked at the end of it only",
+    )
+    return {"speed": speed}
+
+
+def _sway(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
+    """Return how it turns; a standard deviation is written in degrees per step."""
+    sway = abs(reader.number(keys, least=-_WIDEST_TURN_DEG, most=_WIDEST_TURN_DEG) or 0.0)
+    if not sway:
+        return {"turn_std_deg": 0.0}
+    limit = _TURN_LIMIT_STD * sway / float(step_s)
+    reader.remark(
+        keys,
+        "degrees per step there, per square root of a second here, and the same walk at this step;"
+        " turns are cut at 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
+    )
+    if limit > _FASTEST_TURN_DEG_S:
+        limit = _FASTEST_TURN_DEG_S
+        reader.remark(keys, f"turns are cut at {limit:g} deg/s, the fastest there is")
+    return {"turn_std_deg": tidy(sway / math.sqrt(step_s)), "turn_rate_deg": tidy(limit)}
+
+
+def convert_robot(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
+    """Return the robot whose settings are at `keys`."""
+    return _body(reader, keys, step) | {"camera": _camera(reader, (*keys, "fov_config"))}
+
+
+def _camera(reader: Reader, keys: Keys) -> dict[str, Any]:
+    """Return the camera; a key that is missing gets our default."""
+    for key in ("load_fov_file", "lazy_compute"):
+        if reader.get((*keys, key)) is not None:
+            reader.remark(
+                (*keys, key), "not needed: what is in view is worked out exactly and at once"
+            )
+    camera: dict[str, Any] = {"range": _reach(reader, keys)}
+    angle = reader.number((*keys, "angle"), above=0)
+    if angle is None:
+        reader.remark((*keys, "angle"), "missing; the camera gets the angle that cameras have here")
+    else:
+        camera["angle_deg"] = min(angle, 360.0)  # it saw all round from there on
+    return camera
+
+
+def _reach(reader: Reader, keys: Keys) -> list[float]:
+    """Return the nearest and the farthest distance of the camera [m]."""
+    saw = reader.number((*keys, "distance"), above=0)
+    if saw is None:
+        saw = Camera().range[1]
+        reader.remark((*keys, "distance"), f"missing; taken as {saw:g} m")
+    limits = ("min_distance", "max_distance")
+    lowest, highest = (reader.number((*keys, limit), least=0) for limit in limits)
+    near, far = lowest or 0.0, saw if highest is None else highest
+    if near >= far:
+        raise reader.wrong(
+            keys,
+            f"the camera would see from {near:g} m to {far:g} m; a farthest distance beyond the"
+            " nearest is wanted",
+        )
+    held = [(*keys, limit) for limit in limits if reader.get((*keys, limit)) is not None]
+    if held:
+        reader.remark(
+            held[0],
+            f"accepted and ignored there, where it saw from 0 to distance, {saw:g} m; here they"
+            f" hold, and camera.range is [{near:g}, {far:g}]",
+            *held[1:],
+        )
+    return [near, far]
+
+
+def free_name(name: str, taken: Iterable[str]) -> str:
+    """Return a name for an entity that is valid and not taken, as close to `name` as can be."""
+    valid = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+    valid = valid if valid[0].isalpha() else f"user_{valid}"
+    return next(n for n in (valid, *(f"{valid}_{i}" for i in count(2))) if n not in taken)

@@ -1,0 +1,187 @@
+"""What becomes of the sections `simulation` and `floorplan` of the published Fleet2D."""
+
+import os
+from contextlib import suppress
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import PydanticCustomError
+
+from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.problems import shown
+from fleet2d.scenario.document import Keys
+from fleet2d.scenario.published.reader import Reader, tidy
+from fleet2d.units import format_duration, parse_duration
+
+_NOTHING_STORED = {
+    "trajectories": "off",
+    **dict.fromkeys(("key_frames", "observations", "events", "outputs"), False),
+}
+_SIMULATION: Keys = ("simulation",)
+_PLAN: Keys = ("floorplan", "he")
+
+
+def read_step(reader: Reader) -> timedelta:
+    """Return the length of a step."""
+    keys = (*_SIMULATION, "delta")
+    step = reader.duration(keys)
+    if step is None:
+        reader.remark(keys, "missing; the step is 1 s")
+        return timedelta(seconds=1)
+    if not step:
+        raise reader.wrong(keys, "found 0; a step longer than 0 is wanted")
+    return step
+
+
+def convert_simulation(reader: Reader, step: timedelta) -> dict[str, Any]:
+    """Return the section `simulation`: when, how long, how fast, from which seed."""
+    duration_keys = (*_SIMULATION, "duration")
+    duration = reader.duration(duration_keys)
+    if duration is None:
+        raise reader.wrong(duration_keys, "missing; without it nobody knows how long to run")
+    if duration < step:
+        raise reader.wrong(
+            duration_keys,
+            f"{format_duration(duration)} is shorter than one step, delta: {format_duration(step)}",
+        )
+    if duration % step:
+        reader.remark(
+            duration_keys,
+            f"{format_duration(duration)} is no multiple of delta, {format_duration(step)}: there,"
+            " a run went one step beyond it; here it ends with the last full step within it",
+        )
+    result: dict[str, Any] = {"start": _start(reader), "duration": format_duration(duration)}
+    if result["start"] is None:
+        del result["start"]
+    seed = reader.integer((*_SIMULATION, "seed"), least=0)
+    if seed is not None:
+        reader.remark(
+            (*_SIMULATION, "seed"),
+            "the same seed draws other numbers here: the walks are of the same kind, not the same",
+        )
+    speedup = reader.number((*_SIMULATION, "speedup"), above=0)
+    if speedup is not None:
+        reader.remark(
+            (*_SIMULATION, "speedup"),
+            "kept to in full here; there, each step slept for its share of it on top of computing",
+        )
+    _windows(reader)
+    return result | {"step": format_duration(step), "seed": seed, "speedup": speedup}
+
+
+def _start(reader: Reader) -> datetime | None:
+    keys = (*_SIMULATION, "start_ts")
+    value = reader.get(keys)
+    if value is None:
+        reader.remark(keys, "missing; the run starts on 2026-01-05, a Monday, at 00:00")
+        return None
+    if isinstance(value, str):
+        with suppress(ValueError):
+            value = datetime.fromisoformat(value)
+    if isinstance(value, date) and not isinstance(value, datetime):
+        value = datetime.combine(value, time())
+    if not isinstance(value, datetime):
+        raise reader.wrong(
+            keys, f"found {shown(value)}; a date and time is wanted, like 2026-01-05 08:00:00"
+        )
+    if value.tzinfo is not None:
+        reader.remark(
+            keys, "its time zone is left out: time is that of the clock on the home's wall"
+        )
+    return value.replace(tzinfo=None)
+
+
+def _windows(reader: Reader) -> None:
+    """Read what is about watching a run; nothing of it belongs in a scenario."""
+    picture: Keys = (*_SIMULATION, "visualization")
+    every = reader.get((*picture, "every_n_steps"))
+    if reader.truth((*picture, "visualize")):
+        reader.remark(
+            (*picture, "visualize"),
+            "left out: no window opens during a run; `fleet2d show RUN_DIR` draws a stored one",
+            *([(*picture, "every_n_steps")] if every else []),
+        )
+    if reader.truth((*_SIMULATION, "show_progress")) is False:
+        reader.remark((*_SIMULATION, "show_progress"), "left out: `fleet2d run --quiet` shows none")
+    if reader.get((*_SIMULATION, "fov_provider")) is not None:
+        reader.remark(
+            (*_SIMULATION, "fov_provider"),
+            "left out: there is one way of seeing here, and it is exact",
+        )
+
+
+def convert_outputs(reader: Reader, step: timedelta) -> dict[str, Any]:
+    """Return the section `artifacts`: what is stored, and how often."""
+    keys: Keys = (*_SIMULATION, "outputs")
+    for key in ("output_dir", "prefix"):
+        if reader.text((*keys, key)):
+            reader.remark(
+                (*keys, key), "left out: `fleet2d run --out DIR` says where a run is stored"
+            )
+    every = reader.integer((*keys, "every_n_steps"), least=1)
+    if reader.truth((*keys, "save")) is False:
+        reader.remark(
+            (*keys, "save"), "every table is off; a run still makes a directory with its manifest"
+        )
+        return dict(_NOTHING_STORED)
+    if every is None:
+        return {}
+    try:
+        stored = "every step" if every == 1 else format_duration(parse_duration(every * step))
+    except (PydanticCustomError, OverflowError):
+        raise reader.wrong(
+            (*keys, "every_n_steps"), "that many steps are over 1000 years"
+        ) from None
+    reader.remark(
+        (*keys, "save"),
+        f"poses are stored {stored if every == 1 else f'every {stored}'}, observations and events"
+        " in full; the published Fleet2D wrote nothing",
+        (*keys, "every_n_steps"),
+    )
+    return {"trajectories": stored}
+
+
+def convert_floorplan(reader: Reader, old: Path, new: Path) -> tuple[dict[str, Any], Path | None]:
+    """Return the floorplan section, and the plan's file if there is one."""
+    kind = reader.get(("floorplan", "type"))
+    if kind != "he":
+        raise reader.wrong(
+            ("floorplan", "type"), f"found {shown(kind)}; only he (HouseExpo) can be converted"
+        )
+    path_keys = (*_PLAN, "json_fpath")
+    written = reader.text(path_keys)
+    if written is None:
+        raise reader.wrong(path_keys, "missing; the path of a HouseExpo JSON file is wanted")
+    # Paths there count from the top of its repository, some folders above the configuration.
+    folders = dict.fromkeys([old.absolute().parent, Path.cwd(), *old.absolute().parents])
+    found = next((p.resolve() for f in folders if (p := f / written).is_file()), None)
+    if found is None:
+        reader.remark(
+            path_keys,
+            f"there is no file {written} beside {old.name}, in the folders above it or in the"
+            f" current one; kept as written, it counts from the folder of {new.name}: put the plan"
+            " there, or run with floorplan.path=PLAN.json. Where everybody starts was not checked",
+        )
+    ppm = reader.number((*_PLAN, "ppm"), above=0)
+    cell = 0.05 if ppm is None else min(max(1 / ppm, MIN_CELL_M), MAX_CELL_M)
+    reader.remark(
+        (*_PLAN, "ppm"),
+        f"{'missing; ' if ppm is None else ''}the grid's cells are {cell:.4g} m; walls and poses"
+        " are not rounded to them",
+    )
+    if reader.get((*_PLAN, "border_pad")) is not None:
+        reader.remark((*_PLAN, "border_pad"), "left out: the grid has a margin of its own")
+    path = _path_from(new.absolute().parent.resolve(), found) if found else written
+    return {"type": "houseexpo", "path": path, "cell": tidy(cell)}, found
+
+
+def _path_from(folder: Path, file: Path) -> str:
+    """Return the path of a file as seen from a folder, absolute if they share nothing."""
+    try:
+        shared = Path(os.path.commonpath([folder, file]))
+    except ValueError:  # on two drives
+        return str(file)
+    return (
+        str(file) if shared == Path(file.anchor) else Path(os.path.relpath(file, folder)).as_posix()
+    )

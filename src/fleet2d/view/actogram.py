@@ -1,0 +1,161 @@
+"""An actogram: a row per simulated day, coloured by the room that somebody is in."""
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.view.floorplan import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
+from fleet2d.view.traces import Trace
+
+DAY_US = 86_400_000_000
+BINS = 1440  # pieces of a day that have a colour each
+MARKS = 288  # pieces of a day that are marked if somebody was seen in them
+# The floor plan's colours are pale, for words are written on them; a row is a few pixels high.
+DEEPER = 1.9
+HATCH_COLOR = "#cfd2d6"
+QUIET_COLOR = "#6b7078"
+GAPS_UP_TO = 75  # days; with more, there is no space left between the rows
+# The part of a row that marks take, at its bottom.
+MARK_PART = 0.3
+
+NOT_SIMULATED = -2
+
+Rooms = NDArray[np.int16]
+
+
+def room_color(plan: FloorPlan, index: int) -> tuple[float, float, float]:
+    """Return the colour of a room in an actogram: the floor plan's, deeper."""
+    pale = to_rgb(ROOM_COLORS.get(plan.rooms[index].type, OTHER_COLOR))
+    red, green, blue = (max(0.0, 1 - DEEPER * (1 - part)) for part in pale)
+    return red, green, blue
+
+
+def rooms_by_day(trace: Trace, start: datetime, step_us: int, steps: int) -> Rooms:
+    """Return the room in each minute of each day, int16 (days, BINS); -1 away, -2 not simulated."""
+    midnight = (start - start.replace(hour=0, minute=0, second=0, microsecond=0)) // timedelta(
+        microseconds=1
+    )
+    days = -(-(midnight + steps * step_us) // DAY_US)
+    # In the middle of each minute, so that a run of a few seconds may colour none, but no run one more.
+    since = (np.arange(days * BINS) + 0.5) * (DAY_US / BINS) - midnight
+    sample = np.clip((since // trace.every_us).astype(np.int64), 0, len(trace.room) - 1)
+    rooms = np.where((since < 0) | (since >= steps * step_us), NOT_SIMULATED, trace.room[sample])
+    return rooms.reshape(days, BINS).astype(np.int16)
+
+
+def marks_by_day(seen: NDArray[np.int64], start: datetime, step_us: int, days: int) -> NDArray[Any]:
+    """Return in which pieces of each day there are steps of `seen`, bool (days, MARKS)."""
+    midnight = start.replace(hour=0, minute=0, second=0, microsecond=0)
+    elapsed = seen * step_us + (start - midnight) // timedelta(microseconds=1)
+    marks = np.zeros(days * MARKS, np.bool_)
+    marks[elapsed * MARKS // DAY_US] = True
+    return marks.reshape(days, MARKS)
+
+
+def hours_shown(rooms: Rooms) -> tuple[float, float]:
+    """Return the hours of the day to show: all, or of a run within one day those it lasts."""
+    simulated = np.flatnonzero((rooms != NOT_SIMULATED).any(axis=0))
+    if len(rooms) > 1 or len(simulated) == 0:
+        return 0.0, 24.0
+    first, last = simulated[0] * 24 / BINS, (simulated[-1] + 1) * 24 / BINS
+    if last - first > 12:
+        return 0.0, 24.0
+    return float(np.floor(first * 4) / 4), float(np.ceil(last * 4) / 4)
+
+
+def draw_actogram(
+    plan: FloorPlan, rooms: Rooms, marks: NDArray[Any], start: datetime, axes: Axes, *, dates: bool
+) -> None:
+    """Draw an actogram.
+
+    Args:
+        plan: The home, for the colours of its rooms.
+        rooms: Of `rooms_by_day`.
+        marks: Of `marks_by_day`.
+        start: When the run starts.
+        axes: Where to draw.
+        dates: Whether to write the dates beside the rows.
+    """
+    days = len(rooms)
+    table = np.ones((len(plan.rooms) + 2, 4))
+    table[:-2, :3] = [room_color(plan, index) for index in range(len(plan.rooms))]
+    table[-1, 3] = 0.0  # away: the hatching shows
+    away = Rectangle(
+        (0, 0), 24, days, facecolor="white", edgecolor=HATCH_COLOR, hatch="//////", lw=0
+    )
+    axes.add_patch(away)
+    axes.imshow(
+        table[rooms], extent=(0, 24, days, 0), aspect="auto", interpolation="nearest", zorder=1
+    )
+    _draw_marks(marks, axes)
+    if days <= GAPS_UP_TO:
+        axes.hlines(
+            np.arange(1, days), 0, 24, color="white", lw=1.1 if days <= 40 else 0.6, zorder=3
+        )
+    axes.set(xlim=hours_shown(rooms), ylim=(days, 0))
+    _label(axes, start, days, dates=dates)
+
+
+def _draw_marks(marks: NDArray[Any], axes: Axes) -> None:
+    """Draw a dark strip at the bottom of a row where somebody was seen."""
+    edges = np.diff(np.pad(marks, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    day, first = np.nonzero(edges == 1)
+    _, last = np.nonzero(edges == -1)
+    left, right = first * (24 / MARKS), last * (24 / MARKS)
+    top, bottom = day + 1 - MARK_PART, day + 1.0
+    corners = np.stack([left, top, right, top, right, bottom, left, bottom], axis=1)
+    boxes = PolyCollection(corners.reshape(-1, 4, 2), facecolors=TEXT_COLOR, lw=0, zorder=2)
+    axes.add_collection(boxes, autolim=False)
+
+
+def _label(axes: Axes, start: datetime, days: int, *, dates: bool) -> None:
+    low, high = axes.get_xlim()
+    wide = axes.get_position().width * axes.figure.get_figwidth() > 2.4  # inches
+    step = (
+        (3 if wide else 6)
+        if high - low > 12
+        else max(0.25, 2.0 ** np.ceil(np.log2((high - low) / 6)))
+    )
+    ticks = np.arange(np.ceil(low / step) * step, high + 1e-9, step)
+    words = [
+        f"{tick:g}" if step >= 1 else f"{int(tick)}:{round(tick % 1 * 60):02d}" for tick in ticks
+    ]
+    axes.set_xticks(ticks, words)
+    axes.vlines(
+        ticks[(ticks > low) & (ticks < high)], 0, days, color="white", lw=0.5, alpha=0.6, zorder=2.5
+    )
+    axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    rows, names = _dated_rows(start, days)
+    axes.set_yticks(rows, names if dates else [""] * len(rows))
+
+
+def _dated_rows(start: datetime, days: int) -> tuple[list[float], list[str]]:
+    """Return where dates stand: at Mondays, or every day, or the first of each month."""
+    dates = [start.date() + timedelta(days=day) for day in range(days)]
+    if days <= 10:
+        chosen = list(range(days))
+    elif days <= GAPS_UP_TO:
+        chosen = [day for day in range(days) if dates[day].weekday() == 0]
+    else:
+        chosen = [day for day in range(days) if dates[day].day == 1]
+        chosen = chosen[:: 1 + len(chosen) // 24]
+    months = days > GAPS_UP_TO
+    names = []
+    for day in chosen:
+        date = dates[day]
+        month = (
+            f"{date:%b}"
+            if not (months and (date.month == 1 or day == chosen[0]))
+            else f"{date:%b %Y}"
+        )
+        names.append(month if months else f"{date:%a} {date.day} {date:%b}")
+    return [day + 0.5 for day in chosen], names

@@ -1,0 +1,217 @@
+"""A home being lived in: over its floor plan, where bodies were, how they went, what robots saw."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Circle, Polygon
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.sight.region import VisibleRegion
+from fleet2d.view.traces import Trace
+
+BLUR_M = 0.14  # a body is a soft spot of about its own size
+SOLID = 0.78  # opacity where somebody was longest
+FAINT = 0.02
+CANDIDATES = 60  # moments looked at to find one that shows what a robot sees
+SPOTS = 1500
+CLEAR_M = 0.5  # twice the space between a name and a robot
+FAR_ENOUGH_M = 2.0
+
+F64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class View:
+    """What a camera sees at one moment.
+
+    Attributes:
+        robot: Whose camera.
+        step: When.
+        xy: Where the robot is [m].
+        heading: Where it looks [rad].
+        outline: Pieces of the field of view, each float64 (n, 2) [m].
+        seen: Where the users are that it sees, float64 (m, 2) [m].
+    """
+
+    robot: Trace
+    step: int
+    xy: F64
+    heading: float
+    outline: list[F64]
+    seen: F64
+
+
+def draw_presence(plan: FloorPlan, trace: Trace, axes: Axes) -> None:
+    """Draw where a body spent its time, the more opaque the longer."""
+    at_home = trace.room >= 0
+    lattice = plan.lattice
+    cells = (trace.xy[at_home] - lattice.origin) / lattice.cell
+    column, row = np.floor(cells).astype(np.int64).T
+    shape = (lattice.rows, lattice.columns)
+    flat = np.clip(row, 0, shape[0] - 1) * shape[1] + np.clip(column, 0, shape[1] - 1)
+    time = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape).astype(np.float64)
+    time = _blurred(time, BLUR_M / lattice.cell) * plan.free
+    if time.max() <= 0:
+        return
+    # By the fourth root or so: an hour at the table shows beside a night in bed.
+    share = (time / time.max()) ** 0.4
+    image = np.empty((*shape, 4))
+    image[..., :3] = to_rgb(trace.color)
+    image[..., 3] = SOLID * np.clip((share - FAINT) / (1 - FAINT), 0, 1)
+    low, high = np.array(lattice.origin), np.array(shape[::-1]) * lattice.cell
+    extent = (low[0], low[0] + high[0], low[1], low[1] + high[1])
+    axes.imshow(image, extent=extent, origin="lower", interpolation="bilinear", zorder=3)
+
+
+def draw_ways(trace: Trace, axes: Axes) -> None:
+    """Draw the ways that a body went as thin lines."""
+    count = max(1, len(trace.legs))
+    alpha = (
+        float(np.clip(40 / count, 0.1, 0.3))
+        if not trace.robot
+        else float(np.clip(60 / count, 0.12, 0.6))
+    )
+    width, dashes = (0.9, (0, (5, 2))) if trace.robot else (0.9, "solid")
+    lines = LineCollection(
+        list(trace.legs), colors=trace.color, lw=width, ls=dashes, alpha=alpha, zorder=2.5
+    )
+    axes.add_collection(lines, autolim=False)
+
+
+def draw_sightings(spots: F64, color: str, axes: Axes) -> None:
+    """Draw where users were when robots saw them, one ring per place."""
+    places = np.unique(np.rint(spots * 10), axis=0) / 10
+    places = places[:: 1 + len(places) // SPOTS]
+    axes.scatter(
+        *places.T, s=7, facecolors="none", edgecolors=color, linewidths=0.45, alpha=0.6, zorder=3.5
+    )
+
+
+def draw_view(view: View, radius: float, axes: Axes) -> None:
+    """Draw what a camera sees: its field of view, the robot, and lines to whom it sees."""
+    color = view.robot.color
+    for outline in view.outline:
+        axes.add_patch(
+            Polygon(outline, facecolor="#ffd23f", alpha=0.38, edgecolor="none", zorder=2.2)
+        )
+        axes.add_patch(Polygon(outline, fill=False, edgecolor="#b98900", lw=0.7, zorder=3.2))
+    for x, y in view.seen.tolist():
+        axes.plot([view.xy[0], x], [view.xy[1], y], color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=4)
+        axes.plot(x, y, "o", ms=5, mfc="white", mec=color, mew=1.1, zorder=4.2)
+    x, y = view.xy.tolist()
+    size = max(radius, 0.13)
+    axes.add_patch(Circle((x, y), size, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3))
+    nose = [[x, x + size * np.cos(view.heading)], [y, y + size * np.sin(view.heading)]]
+    axes.plot(*nose, color="white", lw=1.1, zorder=4.4, solid_capstyle="butt")
+
+
+def clear_names(plan: FloorPlan, views: Sequence[View], axes: Axes) -> None:
+    """Keep the rooms' names legible: on a soft ground, and moved off the robots and whom they see."""
+    marks = np.array([xy for view in views for xy in (view.xy, *view.seen)]).reshape(-1, 2)
+    canvas: Any = axes.figure.canvas
+    pixels = axes.transData.inverted()
+    for text in axes.texts:
+        text.set_path_effects([withStroke(linewidth=2.0, foreground="#ffffffb0")])
+        box = text.get_window_extent(canvas.get_renderer())
+        (x0, y0), (x1, y1) = pixels.transform(box.get_points()).tolist()
+        x, y = text.get_position()
+        home = plan.room_at(x, y)
+        if home is None or not len(marks):
+            continue
+        for shift in (0.0, *(sign * 0.1 * k for k in range(1, 25) for sign in (-1, 1))):
+            ends = (y0 + shift, y1 + shift)
+            inside = all(plan.room_at(at, end) is home for at in (x0, x, x1) for end in ends)
+            near = (abs(marks - [(x0 + x1) / 2, sum(ends) / 2]) * 2).T
+            covered = (near[0] < x1 - x0 + CLEAR_M) & (near[1] < y1 - y0 + CLEAR_M)
+            if (inside or shift == 0) and not covered.any():
+                text.set_position((x, y + shift))
+                break
+
+
+def telling_view(
+    plan: FloorPlan, robot: Trace, camera: dict[str, Any], seen: dict[int, F64]
+) -> View | None:
+    """Return a moment that shows what a robot sees, and what walls hide from it.
+
+    Of moments at which it sees somebody if there are any, else of any, the one at which it sees the
+    largest area while a wall is in the way.
+
+    Args:
+        plan: The home.
+        robot: The robot.
+        camera: Its camera, as the scenario says.
+        seen: Where users were that it saw, by step.
+    """
+    index = np.flatnonzero(np.isin(robot.step, np.fromiter(seen, np.int64, len(seen))))
+    if len(index) == 0:
+        index = np.arange(len(robot.step))
+    index = index[:: 1 + len(index) // CANDIDATES]
+    best, found = -1.0, None
+    near, far = camera["range"]
+    whole = (far**2 - near**2) * np.deg2rad(camera["angle_deg"]) / 2
+    for i in index.tolist():
+        if robot.room[i] < 0:
+            continue
+        outline = field_of_view(plan, robot.xy[i], float(robot.heading[i]), camera)
+        area = outline.area
+        step = int(robot.step[i])
+        where = seen.get(step, np.zeros((0, 2)))
+        score = area if area < 0.97 * whole else 0.3 * area
+        if len(where):
+            distance = float(np.hypot(*(where - robot.xy[i]).T).max())
+            score *= min(1.0, distance / FAR_ENOUGH_M)
+        if score > best:
+            best = score
+            parts = [shapely.get_coordinates(p.exterior) for p in shapely.get_parts(outline)]
+            found = View(robot, step, robot.xy[i], float(robot.heading[i]), parts, where)
+    return found
+
+
+def field_of_view(
+    plan: FloorPlan, xy: F64, heading: float, camera: dict[str, Any]
+) -> shapely.Geometry:
+    """Return what a camera sees from a place [m]: visible, in range, and within its angle."""
+    try:
+        visible = shapely.Polygon(VisibleRegion(plan, *xy.tolist()).polygon())
+    except PlacementError:
+        return shapely.Polygon()
+    near, far = camera["range"]
+    half = np.deg2rad(camera["angle_deg"]) / 2
+    angles = np.linspace(heading - half, heading + half, max(3, round(half * 2 / pi * 180)))
+    arc = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    inner = [xy] if near == 0 else (xy + near * arc[::-1]).tolist()
+    whole_turn = camera["angle_deg"] >= 360
+    if whole_turn:
+        sector = shapely.Point(xy).buffer(far).difference(shapely.Point(xy).buffer(near))
+    else:
+        sector = shapely.Polygon([*(xy + far * arc).tolist(), *inner])
+    cut = shapely.intersection(shapely.make_valid(visible), shapely.make_valid(sector))
+    polygons = [p for p in shapely.get_parts(cut) if p.geom_type == "Polygon"]
+    return shapely.MultiPolygon(polygons)
+
+
+def _blurred(image: F64, sigma: float) -> F64:
+    """Return an image blurred by a bell curve of standard deviation `sigma` [cells]."""
+    reach = max(1, round(3 * sigma))
+    at = np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (at / max(sigma, 1e-6)) ** 2)
+    bell /= bell.sum()
+    blurred = image
+    for axis in (0, 1):
+        padding = [(reach, reach) if a == axis else (0, 0) for a in (0, 1)]
+        padded = np.pad(blurred, padding)
+        size = image.shape[axis]
+        slices = [np.take(padded, range(k, k + size), axis=axis) for k in range(len(at))]
+        blurred = np.sum([w * s for w, s in zip(bell, slices, strict=True)], axis=0)
+    return blurred
+

@@ -1,0 +1,105 @@
+"""A page to write on in inches: words, and the chips that a legend is made of."""
+
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle, Wedge
+from matplotlib.text import Text
+
+from fleet2d.view.floorplan import TEXT_COLOR
+
+CHIP_IN = 0.15
+LINE_IN = 0.215
+QUIET_COLOR = "#6b7078"
+VIEW_COLOR = "#ffd23f"
+VIEW_EDGE = "#b98900"
+HATCH_COLOR = "#cfd2d6"
+
+
+class Chip(NamedTuple):
+    """An entry of a legend: a small picture, and what it stands for."""
+
+    kind: Literal["room", "away", "seen", "spot", "way", "ring", "view", "words"]
+    color: Any
+    words: str
+
+
+class Page:
+    """The whole of a figure as one layer, in inches from its lower left corner."""
+
+    def __init__(self, figure: Figure) -> None:
+        """Lay the page over the figure."""
+        self._figure = figure
+        self._canvas = FigureCanvasAgg(figure)
+        width, height = figure.get_size_inches().tolist()
+        self.axes: Axes = figure.add_axes((0, 0, 1, 1), zorder=10)
+        self.axes.set(xlim=(0, width), ylim=(0, height))
+        self.axes.set_axis_off()
+
+    def write(self, x: float, y: float, words: str, size: float, **style: Any) -> float:
+        """Write a line, y at its baseline; return where it ends."""
+        style = {"color": TEXT_COLOR, "va": "baseline", **style}
+        text = self.axes.text(x, y, words, fontsize=size, **style)
+        return x + self.width(text)
+
+    def width(self, text: Text) -> float:
+        """Return how wide a text is [in]."""
+        extent = text.get_window_extent(self._canvas.get_renderer())
+        return float(extent.width) / float(self._figure.dpi)
+
+    def fit(self, words: str, size: float, width: float) -> str:
+        """Return words cut so that they are at most `width` inches wide."""
+        text = self.axes.text(0, 0, words, fontsize=size)
+        whole = words
+        while self.width(text) > width and len(words) > 1:
+            words = words[:-1]
+            text.set_text(words.rstrip() + "…")
+        text.remove()
+        return words if words == whole else words.rstrip() + "…"
+
+    def legend(self, x: float, y: float, width: float, chips: Sequence[Chip], size: float) -> float:
+        """Lay out chips in lines from (x, y) down; return the y below the last line."""
+        at = x
+        for chip in chips:
+            label = self.axes.text(0, y, chip.words, fontsize=size, color=QUIET_COLOR, va="center")
+            picture = 0.0 if chip.kind == "words" else CHIP_IN * (1.6 if chip.kind == "way" else 1.0) + 0.06
+            needed = picture + self.width(label)
+            if at > x and at + needed > x + width:
+                at, y = x, y - LINE_IN
+            if chip.kind != "words":
+                self._picture(chip, at, y)
+            label.set_position((at + picture, y - 0.005))
+            at += needed + 0.17
+        return y - LINE_IN
+
+    def _picture(self, chip: Chip, x: float, y: float) -> None:
+        """Draw the picture of a chip, its left middle at (x, y)."""
+        side, draw = CHIP_IN, self.axes
+        low = y - side / 2
+        middle = (x + side / 2, y)
+        if chip.kind in ("room", "seen"):
+            draw.add_patch(Rectangle((x, low), side, side, facecolor=chip.color, lw=0))
+        if chip.kind == "seen":
+            draw.add_patch(Rectangle((x, low), side, 0.3 * side, facecolor=TEXT_COLOR, lw=0))
+        if chip.kind == "away":
+            style = {"facecolor": "white", "edgecolor": HATCH_COLOR, "hatch": "////////", "lw": 0.5}
+            draw.add_patch(Rectangle((x, low), side, side, **style))
+        if chip.kind == "spot":
+            for part, alpha in ((0.62, 0.2), (0.42, 0.35), (0.24, 0.8)):
+                draw.add_patch(Circle(middle, part * side, facecolor=chip.color, alpha=alpha, lw=0))
+        if chip.kind in ("way"):
+            dashes = "solid" if chip.kind == "way" else (0, (4, 1.6))
+            line = [np.array([[x, y], [x + 1.6 * side, y]])]
+            draw.add_collection(LineCollection(line, colors=chip.color, lw=1.3), autolim=False)
+        if chip.kind == "ring":
+            draw.add_patch(Circle(middle, 0.26 * side, fill=False, edgecolor=chip.color, lw=0.7))
+        if chip.kind == "view":
+            corner = (x + 0.1 * side, y)
+            style = {"facecolor": VIEW_COLOR, "edgecolor": VIEW_EDGE, "lw": 0.7, "alpha": 0.8}
+            draw.add_patch(Wedge(corner, 0.9 * side, -40, 40, **style))
+

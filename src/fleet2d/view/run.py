@@ -1,0 +1,312 @@
+"""Draw a stored run: the home being lived in, and who was where in every hour of every day."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import InputError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.view.actogram import (
+    NOT_SIMULATED,
+    draw_actogram,
+    marks_by_day,
+    room_color,
+    rooms_by_day,
+)
+from fleet2d.view.floorplan import ACCENT_COLOR, DPI, drawing_style, floorplan_axes, save_figure
+from fleet2d.view.life import (
+    View,
+    clear_names,
+    draw_presence,
+    draw_sightings,
+    draw_view,
+    draw_ways,
+    telling_view,
+)
+from fleet2d.view.page import LINE_IN, QUIET_COLOR, Chip, Page
+from fleet2d.view.traces import Trace, trace_of
+
+SHOWN = 4  # users that have an actogram, and robots that are drawn
+
+# Inches.
+WIDTH = 10.67
+EDGE = 0.32
+HEADER = 0.82
+FOOTER = 0.9
+GAP = 0.3
+DATES = 0.78  # beside the first actogram
+CAPTION = 0.42  # above each actogram
+ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 5.0, 3: 5.6, 4: 6.1}
+BODY = (3.4, 6.6)
+ROW_MOST = 0.55
+
+SMALL = 7.5
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The observations of the users that are shown."""
+
+    step: NDArray[np.int64]
+    robot: NDArray[Any]
+    user: NDArray[Any]
+    xy: NDArray[np.float64]
+
+
+def draw_run(run: Run, path: Path) -> None:
+    """Draw a run to a PNG or SVG file; the same run gives the same bytes.
+
+    Left is the floor plan with where bodies were, the ways they went, and what robots saw; right an
+    actogram per user, of at most four: a row per day, coloured by room.
+
+    Args:
+        run: A stored run, or one in memory; whole or interrupted.
+        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
+
+    Raises:
+        InputError: The name ends otherwise, the file can't be written, or the run has no floor plan.
+
+    Example:
+        >>> import fleet2d, tempfile
+        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     draw_run(run, Path(folder) / "picture.png")
+    """
+    ending = path.suffix.lower()
+    if ending not in (".png", ".svg"):
+        raise InputError(
+            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
+        )
+    with drawing_style():
+        save_figure(_Picture(run).figure, path)
+
+
+class _Picture:
+    """The picture of a run: what is gathered, then drawn part by part."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.plan = run, run.plan
+        manifest = run.manifest
+        self.start = datetime.fromisoformat(manifest["start"])
+        self.step_us, self.steps = manifest["step_us"], manifest["steps"]
+        self.notes: list[str] = []
+        self.users = self._traces("users", robot=False)
+        self.robots = self._traces("robots", robot=True)
+        self.seen = _observations(run, [user.name for user in self.users])
+        self.views = list(self._views())
+        self.panels = self.users or self.robots
+        self._lay_out()
+        self._header()
+        self._life()
+        self._actograms()
+        self._footer()
+
+    def _traces(self, bucket: str, *, robot: bool) -> list[Trace]:
+        names = self.run.manifest["entities"][bucket]
+        if len(names) > SHOWN:
+            self.notes.append(f"{SHOWN} of {len(names)} {bucket} are shown")
+        if not self.steps:
+            return []
+        found = []
+        for number, name in enumerate(names[:SHOWN]):
+            trace = trace_of(self.run, self.plan, name, number, robot=robot)
+            if trace is not None:
+                found.append(trace)
+                self.notes += [f"{name}: {trace.note}"] if trace.note else []
+        if names and not found:
+            self.notes.append(f"where {bucket} were is not stored")
+        return found
+
+    def _views(self) -> Iterator[View]:
+        for robot in self.robots:
+            camera = self._body("robots", robot.name).get("camera")
+            if camera is None:
+                continue
+            mine = self.seen.robot == robot.name
+            where: dict[int, Any] = {}
+            shown = mine & np.isin(self.seen.step, robot.step)
+            for step, xy in zip(self.seen.step[shown].tolist(), self.seen.xy[shown], strict=True):
+                where[step] = np.vstack([where[step], xy]) if step in where else xy[None]
+            view = telling_view(self.plan, robot, camera, where)
+            if view is not None:
+                yield view
+
+    def _body(self, bucket: str, name: str) -> dict[str, Any]:
+        body = self.run.manifest["scenario"].get(bucket, {}).get(name, {})
+        return dict(body)
+
+    # Parts of the picture
+
+    def _lay_out(self) -> None:
+        """Choose the size of everything, and open the figure."""
+        x0, y0, x1, y1 = self.plan.bounds
+        span = max(x1 - x0, y1 - y0)
+        self.limits = (x0 - 0.03 * span, x1 + 0.03 * span, y0 - 0.085 * span, y1 + 0.03 * span)
+        left, right, low, high = self.limits
+        self.right = ACTOGRAMS[len(self.panels)]
+        self.left = WIDTH - 2 * EDGE - self.right - (GAP if self.right else 0.0)
+        self.body = float(np.clip(self.left * (high - low) / (right - left), *BODY))
+        self.foot = FOOTER + LINE_IN * (len(self.notes) > 0)
+        self.height = HEADER + self.body + self.foot
+        self.figure = Figure(figsize=(WIDTH, self.height), dpi=DPI, facecolor="white")
+        self.page = Page(self.figure)
+
+    def _axes(self, x: float, y: float, width: float, height: float) -> Any:
+        """Open axes at a place [in]."""
+        box = (x / WIDTH, y / self.height, width / WIDTH, height / self.height)
+        return self.figure.add_axes(box)
+
+    def _header(self) -> None:
+        scenario = self.run.manifest["scenario"]
+        top = self.height
+        name = scenario.get("name") or "run"
+        lasted = _length(self.steps * self.step_us)
+        x = self.page.write(EDGE, top - 0.42, self.page.fit(name, 16, 4.0), 16, weight="bold")
+        words = self.page.fit(f"{lasted} in {self.plan.name}", 16, WIDTH - EDGE - x - 0.15)
+        self.page.write(x + 0.12, top - 0.42, words, 16, color=QUIET_COLOR)
+        end = self.start + timedelta(microseconds=self.steps * self.step_us)
+        digest = self.run.digest
+        facts = [
+            f"{_date(self.start)} to {_date(end)}",
+            f"step {self.step_us / 1e6:g} s",
+            f"seed {self.run.manifest['seed']}",
+            f"digest {digest[:12]}" if digest else "no digest",
+        ]
+        x = self.page.write(EDGE, top - 0.66, "   ·   ".join(facts), 8.5, color=QUIET_COLOR)
+        if self.run.status != "complete":
+            self.page.write(x + 0.2, top - 0.66, self.run.status, 8.5, color=ACCENT_COLOR, weight="bold")
+
+    def _life(self) -> None:
+        axes = self._axes(EDGE, self.foot, self.left, self.body)
+        axes.set_anchor("C")
+        floorplan_axes(self.plan, axes, title=False)
+        left, right, low, high = self.limits
+        axes.set(xlim=(left, right), ylim=(low, high))
+        clear_names(self.plan, self.views, axes)
+        for trace in (*self.robots, *self.users):
+            draw_ways(trace, axes)
+        for trace in self.users:
+            draw_presence(self.plan, trace, axes)
+        for robot in self.robots:
+            draw_sightings(self.seen.xy[self.seen.robot == robot.name], robot.color, axes)
+        for view in self.views:
+            draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
+        self.page.legend(EDGE, self.foot - 0.13, self.left, list(self._life_chips()), SMALL)
+
+    def _life_chips(self) -> Iterator[Chip]:
+        for user in self.users:
+            yield Chip("spot", user.color, user.name)
+        ways = [user for user in self.users if len(user.legs)]
+        if ways:
+            yield Chip("way", ways[0].color, "ways walked")
+        for robot in self.robots:
+            yield Chip("way", robot.color, f"{robot.name}{self._covers(robot.name)}")
+        if len(self.seen.step):
+            yield Chip("ring", self.robots[0].color if self.robots else QUIET_COLOR, "seen here by a robot")
+        for view in self.views:
+            when = self.start + timedelta(microseconds=view.step * self.step_us)
+            yield Chip("view", None, f"what {view.robot.name} sees, {_date(when)}")
+
+    def _actograms(self) -> None:
+        count = len(self.panels)
+        if not count:
+            return
+        days = [rooms_by_day(trace, self.start, self.step_us, self.steps) for trace in self.panels]
+        x = WIDTH - EDGE - self.right + DATES
+        gap = 0.2
+        width = (self.right - DATES - gap * (count - 1)) / count
+        height = min(self.body - CAPTION - 0.2, ROW_MOST * len(days[0]))
+        bottom = self.foot + self.body - CAPTION - height
+        for number, (trace, rooms) in enumerate(zip(self.panels, days, strict=True)):
+            at = x + number * (width + gap)
+            axes = self._axes(at, bottom, width, height)
+            steps = self.seen.step[self.seen.user == trace.name]
+            marks = marks_by_day(steps, self.start, self.step_us, len(rooms))
+            draw_actogram(self.plan, rooms, marks, self.start, axes, dates=number == 0)
+            self._caption(trace, rooms, at, bottom + height, width)
+        below = bottom - 0.42
+        self.page.legend(x, below, self.right - DATES, list(self._room_chips(days)), SMALL)
+
+    def _caption(self, trace: Trace, rooms: NDArray[Any], x: float, y: float, width: float) -> None:
+        name = self.page.fit(trace.name, 9.5, width)
+        self.page.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
+        home = np.count_nonzero(rooms >= 0) / max(1, np.count_nonzero(rooms != NOT_SIMULATED))
+        facts = [] if trace.robot else [f"at home {_percent(home)}"]
+        seen = self._metric("sightings").get(trace.name)
+        if seen is not None:
+            facts.append(f"seen {_percent(seen)} of that")
+        words = " · ".join(facts) + self._covers(trace.name)
+        words = words.removeprefix(" · ")
+        self.page.write(x, y + 0.09, self.page.fit(words, SMALL, width), SMALL, color=QUIET_COLOR)
+
+    def _room_chips(self, days: list[NDArray[Any]]) -> Iterator[Chip]:
+        here = np.unique(np.concatenate([rooms.ravel() for rooms in days]))
+        told = set()
+        for index in here[here >= 0].tolist():
+            kind = self.plan.rooms[index].type
+            if kind not in told:
+                told.add(kind)
+                yield Chip("room", room_color(self.plan, index), kind.replace("_", " "))
+        if (here == -1).any():
+            yield Chip("away", None, "away")
+        if np.isin([user.name for user in self.users], self.seen.user).any():
+            yield Chip("seen", "#dfe1e4", "seen by a robot")
+
+    def _footer(self) -> None:
+        words = "   ·   ".join(dict.fromkeys(self.notes))
+        self.page.write(EDGE, 0.16, self.page.fit(words, SMALL, WIDTH - 2 * EDGE), SMALL, color=ACCENT_COLOR)
+
+    # Numbers
+
+    def _metric(self, kind: str) -> Mapping[str, Any]:
+        """Return the result of the first metric of a type."""
+        configured = self.run.manifest["scenario"].get("metrics", {})
+        for name, result in self.run.metrics.items():
+            if configured.get(name, {}).get("type") == kind and isinstance(result, dict):
+                return result
+        return {}
+
+    def _covers(self, name: str) -> str:
+        metres = self._metric("distance").get(name)
+        if metres is None:
+            return ""
+        return f" · {metres / 1000:.1f} km a day" if metres >= 1000 else f" · {metres:.0f} m a day"
+
+
+def _observations(run: Run, users: list[str]) -> Seen:
+    """Return the observations of some users."""
+    if "observations" not in run.tables:
+        none = np.zeros(0, np.int64)
+        return Seen(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
+    table = run.tables["observations"]
+    words = {
+        name: table[name].combine_chunks().cast("string").to_numpy(zero_copy_only=False)
+        for name in ("robot", "user")
+    }
+    mine = np.isin(words["user"].astype(str), users)
+    xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
+    step = table["step"].to_numpy()
+    return Seen(step[mine], words["robot"][mine], words["user"][mine], xy[mine])
+
+
+def _date(when: datetime) -> str:
+    return f"{when:%a} {when.day} {when:%b %Y %H:%M}"
+
+
+def _length(us: int) -> str:
+    for unit, size in (("day", 86_400_000_000), ("hour", 3_600_000_000), ("minute", 60_000_000)):
+        if us >= size:
+            count = us / size
+            return f"{count:.3g} {unit}{'s' * (count != 1)}"
+    return f"{us / 1e6:g} s"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if share < 0.0995 else f"{100 * share:.0f} %"

@@ -1,0 +1,192 @@
+"""The path rebuilt from key frames is the path that was simulated, at every step and exactly."""
+
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d import Behavior, Plan, Run, Simulation, Situation
+from fleet2d.errors import ArtifactError
+
+TWO_ROOMS = {"order": "random", "dwell": "20 s", "rooms": ["living_room", "kitchen", "hallway"]}
+COMMUTER: dict[str, Any] = {
+    "type": "schedule",
+    "days": [
+        {
+            "items": [
+                {"at": "00:00:07", "place": "kitchen", "dwell": "3 min"},
+                {"at": "00:10", "away": True, "activity": "work"},
+                {"at": "00:19:59.3", "place": "living_room"},
+                {"at": "00:30", "away": True},
+                {"at": "00:30:30", "place": "bathroom", "dwell": "1 min"},
+                {"at": "11:58", "away": True},
+                {"at": "12:05", "place": "kitchen", "dwell": "2 min"},
+                {"at": "12:15", "place": "bedroom"},
+                {"at": "23:50", "away": True},
+            ]
+        }
+    ],
+}
+
+
+class Greeter(Behavior):
+    """Go from room to room; turn to whoever comes into view, and stay while somebody is."""
+
+    rooms: tuple[str, ...] = ("living_room", "kitchen", "bathroom", "office")
+
+    def start(self, actor: Any) -> None:
+        self.round = 0
+
+    def decide(self, now: Situation) -> Plan:
+        if any(event.event == "user_seen" for event in now.events):
+            event = now.events[-1]
+            return now.plan().go_to((event.x, event.y)).interrupt_on("user_lost")
+        self.round += 1
+        plan = now.plan().interrupt_on("user_seen", "user_lost")
+        for ahead in range(3):
+            plan.go_to(self.rooms[(self.round + ahead) % len(self.rooms)]).stay(timedelta(seconds=9))
+        return plan
+
+
+class Startled(Behavior):
+    """Wander at random, and stand still for a moment when somebody comes into view."""
+
+    def start(self, actor: Any) -> None:
+        self.walk = actor.entity.behaviors[1].model_copy()
+        self.walk.start(actor)
+
+    def decide(self, now: Situation) -> Plan:
+        if now.events:
+            return now.plan().turn_by(0.4).stay(timedelta(seconds=4.5))
+        return now.plan().meander(self.walk.rule).interrupt_on("user_seen")
+
+
+GREETER = {"behaviors": [{"type": f"{__name__}:Greeter"}]}
+STARTLED = {"behaviors": [{"type": f"{__name__}:Startled"}, {"type": "meander"}]}
+BODIES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "schedule with away": ({"ana": COMMUTER}, {}),
+    "schedule, seen on patrol": ({"ana": COMMUTER}, {"astro": {"type": "patrol", **TWO_ROOMS}}),
+    "patrol without looking around": (
+        {},
+        {"astro": {"type": "patrol", "dwell": "0 s", "look_around": False}},
+    ),
+    "meander": ({"ana": {"type": "meander"}}, {"astro": {"type": "meander"}}),
+    "meander in two bodies of a kind": (
+        {"ana": {"type": "meander"}, "bo": {"type": "meander", "turn_std_deg": 60}},
+        {},
+    ),
+    "interrupted by sight": ({"ana": {"type": "meander"}, "bo": COMMUTER}, {"astro": GREETER}),
+    "random walk interrupted": ({"ana": {"type": "meander"}}, {"astro": STARTLED}),
+    "nothing to do": ({"ana": {"behaviors": []}}, {"astro": {"behaviors": [], "camera": None}}),
+}
+MOMENTS = {"midnight": "2026-01-05", "midday": "2026-01-05T11:57:03", "evening": "2026-01-05T23:44"}
+
+
+def run_of(bodies: str, start: str = "midnight", step: str = "1 s", *more: str) -> Run:
+    """Run two hours and a bit, every step of it stored."""
+    users, robots = BODIES[bodies]
+    scenario = {
+        "simulation": {"start": MOMENTS[start], "duration": "2.2 h", "step": step, "seed": 11},
+        "floorplan": {"type": "bundled"},
+        "users": users,
+        "robots": robots,
+        "artifacts": {"trajectories": "every step"},
+    }
+    return fleet2d.run(scenario, *more)
+
+
+def assert_rebuilt(run: Run, stride: int = 1) -> None:
+    """Compare the rebuilt path of every body with the stored poses."""
+    stored = run.pandas("trajectories")
+    step_us = run.manifest["step_us"]
+    names = [*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]]
+    for name in names:
+        truth = stored[stored["entity"] == name]
+        truth = truth[truth["step"] % stride == 0]
+        path = run.path(name, every=timedelta(microseconds=stride * step_us))
+        at_home = ~path.away
+        assert truth["step"].tolist() == path.step.tolist()
+        assert truth["time"].tolist() == path.time.tolist() or (
+            truth["time"].to_numpy() == path.time
+        ).all()
+        np.testing.assert_array_equal(truth["away"], path.away, name)
+        for column in ("x", "y"):
+            found = getattr(path, column)
+            np.testing.assert_array_equal(truth[column].to_numpy()[at_home], found[at_home], name)
+        np.testing.assert_array_equal(truth["heading"], path.heading, name)
+        np.testing.assert_array_equal(truth["room"].cat.codes, path.room, name)
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("step", ["1 s", "0.5 s", "7 s"])
+def test_every_step_is_rebuilt(bodies: str, step: str) -> None:
+    assert_rebuilt(run_of(bodies, step=step))
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("start", ["midday", "evening"])
+def test_run_that_starts_within_a_day_is_rebuilt(bodies: str, start: str) -> None:
+    assert_rebuilt(run_of(bodies, start))
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("stride", [7, 60, 10_000])
+def test_every_so_many_steps_is_rebuilt(bodies: str, stride: int) -> None:
+    assert_rebuilt(run_of(bodies), stride)
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("span", [1, 13])
+def test_spans_do_not_show(bodies: str, span: int) -> None:
+    run = run_of(bodies, "midnight", "1 s", f"simulation.max_span={span}")
+    assert_rebuilt(run)
+    assert run_of(bodies).digest == run.digest
+
+
+def test_interruptions_happened_and_were_recorded() -> None:
+    run = run_of("interrupted by sight")
+    keys = run.pandas("key_frames")
+    assert (keys["kind"] == "planned").sum() > 10
+    walks = run_of("random walk interrupted").pandas("key_frames")
+    assert {"walk", "track"} <= set(walks["kind"])
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("steps", [1, 1234])
+def test_run_that_was_cut_short_is_rebuilt(bodies: str, steps: int) -> None:
+    users, robots = BODIES[bodies]
+    simulation = Simulation(
+        {
+            "simulation": {"start": MOMENTS["midday"], "duration": "2 h", "seed": 3},
+            "floorplan": {"type": "bundled"},
+            "users": users,
+            "robots": robots,
+            "artifacts": {"trajectories": "every step"},
+        }
+    )
+    simulation.advance(steps)
+    run = simulation.finish()
+    assert steps == run.manifest["steps"]
+    assert_rebuilt(run)
+
+
+@pytest.mark.parametrize(
+    ("entity", "every", "told"),
+    [
+        ("bob", 60.0, "there is no 'bob'"),
+        ("ana", 0.5, "multiple of the step"),
+        ("ana", 0.0, "multiple of the step"),
+    ],
+)
+def test_what_can_not_be_rebuilt_is_told(entity: str, every: float, told: str) -> None:
+    run = run_of("schedule with away")
+    with pytest.raises(ArtifactError, match=told):
+        run.path(entity, every=timedelta(seconds=every))
+
+
+def test_run_without_key_frames_says_so() -> None:
+    run = run_of("schedule with away", "midnight", "1 s", "artifacts.key_frames=false")
+    with pytest.raises(ArtifactError, match="no key frames"):
+        run.path("ana")

@@ -1,0 +1,261 @@
+"""The engine's main test: how a run is cut into spans, where, and beside what, never shows."""
+
+import copy
+import json
+import os
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fleet2d
+from fleet2d.artifacts.reader import Run
+from tests.homes import needs_jit
+from tests.scenes import OWN, digests, every_step, everything, process, run, table
+
+GOLDEN = Path(__file__).parents[1] / "golden.json"
+SPANS = [None, 3600, 7, 1]
+
+pytestmark = needs_jit
+
+
+@pytest.fixture(scope="module")
+def whole() -> Run:
+    """Two hours with every behavior, in spans as long as they get."""
+    return run(everything())
+
+
+def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
+    events = table(whole, "events")
+    assert {"user_seen", "user_lost", "reacts", "obeys", "activity", "left_home", "came_home"} == set(
+        events["event"]
+    )
+    reactions = set(zip(events["entity"], [d.split(" ")[0] for d in events["detail"]], strict=True))
+    assert {
+        (robot, event) for robot in ("astro", "bolt") for event in ("user_seen", "user_lost")
+    } <= reactions
+    assert {"track", "planned", "walk"} == set(table(whole, "key_frames")["kind"])
+    assert {"astro", "bolt", "curio", "drift"} == set(table(whole, "observations")["robot"])
+    assert all(rows.num_rows for rows in whole.tables.values())
+
+
+@pytest.mark.parametrize("span", SPANS[1:])
+def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> None:
+    other = run(everything(), max_span=span)
+    assert digests(whole) == digests(other)
+    assert whole.metrics == other.metrics
+
+
+def test_an_algorithm_after_every_step_sees_the_same_for_every_max_span() -> None:
+    first, *others = (digests(run(every_step(), max_span=span)) for span in SPANS)
+    assert "tick" in first
+    for other in others:
+        assert first == other
+
+
+def test_steps_longer_and_shorter_than_a_second_give_the_same_for_every_max_span() -> None:
+    for step, duration in (("250 ms", "8 min"), ("7 s", "1 h 10 min"), ("1 min", "3 h")):
+        content = everything(duration)
+        content["simulation"]["step"] = step
+        content["artifacts"] = {"trajectories": "7 min"}
+        content["metrics"]["distance"] = {"period": "7 min"}
+        content["metrics"]["sightings"] = {"period": "14 min"}
+        content["algorithms"] = {"share": {"type": f"{OWN}:Share", "period": "7 min"}}
+        content["metrics"]["room_share"] = {"period": "35 min"}
+        first, *others = (digests(run(content, max_span=span)) for span in (None, 7, 1))
+        assert [first, first] == others, step
+
+
+def test_chunks_of_any_size_add_up_to_the_same_run(whole: Run) -> None:
+    simulation = fleet2d.Simulation(everything())
+    size = 1
+    while not simulation.done:
+        simulation.advance(size)
+        size = size * 3 % 1009 + 1
+    assert digests(whole) == digests(simulation.finish())
+
+
+def test_running_until_times_adds_up_to_the_same_run(whole: Run) -> None:
+    simulation = fleet2d.Simulation(everything())
+    simulation.run_until(timedelta(minutes=31, seconds=7, milliseconds=500))
+    assert 31 * 60 + 8 == simulation.step
+    simulation.run_until(simulation.clock.start + timedelta(minutes=50))
+    assert 50 * 60 == simulation.step
+    simulation.run_until(3001)
+    assert digests(whole) == digests(simulation.run())
+
+
+@pytest.mark.parametrize("at", [1, 1801, 3599])
+def test_copies_made_in_the_middle_live_the_same_future(whole: Run, at: int) -> None:
+    simulation = fleet2d.Simulation(everything())
+    simulation.advance(at)
+    copies = [copy.deepcopy(simulation) for _ in range(2)]
+    copies[0].advance(977)  # one ahead of the other, so that shared state would show
+    futures = [digests(branch.run()) for branch in (*copies, simulation)]
+    assert [digests(whole)] * 3 == futures
+
+
+def test_a_copy_does_not_disturb_the_original() -> None:
+    simulation = fleet2d.Simulation(everything("20 min"))
+    simulation.advance(333)
+    before = simulation.state
+    copy.deepcopy(simulation).run()
+    assert before == simulation.state
+    assert 333 == simulation.step
+
+
+# --- Other processes ---------------------------------------------------------------------------
+
+SCRIPT = """
+import json, sys
+import fleet2d
+run = fleet2d.run(json.load(open(sys.argv[1])))
+print(run.digest)
+"""
+
+
+def digest_elsewhere(content: dict[str, Any], folder: Path, **environment: str) -> str:
+    """The digest of a run in another process."""
+    file = folder / "scenario.json"
+    file.write_text(json.dumps(content))
+    done = process("-c", SCRIPT, str(file), timeout=300, **environment)
+    assert 0 == done.returncode, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
+        {"NUMBA_NUM_THREADS": "4", "PYTHONHASHSEED": "2", "OMP_NUM_THREADS": "4", "TZ": "Asia/Tokyo"},
+    ],
+    ids=["1 thread", "4 threads"],
+)
+def test_another_process_gets_the_same_run(
+    whole: Run, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    assert whole.digest == digest_elsewhere(everything(), tmp_path, **environment)
+
+
+@pytest.fixture(scope="module")
+def short() -> Run:
+    """What a process without the compiler can do in a few seconds."""
+    return run(everything("90 s"))
+
+
+def test_kernels_as_plain_python_give_the_same_run(short: Run, tmp_path: Path) -> None:
+    assert short.digest == digest_elsewhere(everything("90 s"), tmp_path, NUMBA_DISABLE_JIT="1")
+
+
+def test_numpy_for_an_older_processor_gives_the_same_run(whole: Run, tmp_path: Path) -> None:
+    # What NumPy doesn't know, or has built in, it warns about; and NumPy on other machines has others.
+    features = "AVX2 FMA3 AVX512F AVX512_SKX AVX512CD AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V3 X86_V4"
+    environment = {"NPY_DISABLE_CPU_FEATURES": features, "PYTHONWARNINGS": "ignore"}
+    assert whole.digest == digest_elsewhere(everything(), tmp_path, **environment)
+
+
+def test_kernels_for_a_generic_processor_give_the_same_run(whole: Run, tmp_path: Path) -> None:
+    # Numba keeps what it compiles apart by processor, so the usual cache can take it.
+    assert whole.digest == digest_elsewhere(everything(), tmp_path, NUMBA_CPU_NAME="generic")
+
+
+# --- Who else is there -------------------------------------------------------------------------
+
+
+def lives(stored: Run, *names: str) -> list[Any]:
+    """Everything that is stored of some bodies, by column."""
+    found = []
+    for name in names:
+        for source in ("key_frames", "trajectories"):
+            columns = table(stored, source, entity=name)
+            found.append({column: values.tolist() for column, values in columns.items()})
+            assert len(columns["step"])
+    return json.loads(json.dumps(found, default=str))
+
+
+def changed(**sections: Any) -> dict[str, Any]:
+    """The scenario of these tests with entries added or replaced."""
+    content = everything("40 min")
+    for section, entries in sections.items():
+        content[section] = {**entries, **content[section]}  # before the others
+    return content
+
+
+@pytest.fixture(scope="module")
+def reference() -> Run:
+    """What the runs with somebody more are compared with."""
+    return run(everything("40 min"))
+
+
+EVERYBODY = ("ana", "ben", "astro", "bolt", "curio", "drift", "ego")
+
+
+def test_a_robot_more_leaves_users_and_other_robots_as_they_were(reference: Run) -> None:
+    more = run(changed(robots={"zed": {"type": "meander"}, "yak": {"type": f"{OWN}:Greet"}}))
+    # Ego acts on what all robots see.
+    others = [name for name in EVERYBODY if name != "ego"]
+    assert lives(reference, *others) == lives(more, *others)
+
+
+def test_a_user_more_leaves_users_and_robots_that_do_not_react_as_they_were(reference: Run) -> None:
+    more = run(changed(users={"zoe": {"type": "meander"}}))
+    bystanders = ("ana", "ben", "curio", "drift")
+    assert lives(reference, *bystanders) == lives(more, *bystanders)
+
+
+def test_a_user_more_leaves_what_is_detected_of_the_others_as_it_was(reference: Run) -> None:
+    more = run(changed(users={"zoe": {"type": "meander"}}))
+    for user in ("ana", "ben"):
+        before, after = (
+            table(stored, "observations", robot="curio", user=user) for stored in (reference, more)
+        )
+        assert len(before["step"])
+        assert before["step"].tolist() == after["step"].tolist()
+        assert before["x"].tolist() == after["x"].tolist()
+
+
+def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference: Run) -> None:
+    more = run(
+        changed(
+            algorithms={"other": {"type": f"{OWN}:Tick", "period": "13 s"}},
+            metrics={"spy": {"type": f"{OWN}:Spy", "period": "17 s"}},
+        )
+    )
+    before, after = digests(reference), digests(more)
+    assert {k: v for k, v in before.items() if k != "run"} == {
+        k: v for k, v in after.items() if k not in ("run", "other")
+    }
+
+
+def test_a_robot_that_behaves_otherwise_leaves_the_users_as_they_were(reference: Run) -> None:
+    content = everything("40 min")
+    content["robots"]["astro"] = {"type": "meander", "radius": 0.3}
+    assert lives(reference, "ana", "ben") == lives(run(content), "ana", "ben")
+
+
+def test_another_seed_is_another_life(reference: Run) -> None:
+    other = run(everything("40 min"), seed=5)
+    assert lives(reference, "ben") != lives(other, "ben")
+    assert lives(reference, "ana") != lives(other, "ana")
+    assert table(reference, "observations")["step"].tolist() != table(other, "observations")["step"].tolist()
+
+
+# --- Pinned ------------------------------------------------------------------------------------
+
+
+def test_digests_are_those_pinned(whole: Run) -> None:
+    found = {
+        "base, 1 day": fleet2d.run(None, "simulation.duration=1 d").digest,
+        "every behavior, 2 h": whole.digest,
+    }
+    if os.environ.get("FLEET2D_WRITE_GOLDEN") == "1":
+        GOLDEN.write_text(json.dumps(found, indent=2) + "\n")
+    pinned = json.loads(GOLDEN.read_text())
+    assert pinned == found, (
+        "the same scenario gives another run than before. If that is meant, say in CHANGELOG.md what"
+        " changes for users and why, and pin the new digests: FLEET2D_WRITE_GOLDEN=1 pytest"
+        " tests/engine/test_spans.py. If it is not, or only on this machine, it is a bug."
+    )
+
+

@@ -1,0 +1,294 @@
+"""Schedule: who is where, to the step."""
+
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import InputError
+from tests.scenes import ENTRANCE, OWN, each_step, path, run, scenario, table
+
+START = datetime(2026, 1, 5, 7)  # a Monday
+
+
+def agenda(*items: dict[str, Any], on: Any = "daily") -> dict[str, Any]:
+    return {"on": on, "items": list(items)}
+
+
+def one(*days: dict[str, Any], duration: str = "1 h", **more: Any) -> dict[str, Any]:
+    """A scenario with one user on a schedule."""
+    simulation = more.pop("simulation", {})
+    return scenario(
+        duration, users={"ana": {"type": "schedule", "days": list(days), **more}}, simulation=simulation
+    )
+
+
+def rooms(stored: Run) -> list[str]:
+    """The name of the room at every step, 'away' included."""
+    names = [room.name for room in stored.plan.rooms]
+    return [names[i] if i >= 0 else "away" for i in path(stored, "ana").room]
+
+
+def step_of(text: str, step_s: float = 1.0) -> int:
+    """The step of a time of day on the first day."""
+    moment = datetime.fromisoformat(f"2026-01-05T{text}")
+    return round((moment - START).total_seconds() / step_s)
+
+
+@pytest.fixture(scope="module")
+def morning() -> Run:
+    """An hour with every kind of item."""
+    return run(
+        one(
+            agenda(
+                {"at": "06:30", "place": "bedroom"},
+                {"at": "07:02", "place": "bathroom", "dwell": "4 min", "activity": "wash"},
+                {"place": "kitchen", "dwell": "10 min", "activity": "breakfast"},
+                {"at": "07:30", "away": True, "activity": "errand"},
+                {"at": "07:45:30", "place": [1.0, 3.0], "activity": "read"},
+            ),
+            rest="living_room",
+        )
+    )
+
+
+def departures(stored: Run) -> list[int]:
+    """The steps after which the body begins to turn or walk."""
+    poses = path(stored, "ana")
+    pose = np.stack([poses.x, poses.y, poses.heading])
+    moves = (pose[:, 1:] != pose[:, :-1]).any(axis=0)
+    return [k for k in range(1, len(moves)) if moves[k] and not moves[k - 1]]
+
+
+def test_it_begins_where_the_item_before_the_run_leaves_it(morning: Run) -> None:
+    assert {"bedroom_0"} == set(rooms(morning)[: step_of("07:02") + 1])
+
+
+def test_it_sets_out_exactly_when_an_item_begins_or_is_over(morning: Run) -> None:
+    wanted = ["07:02", "07:06", "07:16", "07:30", "07:45:30"]
+    assert [step_of(text) for text in wanted] == departures(morning)
+
+
+def test_after_a_dwell_with_nothing_due_it_rests(morning: Run) -> None:
+    assert {"living_room_0"} == set(rooms(morning)[step_of("07:17") : step_of("07:30")])
+
+
+def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning: Run) -> None:
+    poses = path(morning, "ana")
+    at = step_of("07:45:30")
+    leg = slice(at, at + 60)
+    length = np.sqrt(np.diff(poses.x[leg]) ** 2 + np.diff(poses.y[leg]) ** 2).sum()
+    arrived = next(k for k in range(at, at + 60) if (poses.x[k], poses.y[k]) == (1.0, 3.0))
+    assert arrived - at < length / 1.0 + 2 * 360 / 180 + 2  # m at 1 m/s, and two turns
+    assert {(1.0, 3.0)} == set(zip(poses.x[arrived:].tolist(), poses.y[arrived:].tolist(), strict=True))
+
+
+def test_away_and_back_is_at_one_and_the_same_place(morning: Run) -> None:
+    poses = path(morning, "ana")
+    gone = np.flatnonzero(poses.away)
+    assert gone[-1] == step_of("07:45:30") - 1
+    assert step_of("07:30") < gone[0] < step_of("07:30:30")
+    assert len(gone) == gone[-1] - gone[0] + 1
+    before, back = gone[0] - 1, gone[-1] + 1
+    assert (poses.x[back], poses.y[back]) == (poses.x[gone[0]], poses.y[gone[0]])
+    assert (poses.x[back], poses.y[back]) == pytest.approx(ENTRANCE, abs=0.1)
+    assert (poses.x[before], poses.y[before]) == pytest.approx((poses.x[back], poses.y[back]), abs=1.0)
+
+
+def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: Run) -> None:
+    events = table(morning, "events", entity="ana")
+    told = {
+        (event, detail): step
+        for event, detail, step in zip(events["event"], events["detail"], events["step"], strict=True)
+    }
+    poses = path(morning, "ana")
+    gone = np.flatnonzero(poses.away)
+    assert gone[0] == told["left_home", ""]
+    assert gone[-1] + 1 == told["came_home", ""]
+    assert gone[0] == told["activity", "errand"]
+    still = [step_of("07:02"), step_of("07:06"), step_of("07:16")]
+    arrivals = [told["activity", "wash"], told["activity", "breakfast"], told["activity", "rest"]]
+    for left, arrived in zip(still, arrivals, strict=True):
+        assert left < arrived < left + 30
+        assert (poses.x[arrived], poses.y[arrived]) == (poses.x[arrived + 60], poses.y[arrived + 60])
+        assert (poses.x[arrived - 1], poses.y[arrived - 1]) != (poses.x[arrived], poses.y[arrived])
+
+
+def test_a_step_that_does_not_divide_the_times_takes_effect_at_the_next_step() -> None:
+    stored = run(
+        one(
+            agenda(
+                {"at": "06:00", "place": "bedroom"},
+                {"at": "07:10:03", "place": "kitchen", "activity": "cook"},
+            ),
+            simulation={"step": "7 s"},
+            duration="20 min",
+        ),
+        "artifacts.trajectories=7 s",
+    )
+    # 603 s is between step 86 (602 s) and step 87 (609 s): the body is under way at step 87.
+    assert [86] == departures(stored)
+
+
+@pytest.mark.parametrize(
+    ("start", "room"),
+    [
+        ("2026-01-05T07:30", "kitchen_0"),  # Monday
+        ("2026-01-09T23:59", "kitchen_0"),  # Friday
+        ("2026-01-10T08:30", "bathroom_0"),  # Saturday
+        ("2026-01-11T08:30", "bedroom_0"),  # Sunday: a later entry of the list holds
+        ("2026-01-12T06:59", "bedroom_0"),  # Monday before the first item: as on Sunday
+    ],
+)
+def test_agendas_hold_on_their_days(start: str, room: str) -> None:
+    content = one(
+        agenda({"at": "07:00", "place": "kitchen"}, on="weekdays"),
+        agenda({"at": "08:00", "place": "bathroom"}, on="weekend"),
+        agenda({"at": "08:00", "place": "bedroom"}, on="sunday"),
+        simulation={"start": start},
+        duration="1 min",
+    )
+    assert room == fleet2d.Simulation(content).state["ana"]["room"]
+
+
+def test_the_agenda_of_the_next_day_follows_at_midnight() -> None:
+    stored = run(
+        one(
+            agenda({"at": "06:00", "place": "kitchen"}, on=["monday", "wednesday"]),
+            agenda({"at": "00:00", "place": "bedroom"}, {"at": "12:00", "place": "bathroom"}, on="tuesday"),
+            duration="3 d",
+            simulation={"step": "1 min"},
+        )
+    )
+    names = rooms(stored)
+
+    def at(day: int, hour: int) -> str:
+        return names[(day * 24 + hour - 7) * 60]
+
+    assert ["kitchen_0", "kitchen_0"] == [at(0, 7), at(0, 23)]
+    assert "kitchen_0" == at(1, 0)  # it sets out then
+    assert ["bedroom_0", "bedroom_0", "bathroom_0"] == [at(1, 1), at(1, 12), at(1, 13)]
+    assert ["bathroom_0", "kitchen_0"] == [at(2, 6), at(2, 7)]
+
+
+def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten() -> None:
+    stored = run(
+        one(
+            agenda(
+                {"at": "00:00:05", "place": "bathroom"},
+                {"at": "20:00", "place": "living_room"},
+                {"at": "23:59:55", "place": "bedroom"},
+            ),
+            duration="20 min",
+            speed=0.2,
+            simulation={"start": "2026-01-05T23:50"},
+        )
+    )
+    assert "bathroom_0" == rooms(stored)[-1]
+
+
+def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_comes() -> None:
+    stored = run(
+        one(
+            agenda(
+                {"at": "06:00", "place": "living_room"},
+                {"at": "07:01", "place": "bedroom", "activity": "first"},
+                {"at": "07:01:01", "place": "kitchen", "activity": "second"},
+            ),
+            duration="10 min",
+        )
+    )
+    details = table(stored, "events")["detail"].tolist()
+    assert ["first", "second"] == details
+    assert "kitchen_0" == rooms(stored)[-1]
+
+
+def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() -> None:
+    schedule = {"type": "schedule", "days": [agenda({"at": "06:00", "place": "kitchen"})]}
+    detour = {"type": f"{OWN}:Scripted", "script": ["bedroom", 60]}
+    content = scenario("10 min", users={"ana": {"start": "bathroom", "behaviors": [detour, schedule]}})
+    names = rooms(run(content))
+    assert "bedroom_0" in names
+    assert "kitchen_0" == names[-1]
+
+
+def test_it_does_not_move_when_it_begins_where_it_should_be() -> None:
+    stored = run(one(agenda({"at": "06:00", "place": "kitchen"}), duration="30 min"))
+    poses = path(stored, "ana")
+    assert 1 == len(set(zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True)))
+
+
+def test_a_room_is_entered_at_another_spot_each_time() -> None:
+    items = [
+        {"at": f"07:{minute:02}", "place": ("kitchen", "bathroom")[minute % 4 // 2]}
+        for minute in range(0, 60, 2)
+    ]
+    poses = path(run(one(agenda(*items))), "ana")
+    spots = {(poses.x[k], poses.y[k]) for k in range(119, 3600, 120)}
+    assert 30 == len(spots)
+
+
+def test_a_run_may_begin_away() -> None:
+    content = one(
+        agenda({"at": "06:00", "away": True}, {"at": "07:10", "place": "kitchen"}), duration="30 min"
+    )
+    simulation = fleet2d.Simulation(content)
+    state = simulation.state["ana"]
+    assert (True, None) == (state["away"], state["room"])
+    first = each_step(content, "ana")
+    assert first["away"][: step_of("07:10")].all()
+    assert np.isnan(first["x"][: step_of("07:10")]).all()
+    assert not first["away"][step_of("07:10") :].any()
+    assert "kitchen_0" == first["room"][-1]
+
+
+@pytest.mark.parametrize(
+    ("items", "words"),
+    [
+        ([{"place": "kitchen"}], ["items.0", "at"]),
+        ([{"at": "08:00", "place": "kitchen"}, {"place": "bedroom"}], ["items.1", "dwell"]),
+        (
+            [{"at": "08:00", "place": "kitchen"}, {"at": "07:00", "place": "bedroom"}],
+            ["items.1", "07:00", "08:00", "order"],
+        ),
+        (
+            [{"at": "08:00", "place": "kitchen", "dwell": "1 h"}, {"at": "08:30", "place": "bedroom"}],
+            ["items.1", "08:30", "09:00"],
+        ),
+        ([{"at": "23:30", "place": "kitchen", "dwell": "1 h"}, {"place": "bedroom"}], ["items.1", "24:30", "day"]),
+        ([{"at": "24:00", "place": "kitchen"}], ["items.0", "24:00", "day"]),
+        ([{"at": "08:00"}], ["place", "away"]),
+        ([{"at": "08:00", "place": "kitchen", "away": True}], ["place", "away", "both"]),
+        ([], ["items"]),
+    ],
+)
+def test_items_that_do_not_make_a_day_are_refused(items: list[Any], words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        fleet2d.load_scenario(one(agenda(*items)))
+    for word in ["users.ana.days.0", *words]:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("on", ["moonday", ["weekdays", "holidays"], []])
+def test_days_that_are_none_are_refused(on: Any) -> None:
+    with pytest.raises(InputError, match="on"):
+        fleet2d.load_scenario(one(agenda({"at": "08:00", "place": "kitchen"}, on=on)))
+
+
+def test_an_unreachable_rest_is_refused_before_the_run() -> None:
+    item = {"at": "08:00", "place": "kitchen", "dwell": "1 h"}
+    with pytest.raises(InputError, match="storage") as caught:
+        fleet2d.Simulation(one(agenda(item), rest="storage"))
+    assert "users.ana" in str(caught.value)
+
+
+def test_time_is_told_to_the_step_when_the_run_begins_within_a_minute() -> None:
+    content = one(
+        agenda({"at": "06:00", "place": "bedroom"}, {"at": "07:00:30", "place": "kitchen"}),
+        simulation={"start": "2026-01-05T07:00:12"},
+        duration="2 min",
+    )
+    assert [18] == departures(run(content))

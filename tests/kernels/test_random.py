@@ -1,0 +1,138 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fleet2d.kernels.random import (
+    BELL_MEAN,
+    BELL_STD,
+    random_below,
+    random_bell,
+    random_bits,
+    random_uniform,
+)
+from tests.reference import random as slow
+from tests.strategies import quick
+
+keys = st.integers(0, 2**64 - 1)
+counters = st.integers(0, 2**63 - 1)
+
+# Outputs of the reference implementation (Vigna's splitmix64.c) for two seeds.
+KNOWN = {
+    1234567: [
+        6457827717110365317,
+        3203168211198807973,
+        9817491932198370423,
+        4593380528125082431,
+        16408922859458223821,
+    ],
+    0: [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F],
+}
+
+
+@pytest.mark.parametrize("seed", KNOWN)
+def test_random_bits_are_the_published_outputs_of_splitmix64(seed: int) -> None:
+    expected = KNOWN[seed]
+
+    assert expected == [int(random_bits(np.uint64(seed), i)) for i in range(len(expected))]
+    assert expected == slow.splitmix(seed, len(expected))
+
+
+@quick
+@given(keys, counters)
+def test_random_bits_of_any_key_and_counter_are_those_of_the_twin(key: int, counter: int) -> None:
+    assert slow.random_bits(key, counter) == int(random_bits(np.uint64(key), counter))
+
+
+def test_random_bits_are_addressed_not_drawn() -> None:
+    key = np.uint64(2**64 - 1)
+
+    forwards = [int(random_bits(key, i)) for i in range(50)]
+    backwards = [int(random_bits(key, i)) for i in reversed(range(50))]
+
+    assert forwards == backwards[::-1] == slow.splitmix(2**64 - 1, 50)
+
+
+@quick
+@given(keys, counters, st.one_of(st.sampled_from([1, 2, 2**31 - 1]), st.integers(1, 2**31 - 1)))
+def test_random_below_is_in_range_and_that_of_the_twin(key: int, counter: int, bound: int) -> None:
+    drawn = int(random_below(np.uint64(key), counter, bound))
+
+    assert 0 <= drawn < bound
+    assert slow.random_below(key, counter, bound) == drawn
+
+
+def test_random_below_reaches_both_ends() -> None:
+    key = np.uint64(7)
+
+    assert set(range(6)) == {int(random_below(key, i, 6)) for i in range(200)}
+    assert {0} == {int(random_below(key, i, 1)) for i in range(200)}
+
+
+def test_random_below_the_largest_bound_does_not_overflow() -> None:
+    """The product of 32 random bits and the bound needs 63 bits."""
+    bound = 2**31 - 1
+    of_ones, of_zeros = np.uint64(_key_of_word(2**64 - 1)), np.uint64(_key_of_word(0))
+
+    assert bound - 1 == random_below(of_ones, 0, bound)
+    assert random_below(of_zeros, 0, bound) == 0
+
+
+@quick
+@given(keys, counters)
+def test_random_uniform_is_the_upper_53_bits(key: int, counter: int) -> None:
+    drawn = float(random_uniform(np.uint64(key), counter))
+
+    assert 0.0 <= drawn < 1.0
+    assert slow.random_bits(key, counter) >> 11 == drawn * 2**53
+
+
+@quick
+@given(keys, counters)
+def test_random_bell_is_the_sum_of_the_bytes(key: int, counter: int) -> None:
+    assert slow.random_bell(key, counter) == int(random_bell(np.uint64(key), counter))
+
+
+@pytest.mark.parametrize(("word", "expected"), [(0, -1020), (2**64 - 1, 1020), (255 << 56, -765)])
+def test_random_bell_of_extreme_words(word: int, expected: int) -> None:
+    """A word of ones has the largest sum: 2040, in lanes of sixteen bits."""
+    key = np.uint64(_key_of_word(word))
+    assert word == int(random_bits(key, 0))
+
+    assert expected == int(random_bell(key, 0))
+
+
+def _key_of_word(word: int) -> int:
+    """Return the key whose output 0 is `word`, by running the generator backwards."""
+    mask = 2**64 - 1
+    z = word
+    z = z ^ (z >> 31) ^ (z >> 62)
+    z = z * pow(0x94D049BB133111EB, -1, 2**64) & mask
+    z = z ^ (z >> 27) ^ (z >> 54)
+    z = z * pow(0xBF58476D1CE4E5B9, -1, 2**64) & mask
+    z = z ^ (z >> 30) ^ (z >> 60)
+    return (z - 0x9E3779B97F4A7C15) & mask
+
+
+def test_random_bell_has_the_stated_moments() -> None:
+    chances = slow.distribution_of_bell()
+    mean = sum(value * chance for value, chance in chances.items())
+    variance = sum(value**2 * chance for value, chance in chances.items())
+    kurtosis = sum(value**4 * chance for value, chance in chances.items()) / variance**2 - 3
+
+    assert 1 == sum(chances.values())
+    assert (-1020, 1020) == (min(chances), max(chances))
+    assert mean == 0
+    assert BELL_MEAN == 1020
+    assert variance == 43690
+    assert abs(BELL_STD - 43690**0.5) < 1e-9
+    assert round(float(kurtosis), 2) == -0.15
+    assert round(1020 / BELL_STD, 2) == 4.88
+
+
+def test_random_bell_draws_spread_as_its_distribution_says() -> None:
+    """Ten thousand fixed draws: mean and standard deviation within three standard errors."""
+    drawn = np.array([int(random_bell(np.uint64(11), i)) for i in range(10_000)])
+
+    assert abs(drawn.mean()) < 3 * BELL_STD / 100
+    assert abs(drawn.std() / BELL_STD - 1) < 3 / 200**0.5 / 10

@@ -1,0 +1,215 @@
+"""Shortest paths against Dijkstra over all corners, in free space with holes and pinches."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import shapely
+from hypothesis import given
+from shapely.geometry import Polygon
+
+from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, distance, find_route
+from tests.homes import JIT_IS_OFF, Home, home_of, shuffled
+from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
+from tests.strategies import homes, quick, seeds
+
+Int64 = npt.NDArray[np.int64]
+
+
+def corners_of(home: Home) -> Corners:
+    """Return the nodes of a route graph: reflex corners, and vertices where several walls meet."""
+    into = {tuple(v): [] for v in home.mesh.vertices.tolist()}
+    out_of = {tuple(v): [] for v in home.mesh.vertices.tolist()}
+    for ax, ay, bx, by in home.walls.tolist():
+        out_of[ax, ay].append((bx, by))
+        into[bx, by].append((ax, ay))
+    vertex, before, after, simple = [], [], [], []
+    for i, v in enumerate(home.mesh.vertices.tolist()):
+        a, b = into[tuple(v)], out_of[tuple(v)]
+        if not a:  # another ring's corner in the middle of a wall
+            continue
+        alone = len(a) == 1
+        turn = (v[0] - a[0][0]) * (b[0][1] - v[1]) - (v[1] - a[0][1]) * (b[0][0] - v[0])
+        if not alone or turn < 0:
+            vertex.append(i)
+            before.append(a[0])
+            after.append(b[0])
+            simple.append(alone)
+    node_of_vertex = np.full(len(home.mesh.vertices), -1, np.int32)
+    node_of_vertex[vertex] = np.arange(len(vertex))
+    return Corners(
+        node_of_vertex,
+        np.array(vertex, np.int32),
+        np.array(before, np.int64).reshape(-1, 2),
+        np.array(after, np.int64).reshape(-1, 2),
+        np.array(simple, np.uint8),
+    )
+
+
+def routes_of(home: Home) -> RouteGraph:
+    """Return the route graph of a home."""
+    return build_route_graph(home.mesh, corners_of(home))
+
+
+def route(home: Home, graph: RouteGraph, start: Int64, goal: Int64) -> Int64 | None:
+    """Return the path of the kernel, or None."""
+    out = np.full((len(graph.corners.vertex) + 2, 2), -7, np.int64)
+    count = find_route(home.mesh, graph, *start.tolist(), *goal.tolist(), out)
+    return out[:count] if count else None
+
+
+def some_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
+    """Return points inside: centres of cells, and points in line with corners."""
+    region = region_of(home.mesh.vertices, home.mesh.triangles)
+    anywhere = rng.integers(0, [64 * home.columns, 64 * home.rows], (20 * count, 2))
+    first, second = rng.choice(home.mesh.vertices, (2, 20 * count))
+    tried = np.concatenate([anywhere, (first + second) // 2, 2 * second - first])
+    rng.shuffle(tried)
+    inside = shapely.contains_properly(region, shapely.points(tried))
+    return np.asarray(tried[inside][:count], np.int64)
+
+
+def check_routes(home: Home, rng: np.random.Generator, count: int) -> tuple[int, int]:
+    """Compare paths between random points with the twin; return how many bend and how many fail."""
+    vertices = home.mesh.vertices
+    region, graph = region_of(vertices, home.mesh.triangles), routes_of(home)
+    slow_graph = graph_of(region, vertices)
+    points = some_points(home, rng, 2 * count)
+    bent = failed = 0
+    for start, goal in zip(points[::2], points[1::2], strict=False):
+        expected = shortest(region, vertices, slow_graph, start, goal)
+        path = route(home, graph, start, goal)
+        if path is None:
+            assert math.isinf(expected)
+            assert route(home, graph, goal, start) is None
+            failed += 1
+            continue
+        back = route(home, graph, goal, start)
+        assert back is not None
+        assert [start.tolist(), goal.tolist()] == path[[0, -1]].tolist()
+        assert straight_ways(region, path[:-1], path[1:]).all()
+        assert math.isclose(expected, length_of(path), rel_tol=1e-9)
+        assert math.isclose(expected, length_of(back), rel_tol=1e-9)
+        bent += len(path) > 2
+    return bent, failed
+
+
+@quick
+@given(homes(), seeds())
+def test_find_route_is_as_short_as_dijkstra_over_all_corners(
+    polygons: list[Polygon], seed: int
+) -> None:
+    check_routes(home_of(polygons), np.random.default_rng(seed), 6)
+
+
+@quick
+@given(homes(), seeds())
+def test_find_route_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    other = home._replace(mesh=shuffled(home.mesh, rng))
+    graph, other_graph = routes_of(home), routes_of(other)
+    points = some_points(home, rng, 8)
+
+    assert all(np.array_equal(a, b) for a, b in zip(graph[1:], other_graph[1:], strict=True))
+    for start, goal in zip(points[::2], points[1::2], strict=False):
+        path, same = route(home, graph, start, goal), route(other, other_graph, start, goal)
+        assert (path is None) == (same is None)
+        assert path is None or np.array_equal(path, same)
+
+
+def crowded(seed: int) -> Home:
+    """Return a hall full of slanted pillars."""
+    rng = np.random.default_rng(seed)
+    hall = shapely.box(0, 0, 4096, 4096)
+    for _ in range(6 if JIT_IS_OFF else 22):
+        centre, spread = rng.integers(300, 3800, 2), rng.integers(60, 500)
+        outline = centre + rng.integers(-spread, spread, (6, 2))
+        hall = hall.difference(shapely.convex_hull(shapely.multipoints(outline)), grid_size=2)
+    return home_of([p for p in shapely.get_parts(hall) if p.area > 0])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_find_route_among_many_pillars_is_as_short_as_dijkstra(seed: int) -> None:
+    bent, _ = check_routes(crowded(seed), np.random.default_rng(seed), 8 if JIT_IS_OFF else 40)
+
+    assert bent > (0 if JIT_IS_OFF else 15)
+
+
+def test_find_route_between_two_parts_is_none() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640), shapely.box(704, 0, 1344, 640)])
+    graph = routes_of(home)
+
+    assert route(home, graph, np.array([33, 33]), np.array([737, 33])) is None
+    assert route(home, graph, np.array([33, 33]), np.array([670, 33])) is None
+    assert route(home, graph, np.array([670, 33]), np.array([33, 33])) is None
+
+
+def test_find_route_without_corners_is_straight() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+
+    path = route(home, routes_of(home), np.array([33, 33]), np.array([601, 97]))
+
+    assert path is not None
+    assert [[33, 33], [601, 97]] == path.tolist()
+
+
+def test_find_route_to_where_it_starts_has_no_length() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+
+    path = route(home, routes_of(home), np.array([33, 33]), np.array([33, 33]))
+
+    assert path is not None
+    assert [[33, 33], [33, 33]] == path.tolist()
+
+
+def test_find_route_round_a_pillar_goes_the_shorter_way() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
+
+    path = route(home, routes_of(home), np.array([101, 301]), np.array([501, 301]))
+
+    assert path is not None
+    assert [[101, 301], [200, 100], [400, 100], [501, 301]] == path.tolist()
+
+
+def test_find_route_along_a_row_of_corners_touches_each() -> None:
+    """The straight line touches four corners: strictly no line of sight, but the shortest way."""
+    pillars = [shapely.box(128, 64, 192, 320), shapely.box(384, 128, 448, 320)]
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
+    graph = routes_of(home)
+
+    path = route(home, graph, np.array([64, 320]), np.array([512, 320]))
+
+    assert path is not None
+    assert length_of(path) == 448
+
+
+def test_find_route_of_equal_ways_is_always_the_same() -> None:
+    """The tie goes to corners with lower ids: the lower way, as ids are sorted by x, then y."""
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(220, 220, 420, 420))])
+    graph = routes_of(home)
+
+    path = route(home, graph, np.array([100, 320]), np.array([540, 320]))
+
+    assert path is not None
+    assert [[100, 320], [220, 220], [420, 220], [540, 320]] == path.tolist()
+
+
+def test_route_graph_has_each_leg_in_both_directions() -> None:
+    graph = routes_of(crowded(1))
+    legs = {
+        (node, int(graph.node[k])): float(graph.length[k])
+        for node in range(len(graph.corners.vertex))
+        for k in range(graph.start[node], graph.start[node + 1])
+    }
+
+    assert len(legs) == len(graph.node)
+    assert len(legs) > 20
+    assert all(legs[b, a] == length for (a, b), length in legs.items())
+
+
+@pytest.mark.parametrize(
+    ("b", "expected"), [((0, 0), 0.0), ((3, 4), 5.0), ((2**20, 2**20), math.sqrt(2**41))]
+)
+def test_distance_is_the_correctly_rounded_root(b: tuple[int, int], expected: float) -> None:
+    assert expected == distance(0, 0, *b) == distance(*b, 0, 0)

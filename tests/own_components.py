@@ -1,0 +1,128 @@
+"""Behaviors, algorithms and metrics as a user would write them, for the tests of whole runs."""
+
+from collections.abc import Mapping
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+
+from fleet2d import (
+    Algorithm,
+    Behavior,
+    Duration,
+    History,
+    Home,
+    Metric,
+    Plan,
+    Present,
+    RoomDistribution,
+    Situation,
+)
+
+
+class Greet(Behavior):
+    """Turn to who comes into view, look for who is lost; between that, go here and there at times."""
+
+    patience: Duration = timedelta(minutes=2)
+
+    def start(self, actor: Any) -> None:
+        self.greeted = 0
+
+    def decide(self, now: Situation) -> Plan | None:
+        plan = now.plan().interrupt_on("user_seen", "user_lost")
+        for event in now.events:
+            plan.note("reacts", f"{event.event} {event.user} {event.x:.3f} {event.y:.3f}")
+        if any(event.event == "user_lost" for event in now.events):
+            return plan.turn_by(-0.75)
+        if now.events:
+            self.greeted += 1
+            return plan.turn_by(0.1 * self.greeted).stay(self.patience)
+        draws = now.random("wander")
+        if draws.uniform() < 0.3:
+            return None
+        room = draws.choice(["kitchen", "bedroom", "bathroom", "living_room"])
+        return plan.go_to(room).stay(self.patience)
+
+
+class Obey(Behavior):
+    """Go where the algorithm `share` says that somebody was seen most."""
+
+    def decide(self, now: Situation) -> Plan | None:
+        plan = now.plan()
+        if "share" in now.outputs:
+            best = int(np.argmax(now.outputs["share"].share))
+            plan.go_to(now.home.rooms[best].name, "obey").note("obeys", now.home.rooms[best].name)
+        return plan.stay(timedelta(seconds=47))
+
+
+class Scripted(Behavior):
+    """Follow a list of steps: room names, points, seconds to stay, 'leave' and 'home'."""
+
+    script: tuple[str | float | tuple[float, float], ...] = ()
+
+    def start(self, actor: Any) -> None:
+        self.done = False
+
+    def decide(self, now: Situation) -> Plan | None:
+        if self.done:
+            return None
+        self.done = True
+        plan = now.plan()
+        for item in self.script:
+            if item == "leave":
+                plan.leave_home()
+            elif item == "home":
+                plan.come_home()
+            elif isinstance(item, str | tuple):
+                plan.go_to(item)
+            else:
+                plan.stay(timedelta(seconds=item))
+        return plan
+
+
+class Share(Algorithm):
+    """Share of sightings per room."""
+
+    def start(self, home: Home) -> None:
+        self.counts = np.zeros(len(home.rooms))
+
+    def update(self, history: History, state: Present) -> RoomDistribution:
+        self.counts += np.bincount(history.observations.room, minlength=len(self.counts))
+        return RoomDistribution(self.counts)
+
+
+class Smooth(Algorithm):
+    """Mean of the latest and the former shares."""
+
+    def start(self, home: Home) -> None:
+        self.mean = np.full(len(home.rooms), 1 / len(home.rooms))
+
+    def update(self, history: History, state: Present) -> Mapping[str, Any]:
+        self.mean = (self.mean + state.outputs["share"].share) / 2
+        return {"room": [room.name for room in state.home.rooms], "mean": self.mean}
+
+
+class Tick(Algorithm):
+    """Count the steps, and store a row now and then."""
+
+    def start(self, home: Home) -> None:
+        self.ticks = self.sightings = 0
+
+    def update(self, history: History, state: Present) -> Mapping[str, Any] | None:
+        self.ticks += len(history)
+        self.sightings += len(history.observations.step)
+        lucky = state.random("luck").below(100) == 0
+        return {"ticks": self.ticks, "sightings": self.sightings} if lucky else None
+
+
+class Spy(Metric):
+    """Record what each update was handed."""
+
+    def start(self, home: Home) -> None:
+        self.handed: list[tuple[int, int]] = []
+
+    def update(self, history: History, state: Present) -> None:
+        self.handed.append((history.first, history.end))
+
+    def result(self) -> dict[str, Any]:
+        return {"handed": self.handed}

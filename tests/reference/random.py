@@ -1,0 +1,44 @@
+"""Slow, obvious twins of the random kernels, in plain Python integers."""
+
+from fractions import Fraction
+
+MASK = 2**64 - 1
+
+
+def splitmix(seed: int, count: int) -> list[int]:
+    """Return the first `count` outputs of SplitMix64 as published: with a state that moves on."""
+    state, outputs = seed, []
+    for _ in range(count):
+        state = (state + 0x9E3779B97F4A7C15) & MASK
+        z = state
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & MASK
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & MASK
+        outputs.append(z ^ (z >> 31))
+    return outputs
+
+
+def random_bits(key: int, counter: int) -> int:
+    """Return output number `counter` of the generator with seed `key`."""
+    return splitmix((key + counter * 0x9E3779B97F4A7C15) & MASK, 1)[0]
+
+
+def random_below(key: int, counter: int, bound: int) -> int:
+    """Return the upper half of the bits, scaled to [0, bound)."""
+    return (random_bits(key, counter) // 2**32) * bound // 2**32
+
+
+def random_bell(key: int, counter: int) -> int:
+    """Return the sum of the eight bytes, less its mean."""
+    return sum(random_bits(key, counter).to_bytes(8, "big")) - 1020
+
+
+def distribution_of_bell() -> dict[int, Fraction]:
+    """Return the exact probability of each value of `random_bell`, by adding byte after byte."""
+    ways = {-1020: 1}
+    for _ in range(8):
+        longer: dict[int, int] = {}
+        for value, count in ways.items():
+            for byte in range(256):
+                longer[value + byte] = longer.get(value + byte, 0) + count
+        ways = longer
+    return {value: Fraction(count, 256**8) for value, count in ways.items()}

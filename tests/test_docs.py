@@ -1,0 +1,133 @@
+"""README and docs say what is true: code runs, scenarios and commands are valid, links lead on."""
+
+import re
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import typer
+
+from fleet2d.cli import app
+from fleet2d.engine.simulation import Simulation
+from fleet2d.scenario.model import load_scenario
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FENCE = re.compile(r"^```(\w+)(?: title=(\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page."""
+
+    page: Path
+    line: int
+    language: str
+    title: str | None
+    text: str
+
+    @property
+    def where(self) -> str:
+        return f"{self.page.relative_to(ROOT)}:{self.line}"
+
+
+def blocks(page: Path, language: str | None = None) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    found = [
+        Block(page, text.count("\n", 0, match.start()) + 1, *match.groups())
+        for match in FENCE.finditer(text)
+    ]
+    return [block for block in found if language in (None, block.language)]
+
+
+def pages_with(language: str) -> list[object]:
+    pages = [page for page in PAGES if blocks(page, language)]
+    return [pytest.param(page, id=str(page.relative_to(ROOT))) for page in pages]
+
+
+def scenarios() -> list[object]:
+    found = [block for page in PAGES for block in blocks(page, "yaml")]
+    whole = [block for block in found if re.search(r"^simulation:", block.text, re.MULTILINE)]
+    return [pytest.param(block, id=block.where) for block in whole]
+
+
+def commands() -> list[object]:
+    found = []
+    for block in (block for page in PAGES for block in blocks(page, "sh")):
+        lines = (words for line in block.text.splitlines() for words in split_commands(line))
+        ours = [words[1:] for words in lines if Path(words[0]).name == "fleet2d"]
+        found += [pytest.param(words, id=f"{block.where} {' '.join(words)}") for words in ours]
+    return found
+
+
+def split_commands(line: str) -> list[list[str]]:
+    """Split a shell line at `&&` into the words of each command, without what follows a `>`."""
+    parts: list[list[str]] = [[]]
+    for word in shlex.split(line.partition(" > ")[0], comments=True):
+        if word == "&&":
+            parts.append([])
+        else:
+            parts[-1].append(word)
+    return [part for part in parts if part]
+
+
+def write_titled_blocks(page: Path, folder: Path) -> None:
+    for block in blocks(page):
+        if block.title:
+            (folder / block.title).write_text(block.text, encoding="utf-8")
+
+
+def run_python_blocks(page: Path) -> None:
+    names: dict[str, object] = {"__name__": "docs"}
+    for block in blocks(page, "python"):
+        if not block.title:
+            code = "\n" * block.line + block.text  # so that a traceback shows the page's line
+            exec(compile(code, str(page), "exec"), names)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", pages_with("python"))
+def test_python_of_a_page_runs_in_an_empty_folder(page: Path, folder: Path) -> None:
+    write_titled_blocks(page, folder)
+    run_python_blocks(page)
+
+
+@pytest.mark.parametrize("block", scenarios())
+def test_scenario_of_a_page_can_be_simulated(block: Block, folder: Path) -> None:
+    write_titled_blocks(block.page, folder)
+    if block.page.name == "floorplans.md":
+        run_python_blocks(block.page)  # writes the plan that the scenario names
+    file = folder / "scenario.yaml"
+    file.write_text(block.text, encoding="utf-8")
+    simulation = Simulation(file)
+    simulation.advance(60)
+    assert 60 == simulation.step
+
+
+@pytest.mark.parametrize("words", commands())
+def test_command_of_a_page_exists_with_its_options(words: list[str]) -> None:
+    group = typer.main.get_command(app)
+    command = group.commands[words[0]]
+    assert command.make_context(words[0], words[1:]) is not None
+    overrides = [word for word in words[1:] if "=" in word and not word.startswith("floorplan.")]
+    if words[0] == "run":  # what a page changes in its home.yaml, the bundled scenario has, too
+        assert load_scenario(None, *overrides) is not None
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, id=str(p.relative_to(ROOT))) for p in PAGES])
+def test_links_of_a_page_lead_somewhere(page: Path) -> None:
+    links = LINK.findall(page.read_text(encoding="utf-8"))
+    local = [link for link in links if not link.startswith(("http:", "https:"))]
+    assert [] == [link for link in local if not (page.parent / link).exists()]
+
+
+def test_index_names_every_page() -> None:
+    linked = set(LINK.findall((ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
+    assert set() == {page.name for page in PAGES[1:]} - linked - {"index.md"}
