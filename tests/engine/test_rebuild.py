@@ -46,7 +46,9 @@ class Greeter(Behavior):
         self.round += 1
         plan = now.plan().interrupt_on("user_seen", "user_lost")
         for ahead in range(3):
-            plan.go_to(self.rooms[(self.round + ahead) % len(self.rooms)]).stay(timedelta(seconds=9))
+            plan.go_to(self.rooms[(self.round + ahead) % len(self.rooms)]).stay(
+                timedelta(seconds=9)
+            )
         return plan
 
 
@@ -108,9 +110,10 @@ def assert_rebuilt(run: Run, stride: int = 1) -> None:
         path = run.path(name, every=timedelta(microseconds=stride * step_us))
         at_home = ~path.away
         assert truth["step"].tolist() == path.step.tolist()
-        assert truth["time"].tolist() == path.time.tolist() or (
-            truth["time"].to_numpy() == path.time
-        ).all()
+        assert (
+            truth["time"].tolist() == path.time.tolist()
+            or (truth["time"].to_numpy() == path.time).all()
+        )
         np.testing.assert_array_equal(truth["away"], path.away, name)
         for column in ("x", "y"):
             found = getattr(path, column)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fleet2d.entities.plan import Motion, State
 from fleet2d.errors import ComponentError
+from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.measure import count_rooms, sum_moves
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
@@ -36,19 +37,14 @@ class Observations(NamedTuple):
 
 
 class BodyPoses:
-    """Poses of one body, one entry per step; columns are worked out when they are asked for.
-
-    Attributes:
-        heading: int64 [1/4096 turn].
-    """
+    """Poses of one body, one entry per step; columns are worked out when they are asked for."""
 
     def __init__(self, home: "Home", poses: Poses) -> None:
         self._home, self._poses = home, poses
-        self.heading = poses.heading
 
     def __len__(self) -> int:
         """Return the number of steps."""
-        return len(self.heading)
+        return len(self._poses.x)
 
     @cached_property
     def xy(self) -> NDArray[np.float64]:
@@ -71,6 +67,12 @@ class BodyPoses:
     def y(self) -> NDArray[np.float64]:
         """Positions along y [m]."""
         return self.xy[:, 1]
+
+    @cached_property
+    def heading(self) -> NDArray[np.float64]:
+        """Headings, counter-clockwise from +x, 0 to 2 pi [rad]."""
+        radians: NDArray[np.float64] = in_radians(self._poses.heading)
+        return radians
 
     @cached_property
     def away(self) -> NDArray[np.bool_]:

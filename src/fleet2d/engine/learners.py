@@ -13,8 +13,9 @@ from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.output import to_columns
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
+from fleet2d.engine.blame import blame
 from fleet2d.engine.clock import Clock
-from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
+from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean
@@ -98,7 +99,7 @@ class Learners:
                 if learner.since < end:
                     self._update(learner, end, log, self.outputs)
                     learner.since = end
-                with _blame(learner.path, end):
+                with blame(learner.path, end):
                     results[learner.name] = learner.component.result()
         return results
 
@@ -110,7 +111,7 @@ class Learners:
                 f" ({self.clock.step_us / 1e6:g} s): choose a multiple"
             )
         component = component.model_copy()
-        with _blame(path, 0):
+        with blame(path, None):
             component.start(self.home)
         self.all.append(Learner(name, path, component, every))
 
@@ -122,7 +123,7 @@ class Learners:
             learner.path, end - 1, self.clock.time(end - 1), self.home, self.users, self.robots,
             outputs, self.seed
         )  # fmt: skip
-        with _blame(learner.path, end - 1):
+        with blame(learner.path, end - 1):
             output = learner.component.update(history, state)
             if output is not None:
                 columns = to_columns(output, self._room_names, learner.path)
@@ -165,22 +166,3 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     except CycleError as error:
         circle = " reads ".join(reversed(error.args[1]))
         raise ScenarioError(f"algorithms read each other in a circle: {circle}") from None
-
-
-class _blame:  # noqa: N801  (used as a function)
-    """Name the component and the step when a user's code fails."""
-
-    def __init__(self, path: str, step: int) -> None:
-        self.path, self.step = path, step
-
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        """Turn an exception into one that says whose it is."""
-        if isinstance(error, Exception) and not isinstance(error, Fleet2DError):
-            raise ComponentError(
-                f"{self.path} failed at step {self.step}: {type(error).__name__}: {error}"
-            ) from error
-        if isinstance(error, ComponentError) and self.path not in str(error):
-            raise ComponentError(f"{self.path} failed at step {self.step}: {error}") from error

@@ -15,7 +15,7 @@ from fleet2d.entities.plan import State
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.headings import TURN, in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import (
     Breakpoints,
@@ -85,8 +85,15 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     _trace(run, plan, entity, clock, keys, stride, out)
     xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
     room = np.where(out.away, -1, plan.room_of_cell[out.y // SUB, out.x // SUB])
-    radians = (out.heading * (2 * np.pi / TURN)).astype(np.float64)
-    return Path(steps, clock.times(steps), xy[:, 0], xy[:, 1], radians, out.away.astype(bool), room)
+    return Path(
+        steps,
+        clock.times(steps),
+        xy[:, 0],
+        xy[:, 1],
+        in_radians(out.heading),
+        out.away.astype(bool),
+        room,
+    )
 
 
 def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Track
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.units import micros
@@ -268,7 +268,7 @@ class Recorder:
             entity=entity.astype(np.int32),
             x=xy[:, 0],
             y=xy[:, 1],
-            heading=_radians(heading),
+            heading=in_radians(heading),
             room=np.where(gone, np.int32(-1), room),
             away=gone,
         )
@@ -287,7 +287,7 @@ class Recorder:
             kind=rows[:, 2].astype(np.int32),
             x=xy[:, 0],
             y=xy[:, 1],
-            heading=_radians(rows[:, 6]),
+            heading=in_radians(rows[:, 6]),
             away=rows[:, 7].astype(bool),
         )
 
@@ -370,8 +370,3 @@ def _in_order(blocks: list[NDArray[np.int64]]) -> NDArray[np.int64]:
     """Join blocks of rows (step, entity, …) and sort them; ties stay in the order gathered."""
     rows = np.concatenate(blocks)
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-
-
-def _radians(heading: NDArray[np.int64]) -> NDArray[np.float64]:
-    radians: NDArray[np.float64] = heading * np.float64(2 * np.pi / TURN)
-    return radians

@@ -31,6 +31,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
 from fleet2d.floorplan.home import Home
+from fleet2d.kernels.headings import in_radians
 from fleet2d.scenario.model import Scenario, load_scenario
 
 
@@ -117,7 +118,7 @@ class Simulation:
 
     @property
     def state(self) -> dict[str, dict[str, Any]]:
-        """Where everybody is at the next step: x, y [m], heading [1/4096 turn], room, away."""
+        """Where everybody is at the next step: x, y [m], heading [rad], room, away."""
         return {actor.name: self._state_of(actor) for actor in self._all}
 
     @property
@@ -349,7 +350,7 @@ class Simulation:
         return {
             "x": x,
             "y": y,
-            "heading": state.heading,
+            "heading": in_radians(state.heading),
             "room": room.name if room else None,
             "away": bool(state.away),
         }

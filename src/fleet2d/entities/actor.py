@@ -6,6 +6,7 @@ from datetime import timedelta
 
 import numpy as np
 
+from fleet2d.engine.blame import blame
 from fleet2d.engine.clock import Clock
 from fleet2d.engine.streams import Draws, stream_key
 from fleet2d.entities.behavior import Behavior, Situation
@@ -52,9 +53,10 @@ class Actor:
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
         self.behaviors = [behavior.model_copy() for behavior in self.entity.behaviors]
-        self.state = self._begin()
-        for behavior in self.behaviors:
-            behavior.start(self)
+        with blame(self.path, None):
+            self.state = self._begin()
+            for behavior in self.behaviors:
+                behavior.start(self)
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
@@ -140,16 +142,22 @@ class Actor:
         """Ask the behaviors, in order, for a plan that begins at `step`."""
         now = Situation(self, step, events, outputs)  # type: ignore[arg-type]
         plan = None
-        for behavior in self.behaviors:
-            plan = behavior.decide(now)
-            if plan is not None:
-                break
+        with blame(self.path, step):
+            for behavior in self.behaviors:
+                plan = behavior.decide(now)
+                if plan is not None:
+                    break
         if plan is None:
             plan = now.plan()
             plan = plan.stay(PAUSE) if self.behaviors else plan.stay()
         if not isinstance(plan, Plan):
             raise ComponentError(
                 f"{self.path}: decide() returned {plan!r}; a plan or None is wanted"
+            )
+        if plan.began != (step, self.state):
+            raise ComponentError(
+                f"{self.path}: decide() returned a plan that doesn't begin here and now: make a new one"
+                " by now.plan()"
             )
         self.plan, self.motion, self.planned_at = plan, plan.finish(), step
         # A plan that takes no time would be asked for again and again at the same step.
@@ -170,8 +178,17 @@ class Actor:
             self.part = max(self.space.part_at(x, y), 0)
             x, y = self.point(place)  # type: ignore[arg-type]
         else:
+            self.part = self._first_part(place)  # type: ignore[arg-type]
             x, y = self.find(place, 0, "start")
         heading = self.entity.start_heading_deg
         if heading is None:
             return State(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
         return State(x, y, round(heading / 360 * TURN) % TURN, away)
+
+    def _first_part(self, names: RoomChoice) -> int:
+        """Return the largest part of its space that has one of these rooms; the largest if none has."""
+        for part in range(self.space.parts):
+            reachable = [r for r in self.home.rooms if len(self.space.cells(r.index, part))]
+            if {ANY, *(r.name for r in reachable), *(r.type for r in reachable)} & set(names):
+                return part
+        return 0

@@ -54,6 +54,10 @@ class Track:
     breakpoints: Breakpoints
     step_us: int
 
+    def __deepcopy__(self, memo: dict[int, object]) -> "Track":
+        """Return itself: it never changes."""
+        return self
+
     def trace(self, first: int, start: State, out: Poses) -> None:
         """Write the poses of the steps from `first` on."""
         trace_track(self.breakpoints, first * self.step_us, self.step_us, len(out.x), out)
@@ -66,6 +70,10 @@ class Meander:
     walls: Mesh
     space: Mesh
     rule: WalkRule
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Meander":
+        """Return itself: it never changes."""
+        return self
 
     def trace(self, first: int, start: State, out: Poses) -> None:
         """Write the poses of the steps from `first` on."""
@@ -86,6 +94,7 @@ class Plan:
     The behavior is asked again when the plan is over, or when one of `interrupts` happens.
 
     Attributes:
+        began: The step at which it begins, and the state of the body then.
         time_us: The moment up to which it is planned [us since the start].
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
@@ -94,6 +103,7 @@ class Plan:
     def __init__(self, actor: "Actor", step: int) -> None:
         state = actor.state
         self._actor = actor
+        self.began = (step, state)
         self._rows: list[I64] = []
         self._motion: Motion | None = None
         self.time_us = step * actor.clock.step_us
@@ -116,7 +126,6 @@ class Plan:
 
         In a room, the place is a spot drawn from its free cells; `purpose` names the random stream.
         """
-        self.come_home()
         return self.go_to_point(*self._actor.find(place, self.time_us, purpose))
 
     def go_to_point(self, x: int, y: int) -> Self:
@@ -125,6 +134,8 @@ class Plan:
         Raises:
             ComponentError: There is no way to it.
         """
+        self.come_home()
+        self._check_goes_on()
         actor = self._actor
         route = actor.space.route((self.x, self.y), (x, y))
         if route is None:
@@ -140,6 +151,7 @@ class Plan:
 
     def turn_by(self, turns: float) -> Self:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
+        self._check_goes_on()
         whole = round(turns * TURN)
         sign = 1 if whole > 0 else -1
         left = abs(whole)
@@ -152,8 +164,15 @@ class Plan:
         return self
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
-        """Stay for a while, or until a local time (at once over if that is past); else for good."""
+        """Stay for a while, or until a local time (at once over if that is past); else for good.
+
+        Raises:
+            ComponentError: The duration is negative.
+        """
+        self._check_goes_on()
         if duration is not None:
+            if duration < timedelta(0):
+                raise ComponentError(f"{self._actor.path}: can't stay for {duration}")
             self.time_us += micros(duration)
         elif until is not None:
             self.time_us = max(self.time_us, self._actor.clock.elapsed(until))
@@ -182,6 +201,7 @@ class Plan:
     def meander(self, rule: WalkRule) -> Self:
         """Walk at random, for good; must be all that the plan does."""
         self.come_home()
+        self._check_goes_on()
         if len(self._rows) > 2 or self.time_us != self._rows[0][0, 0]:
             raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
         self._motion = Meander(self._actor.home.plan.mesh, self._actor.space.mesh, rule)
@@ -216,6 +236,13 @@ class Plan:
             track = Breakpoints(time, x, y, heading, rows[:, 4].astype(np.uint8))
             self._motion = Track(track, self._actor.clock.step_us)
         return self._motion
+
+    def _check_goes_on(self) -> None:
+        if self.endless:
+            raise ComponentError(
+                f"{self._actor.path}: a plan that stays or meanders for good can't go on: give stay()"
+                " a duration, or make that the end"
+            )
 
     def _mark(self) -> None:
         self._rows.append(

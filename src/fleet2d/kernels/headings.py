@@ -5,8 +5,10 @@ machines. The table is rounded to 2**-30, where no libm disagrees (a test pins i
 """
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.kernels._jit import kernel
 
@@ -67,3 +69,8 @@ def heading_of(dx: int, dy: int) -> int:
 def turn_between(start: int, end: int) -> int:
     """Return the shorter signed turn from `start` to `end`, in [-2048, 2047]."""
     return ((end - start + HALF_TURN) & (TURN - 1)) - HALF_TURN
+
+
+def in_radians(heading: int | NDArray[np.int64]) -> Any:
+    """Return headings in radians, 0 to 2 pi."""
+    return heading * (2 * math.pi / TURN)

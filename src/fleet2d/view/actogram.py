@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.view.floorplan import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
+from fleet2d.view.page import HATCH_COLOR, QUIET_COLOR
 from fleet2d.view.traces import Trace
 
 DAY_US = 86_400_000_000
@@ -19,8 +20,6 @@ BINS = 1440  # pieces of a day that have a colour each
 MARKS = 288  # pieces of a day that are marked if somebody was seen in them
 # The floor plan's colours are pale, for words are written on them; a row is a few pixels high.
 DEEPER = 1.9
-HATCH_COLOR = "#cfd2d6"
-QUIET_COLOR = "#6b7078"
 GAPS_UP_TO = 75  # days; with more, there is no space left between the rows
 # The part of a row that marks take, at its bottom.
 MARK_PART = 0.3
@@ -43,10 +42,10 @@ def rooms_by_day(trace: Trace, start: datetime, step_us: int, steps: int) -> Roo
         microseconds=1
     )
     days = -(-(midnight + steps * step_us) // DAY_US)
-    # In the middle of each minute, so that a run of a few seconds may colour none, but no run one more.
-    since = (np.arange(days * BINS) + 0.5) * (DAY_US / BINS) - midnight
-    sample = np.clip((since // trace.every_us).astype(np.int64), 0, len(trace.room) - 1)
-    rooms = np.where((since < 0) | (since >= steps * step_us), NOT_SIMULATED, trace.room[sample])
+    begins = np.arange(days * BINS) * (DAY_US // BINS) - midnight
+    ends = begins + DAY_US // BINS
+    sample = np.clip((begins + ends) // 2 // trace.every_us, 0, len(trace.room) - 1)
+    rooms = np.where((ends <= 0) | (begins >= steps * step_us), NOT_SIMULATED, trace.room[sample])
     return rooms.reshape(days, BINS).astype(np.int16)
 
 
@@ -111,13 +110,17 @@ def _draw_marks(marks: NDArray[Any], axes: Axes) -> None:
     left, right = first * (24 / MARKS), last * (24 / MARKS)
     top, bottom = day + 1 - MARK_PART, day + 1.0
     corners = np.stack([left, top, right, top, right, bottom, left, bottom], axis=1)
-    boxes = PolyCollection(corners.reshape(-1, 4, 2), facecolors=TEXT_COLOR, lw=0, zorder=2)
+    # The rows of a year are a pixel or two high: dark marks would hide the rooms.
+    alpha = 1.0 if len(marks) <= GAPS_UP_TO else 0.35
+    boxes = PolyCollection(
+        boxes, facecolors=TEXT_COLOR, alpha=alpha, lw=0, zorder=2
+    )
     axes.add_collection(boxes, autolim=False)
 
 
 def _label(axes: Axes, start: datetime, days: int, *, dates: bool) -> None:
     low, high = axes.get_xlim()
-    wide = axes.get_position().width * axes.figure.get_figwidth() > 2.4  # inches
+    wide = axes.bbox.width / axes.figure.dpi > 2.4  # inches
     step = (
         (3 if wide else 6)
         if high - low > 12

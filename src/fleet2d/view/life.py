@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.sight.region import VisibleRegion
+from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 from fleet2d.view.traces import Trace
 
 BLUR_M = 0.14  # a body is a soft spot of about its own size
 SOLID = 0.78  # opacity where somebody was longest
 FAINT = 0.02
 CANDIDATES = 60  # moments looked at to find one that shows what a robot sees
-SPOTS = 1500
+SPOTS = 500
 CLEAR_M = 0.5  # twice the space between a name and a robot
 FAR_ENOUGH_M = 2.0
 
@@ -75,16 +76,10 @@ def draw_presence(plan: FloorPlan, trace: Trace, axes: Axes) -> None:
 
 def draw_ways(trace: Trace, axes: Axes) -> None:
     """Draw the ways that a body went as thin lines."""
-    count = max(1, len(trace.legs))
-    alpha = (
-        float(np.clip(40 / count, 0.1, 0.3))
-        if not trace.robot
-        else float(np.clip(60 / count, 0.12, 0.6))
-    )
-    width, dashes = (0.9, (0, (5, 2))) if trace.robot else (0.9, "solid")
-    lines = LineCollection(
-        list(trace.legs), colors=trace.color, lw=width, ls=dashes, alpha=alpha, zorder=2.5
-    )
+    # Few ways are drawn dark, many faint: they add up where they meet.
+    darkest, faintest, enough = (0.6, 0.09, 60) if trace.robot else (0.3, 0.04, 60)
+    alpha = min(darkest, max(faintest, enough / max(1, len(trace.legs))))
+    lines = LineCollection(list(trace.legs), colors=trace.color, lw=0.9, alpha=alpha, zorder=2.5)
     axes.add_collection(lines, autolim=False)
 
 
@@ -93,7 +88,14 @@ def draw_sightings(spots: F64, color: str, axes: Axes) -> None:
     places = np.unique(np.rint(spots * 10), axis=0) / 10
     places = places[:: 1 + len(places) // SPOTS]
     axes.scatter(
-        *places.T, s=7, facecolors="none", edgecolors=color, linewidths=0.45, alpha=0.6, zorder=3.5
+        places[:, 0],
+        places[:, 1],
+        s=7,
+        facecolors="none",
+        edgecolors=color,
+        linewidths=0.45,
+        alpha=0.6,
+        zorder=3.5,
     )
 
 
@@ -102,9 +104,9 @@ def draw_view(view: View, radius: float, axes: Axes) -> None:
     color = view.robot.color
     for outline in view.outline:
         axes.add_patch(
-            Polygon(outline, facecolor="#ffd23f", alpha=0.38, edgecolor="none", zorder=2.2)
+            Polygon(outline, facecolor=VIEW_COLOR, alpha=0.38, edgecolor="none", zorder=2.2)
         )
-        axes.add_patch(Polygon(outline, fill=False, edgecolor="#b98900", lw=0.7, zorder=3.2))
+        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=0.7, zorder=3.2))
     for x, y in view.seen.tolist():
         axes.plot([view.xy[0], x], [view.xy[1], y], color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=4)
         axes.plot(x, y, "o", ms=5, mfc="white", mec=color, mew=1.1, zorder=4.2)
@@ -116,7 +118,7 @@ def draw_view(view: View, radius: float, axes: Axes) -> None:
 
 
 def clear_names(plan: FloorPlan, views: Sequence[View], axes: Axes) -> None:
-    """Keep the rooms' names legible: on a soft ground, and moved off the robots and whom they see."""
+    """Keep the rooms' names legible: on a soft ground, off the robots and whom they see."""
     marks = np.array([xy for view in views for xy in (view.xy, *view.seen)]).reshape(-1, 2)
     canvas: Any = axes.figure.canvas
     pixels = axes.transData.inverted()
@@ -179,12 +181,12 @@ def telling_view(
 
 def field_of_view(
     plan: FloorPlan, xy: F64, heading: float, camera: dict[str, Any]
-) -> shapely.Geometry:
+) -> shapely.MultiPolygon:
     """Return what a camera sees from a place [m]: visible, in range, and within its angle."""
     try:
         visible = shapely.Polygon(VisibleRegion(plan, *xy.tolist()).polygon())
     except PlacementError:
-        return shapely.Polygon()
+        return shapely.MultiPolygon()
     near, far = camera["range"]
     half = np.deg2rad(camera["angle_deg"]) / 2
     angles = np.linspace(heading - half, heading + half, max(3, round(half * 2 / pi * 180)))
@@ -214,4 +216,3 @@ def _blurred(image: F64, sigma: float) -> F64:
         slices = [np.take(padded, range(k, k + size), axis=axis) for k in range(len(at))]
         blurred = np.sum([w * s for w, s in zip(bell, slices, strict=True)], axis=0)
     return blurred
-

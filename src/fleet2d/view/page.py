@@ -15,6 +15,7 @@ from fleet2d.view.floorplan import TEXT_COLOR
 
 CHIP_IN = 0.15
 LINE_IN = 0.215
+BETWEEN_IN = 0.17
 QUIET_COLOR = "#6b7078"
 VIEW_COLOR = "#ffd23f"
 VIEW_EDGE = "#b98900"
@@ -24,7 +25,7 @@ HATCH_COLOR = "#cfd2d6"
 class Chip(NamedTuple):
     """An entry of a legend: a small picture, and what it stands for."""
 
-    kind: Literal["room", "away", "seen", "spot", "way", "ring", "view", "words"]
+    kind: Literal["room", "away", "seen", "spot", "way", "ring", "view"]
     color: Any
     words: str
 
@@ -36,10 +37,14 @@ class Page:
         """Lay the page over the figure."""
         self._figure = figure
         self._canvas = FigureCanvasAgg(figure)
-        width, height = figure.get_size_inches().tolist()
         self.axes: Axes = figure.add_axes((0, 0, 1, 1), zorder=10)
-        self.axes.set(xlim=(0, width), ylim=(0, height))
         self.axes.set_axis_off()
+        self.resize(*figure.get_size_inches().tolist())
+
+    def resize(self, width: float, height: float) -> None:
+        """Change the size of the figure [in]."""
+        self._figure.set_size_inches(width, height)
+        self.axes.set(xlim=(0, width), ylim=(0, height))
 
     def write(self, x: float, y: float, words: str, size: float, **style: Any) -> float:
         """Write a line, y at its baseline; return where it ends."""
@@ -62,20 +67,34 @@ class Page:
         text.remove()
         return words if words == whole else words.rstrip() + "…"
 
-    def legend(self, x: float, y: float, width: float, chips: Sequence[Chip], size: float) -> float:
-        """Lay out chips in lines from (x, y) down; return the y below the last line."""
-        at = x
+    def lines(self, width: float, chips: Sequence[Chip], size: float) -> list[list[Chip]]:
+        """Return the chips of each line of a legend of a width [in]."""
+        lines: list[list[Chip]] = [[]]
+        taken = 0.0
         for chip in chips:
-            label = self.axes.text(0, y, chip.words, fontsize=size, color=QUIET_COLOR, va="center")
-            picture = 0.0 if chip.kind == "words" else CHIP_IN * (1.6 if chip.kind == "way" else 1.0) + 0.06
-            needed = picture + self.width(label)
-            if at > x and at + needed > x + width:
-                at, y = x, y - LINE_IN
-            if chip.kind != "words":
-                self._picture(chip, at, y)
-            label.set_position((at + picture, y - 0.005))
-            at += needed + 0.17
-        return y - LINE_IN
+            needed = self._needed(chip, size)
+            if lines[-1] and taken + needed > width:
+                lines.append([])
+                taken = 0.0
+            lines[-1].append(chip)
+            taken += needed + BETWEEN_IN
+        return lines
+
+    def legend(self, x: float, y: float, lines: Sequence[Sequence[Chip]], size: float) -> None:
+        """Lay out lines of chips from (x, y) down."""
+        for number, chips in enumerate(lines):
+            at, middle = x, y - number * LINE_IN
+            for chip in chips:
+                self._picture(chip, at, middle)
+                style = {"color": QUIET_COLOR, "va": "center_baseline"}
+                self.write(at + _picture_width(chip), middle, chip.words, size, **style)
+                at += self._needed(chip, size) + BETWEEN_IN
+
+    def _needed(self, chip: Chip, size: float) -> float:
+        text = self.axes.text(0, 0, chip.words, fontsize=size)
+        width = self.width(text)
+        text.remove()
+        return _picture_width(chip) + width
 
     def _picture(self, chip: Chip, x: float, y: float) -> None:
         """Draw the picture of a chip, its left middle at (x, y)."""
@@ -87,13 +106,17 @@ class Page:
         if chip.kind == "seen":
             draw.add_patch(Rectangle((x, low), side, 0.3 * side, facecolor=TEXT_COLOR, lw=0))
         if chip.kind == "away":
-            style = {"facecolor": "white", "edgecolor": HATCH_COLOR, "hatch": "////////", "lw": 0.5}
+            style: dict[str, Any] = {
+                "facecolor": "white",
+                "edgecolor": HATCH_COLOR,
+                "hatch": "////////",
+                "lw": 0.5,
+            }
             draw.add_patch(Rectangle((x, low), side, side, **style))
         if chip.kind == "spot":
             for part, alpha in ((0.62, 0.2), (0.42, 0.35), (0.24, 0.8)):
                 draw.add_patch(Circle(middle, part * side, facecolor=chip.color, alpha=alpha, lw=0))
-        if chip.kind in ("way"):
-            dashes = "solid" if chip.kind == "way" else (0, (4, 1.6))
+        if chip.kind == "way":
             line = [np.array([[x, y], [x + 1.6 * side, y]])]
             draw.add_collection(LineCollection(line, colors=chip.color, lw=1.3), autolim=False)
         if chip.kind == "ring":
@@ -103,3 +126,7 @@ class Page:
             style = {"facecolor": VIEW_COLOR, "edgecolor": VIEW_EDGE, "lw": 0.7, "alpha": 0.8}
             draw.add_patch(Wedge(corner, 0.9 * side, -40, 40, **style))
 
+
+def _picture_width(chip: Chip) -> float:
+    """Return how wide the picture of a chip is, with the space after it [in]."""
+    return CHIP_IN * (1.6 if chip.kind == "way" else 1.0) + 0.06

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.view.actogram import (
-    NOT_SIMULATED,
     draw_actogram,
     marks_by_day,
     room_color,
@@ -31,7 +29,7 @@ from fleet2d.view.life import (
     telling_view,
 )
 from fleet2d.view.page import LINE_IN, QUIET_COLOR, Chip, Page
-from fleet2d.view.traces import Trace, trace_of
+from fleet2d.view.traces import Trace, categories, trace_of
 
 SHOWN = 4  # users that have an actogram, and robots that are drawn
 
@@ -39,15 +37,18 @@ SHOWN = 4  # users that have an actogram, and robots that are drawn
 WIDTH = 10.67
 EDGE = 0.32
 HEADER = 0.82
-FOOTER = 0.9
+FOOTER = 0.28  # below the last line of the legends
 GAP = 0.3
 DATES = 0.78  # beside the first actogram
 CAPTION = 0.42  # above each actogram
-ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 5.0, 3: 5.6, 4: 6.1}
+ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 4.9, 3: 5.1, 4: 5.4}
 BODY = (3.4, 6.6)
+TICKS = 0.24  # below each actogram
 ROW_MOST = 0.55
 
 SMALL = 7.5
+SEPARATOR = " · "
+WIDE_SEPARATOR = "   ·   "
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,8 @@ def draw_run(run: Run, path: Path) -> None:
         path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
 
     Raises:
-        InputError: The name ends otherwise, the file can't be written, or the run has no floor plan.
+        InputError: The name ends otherwise, or the file can't be written.
+        ArtifactError: The run has no floor plan.
 
     Example:
         >>> import fleet2d, tempfile
@@ -99,6 +101,7 @@ class _Picture:
         self.notes: list[str] = []
         self.users = self._traces("users", robot=False)
         self.robots = self._traces("robots", robot=True)
+        self.notes += _told_together([*self.users, *self.robots])
         self.seen = _observations(run, [user.name for user in self.users])
         self.views = list(self._views())
         self.panels = self.users or self.robots
@@ -119,7 +122,6 @@ class _Picture:
             trace = trace_of(self.run, self.plan, name, number, robot=robot)
             if trace is not None:
                 found.append(trace)
-                self.notes += [f"{name}: {trace.note}"] if trace.note else []
         if names and not found:
             self.notes.append(f"where {bucket} were is not stored")
         return found
@@ -153,10 +155,17 @@ class _Picture:
         self.right = ACTOGRAMS[len(self.panels)]
         self.left = WIDTH - 2 * EDGE - self.right - (GAP if self.right else 0.0)
         self.body = float(np.clip(self.left * (high - low) / (right - left), *BODY))
-        self.foot = FOOTER + LINE_IN * (len(self.notes) > 0)
-        self.height = HEADER + self.body + self.foot
-        self.figure = Figure(figsize=(WIDTH, self.height), dpi=DPI, facecolor="white")
+        self.figure = Figure(figsize=(WIDTH, self.body), dpi=DPI, facecolor="white")
         self.page = Page(self.figure)
+        self.days = [
+            rooms_by_day(trace, self.start, self.step_us, self.steps) for trace in self.panels
+        ]
+        self.life_lines = self.page.lines(self.left, list(self._life_chips()), SMALL)
+        self.room_lines = self.page.lines(self.right - DATES, list(self._room_chips()), SMALL)
+        lines = max(len(self.life_lines), len(self.room_lines))
+        self.foot = FOOTER + LINE_IN * (lines + (len(self.notes) > 0))
+        self.height = HEADER + self.body + self.foot
+        self.page.resize(WIDTH, self.height)
 
     def _axes(self, x: float, y: float, width: float, height: float) -> Any:
         """Open axes at a place [in]."""
@@ -179,9 +188,11 @@ class _Picture:
             f"seed {self.run.manifest['seed']}",
             f"digest {digest[:12]}" if digest else "no digest",
         ]
-        x = self.page.write(EDGE, top - 0.66, "   ·   ".join(facts), 8.5, color=QUIET_COLOR)
+        x = self.page.write(EDGE, top - 0.66, WIDE_SEPARATOR.join(facts), 8.5, color=QUIET_COLOR)
         if self.run.status != "complete":
-            self.page.write(x + 0.2, top - 0.66, self.run.status, 8.5, color=ACCENT_COLOR, weight="bold")
+            self.page.write(
+                x + 0.2, top - 0.66, self.run.status, 8.5, color=ACCENT_COLOR, weight="bold"
+            )
 
     def _life(self) -> None:
         axes = self._axes(EDGE, self.foot, self.left, self.body)
@@ -198,7 +209,7 @@ class _Picture:
             draw_sightings(self.seen.xy[self.seen.robot == robot.name], robot.color, axes)
         for view in self.views:
             draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
-        self.page.legend(EDGE, self.foot - 0.13, self.left, list(self._life_chips()), SMALL)
+        self.page.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
 
     def _life_chips(self) -> Iterator[Chip]:
         for user in self.users:
@@ -207,9 +218,12 @@ class _Picture:
         if ways:
             yield Chip("way", ways[0].color, "ways walked")
         for robot in self.robots:
-            yield Chip("way", robot.color, f"{robot.name}{self._covers(robot.name)}")
+            facts = filter(None, [robot.name, self._covers(robot.name)])
+            yield Chip("way", robot.color, SEPARATOR.join(facts))
         if len(self.seen.step):
-            yield Chip("ring", self.robots[0].color if self.robots else QUIET_COLOR, "seen here by a robot")
+            yield Chip(
+                "ring", self.robots[0].color if self.robots else QUIET_COLOR, "seen here by a robot"
+            )
         for view in self.views:
             when = self.start + timedelta(microseconds=view.step * self.step_us)
             yield Chip("view", None, f"what {view.robot.name} sees, {_date(when)}")
@@ -218,36 +232,34 @@ class _Picture:
         count = len(self.panels)
         if not count:
             return
-        days = [rooms_by_day(trace, self.start, self.step_us, self.steps) for trace in self.panels]
         x = WIDTH - EDGE - self.right + DATES
         gap = 0.2
         width = (self.right - DATES - gap * (count - 1)) / count
-        height = min(self.body - CAPTION - 0.2, ROW_MOST * len(days[0]))
+        height = min(self.body - CAPTION - TICKS, ROW_MOST * len(self.days[0]))
         bottom = self.foot + self.body - CAPTION - height
-        for number, (trace, rooms) in enumerate(zip(self.panels, days, strict=True)):
+        for number, (trace, rooms) in enumerate(zip(self.panels, self.days, strict=True)):
             at = x + number * (width + gap)
             axes = self._axes(at, bottom, width, height)
             steps = self.seen.step[self.seen.user == trace.name]
             marks = marks_by_day(steps, self.start, self.step_us, len(rooms))
             draw_actogram(self.plan, rooms, marks, self.start, axes, dates=number == 0)
-            self._caption(trace, rooms, at, bottom + height, width)
-        below = bottom - 0.42
-        self.page.legend(x, below, self.right - DATES, list(self._room_chips(days)), SMALL)
+            self._caption(trace, at, bottom + height, width)
+        self.page.legend(x, bottom - TICKS - 0.13, self.room_lines, SMALL)
 
-    def _caption(self, trace: Trace, rooms: NDArray[Any], x: float, y: float, width: float) -> None:
+    def _caption(self, trace: Trace, x: float, y: float, width: float) -> None:
         name = self.page.fit(trace.name, 9.5, width)
         self.page.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
-        home = np.count_nonzero(rooms >= 0) / max(1, np.count_nonzero(rooms != NOT_SIMULATED))
-        facts = [] if trace.robot else [f"at home {_percent(home)}"]
+        facts = [] if trace.robot else [f"{_percent(float(np.mean(trace.room >= 0)))} at home"]
         seen = self._metric("sightings").get(trace.name)
-        if seen is not None:
-            facts.append(f"seen {_percent(seen)} of that")
-        words = " · ".join(facts) + self._covers(trace.name)
-        words = words.removeprefix(" · ")
-        self.page.write(x, y + 0.09, self.page.fit(words, SMALL, width), SMALL, color=QUIET_COLOR)
+        if seen is not None and self.robots:
+            facts.append(f"{_percent(seen)} of that seen")
+        facts += [covers] if (covers := self._covers(trace.name)) else []
+        while len(facts) > 1 and self.page.fit(SEPARATOR.join(facts), SMALL, width).endswith("…"):
+            facts.pop()
+        self.page.write(x, y + 0.09, SEPARATOR.join(facts), SMALL, color=QUIET_COLOR)
 
-    def _room_chips(self, days: list[NDArray[Any]]) -> Iterator[Chip]:
-        here = np.unique(np.concatenate([rooms.ravel() for rooms in days]))
+    def _room_chips(self) -> Iterator[Chip]:
+        here = np.unique(np.concatenate([rooms.ravel() for rooms in self.days] or [[]]))
         told = set()
         for index in here[here >= 0].tolist():
             kind = self.plan.rooms[index].type
@@ -260,8 +272,8 @@ class _Picture:
             yield Chip("seen", "#dfe1e4", "seen by a robot")
 
     def _footer(self) -> None:
-        words = "   ·   ".join(dict.fromkeys(self.notes))
-        self.page.write(EDGE, 0.16, self.page.fit(words, SMALL, WIDTH - 2 * EDGE), SMALL, color=ACCENT_COLOR)
+        words = self.page.fit(SEPARATOR.join(self.notes), SMALL, WIDTH - 2 * EDGE)
+        self.page.write(EDGE, 0.2, words, SMALL, color=QUIET_COLOR, style="italic")
 
     # Numbers
 
@@ -277,7 +289,7 @@ class _Picture:
         metres = self._metric("distance").get(name)
         if metres is None:
             return ""
-        return f" · {metres / 1000:.1f} km a day" if metres >= 1000 else f" · {metres:.0f} m a day"
+        return f"{metres / 1000:.1f} km a day" if metres >= 1000 else f"{metres:.0f} m a day"
 
 
 def _observations(run: Run, users: list[str]) -> Seen:
@@ -286,14 +298,20 @@ def _observations(run: Run, users: list[str]) -> Seen:
         none = np.zeros(0, np.int64)
         return Seen(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
     table = run.tables["observations"]
-    words = {
-        name: table[name].combine_chunks().cast("string").to_numpy(zero_copy_only=False)
-        for name in ("robot", "user")
-    }
-    mine = np.isin(words["user"].astype(str), users)
+    robot, user = (
+        np.array([*names, ""])[code]
+        for code, names in map(categories, (table["robot"], table["user"]))
+    )
+    mine = np.isin(user, users)
     xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
-    step = table["step"].to_numpy()
-    return Seen(step[mine], words["robot"][mine], words["user"][mine], xy[mine])
+    return Seen(table["step"].to_numpy()[mine], robot[mine], user[mine], xy[mine])
+
+
+def _told_together(traces: list[Trace]) -> Iterator[str]:
+    """Yield what isn't shown as it was, each remark once, with the bodies that it is about."""
+    for note in dict.fromkeys(trace.note for trace in traces if trace.note):
+        names = ", ".join(trace.name for trace in traces if trace.note == note)
+        yield f"{names}: {note}"
 
 
 def _date(when: datetime) -> str:

@@ -107,9 +107,10 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
             return _no_legs(), ""
         path = rebuild_path(run, plan, name, timedelta(microseconds=step_us))
         legs = _joined(np.stack([path.x, path.y], axis=1), path.away)
-        shown = len(legs) if len(legs) <= LEGS else LEGS
-        hours = int(path.step[-1]) * step_us / 3.6e9 * shown / max(1, len(legs))
-        return legs[:shown], "" if shown == len(legs) else f"its ways: the first {hours:.1f} h"
+        if len(legs) <= LEGS:
+            return legs, ""
+        moving = np.flatnonzero(np.diff(path.x).astype(bool) | np.diff(path.y).astype(bool))
+        return legs[:LEGS], f"ways of the first {int(moving[LEGS]) * step_us / 3.6e9:.2g} h"
     # Where a leg was broken off, the next plan begins: the end that was only planned is left out.
     reached = keys["kind"] != "planned"
     xy = np.stack([keys["x"][reached], keys["y"][reached]], axis=1)
@@ -144,18 +145,24 @@ def _rows(
     run: Run, table: str, name: str, columns: Sequence[str], words: str
 ) -> dict[str, NDArray[Any]]:
     """Return columns of a body's rows of a table; `words` is a column of categories."""
-    from pyarrow import compute
-
     whole = run.tables[table]
-    mine = whole.filter(compute.equal(whole["entity"].cast("string"), name))
-    rows = {column: mine[column].to_numpy() for column in columns}
-    text = mine[words].combine_chunks().cast("string")
-    rows[words] = text.to_numpy(zero_copy_only=False)
+    code, names = categories(whole["entity"])
+    mine = code == names.index(name) if name in names else np.zeros(len(code), np.bool_)
+    rows = {column: whole[column].to_numpy()[mine] for column in columns}
+    code, names = categories(whole[words])
+    rows[words] = np.array([*names, ""])[code[mine]]
     return rows
 
 
+def categories(column: Any) -> tuple[I64, list[str]]:
+    """Return a column of categories as numbers, -1 for nothing, and what they stand for."""
+    encoded = column.cast("string").combine_chunks().dictionary_encode()
+    code = encoded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
+    return code, encoded.dictionary.to_pylist()
+
+
 def _joined(xy: F64, away: NDArray[np.bool_]) -> F64:
-    """Return the pieces between positions that follow each other, without those across an absence."""
+    """Return the moves from position to position, without those across an absence."""
     legs = np.stack([xy[:-1], xy[1:]], axis=1)
     gone = away.astype(bool)
     walked = (legs[:, 0] != legs[:, 1]).any(axis=1) & ~gone[:-1] & ~gone[1:]
@@ -169,6 +176,6 @@ def _no_legs() -> F64:
 
 def _length(us: int) -> str:
     seconds = us / 1e6
-    if seconds < 120:
+    if seconds < 60:
         return f"{seconds:g} s"
-    return f"{seconds / 60:g} min" if seconds < 7200 else f"{seconds / 3600:g} h"
+    return f"{seconds / 60:g} min" if seconds < 3600 else f"{seconds / 3600:g} h"

@@ -1,0 +1,42 @@
+"""Whose fault an error is: a component's, at a step."""
+
+from typing import Any
+
+from fleet2d.errors import ArtifactError, ComponentError, InputError
+
+
+class blame:  # noqa: N801  (used as a function)
+    """Name the component and the step when a component's code fails.
+
+    Args:
+        path: The component's path in the scenario.
+        step: The step it is at; None before the run, when wrong input is not the component's fault.
+
+    Raises:
+        ComponentError: The code raised something; an error about the input before the run stays it.
+
+    Example:
+        >>> with blame("users.ana", 7):
+        ...     {}["kitchen"]
+        Traceback (most recent call last):
+        fleet2d.errors.ComponentError: users.ana failed at step 7: KeyError: 'kitchen'
+    """
+
+    def __init__(self, path: str, step: int | None) -> None:
+        self.path, self.step = path, step
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        """Turn an exception into one that says whose it is."""
+        if not isinstance(error, Exception) or isinstance(error, ArtifactError):
+            return
+        if isinstance(error, InputError) and self.step is None:
+            return
+        own = isinstance(error, ComponentError)
+        if own and self.path in str(error):
+            return
+        what = str(error) if own else f"{type(error).__name__}: {error}"
+        when = "when it was started" if self.step is None else f"at step {self.step}"
+        raise ComponentError(f"{self.path} failed {when}: {what}") from error

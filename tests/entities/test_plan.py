@@ -1,0 +1,352 @@
+"""Plans and who makes them: legs, interruptions, arbitration, and what a behavior may not do."""
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d import Behavior, Plan, Situation
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import ComponentError, InputError
+from tests.scenes import path, scenario, table
+
+Decide = Callable[[Situation], Plan | None]
+_DECIDE: dict[str, Decide] = {}
+
+
+class Told(Behavior):
+    """Does what a function of the test says."""
+
+    name: str
+
+    def decide(self, now: Situation) -> Plan | None:
+        return _DECIDE[self.name](now)
+
+
+def told(*functions: Decide, **body: Any) -> dict[str, Any]:
+    """The configuration of a body that asks these functions in turn."""
+    behaviors = []
+    for number, function in enumerate(functions):
+        name = f"{len(_DECIDE)}-{number}"
+        _DECIDE[name] = function
+        behaviors.append(Told(name=name))
+    return {"start": [1.0, 3.0], "start_heading_deg": 0, "behaviors": behaviors, **body}
+
+
+def run(*functions: Decide, duration: str = "5 min", **body: Any) -> Run:
+    return fleet2d.run(
+        scenario(duration, users={"ana": told(*functions, **body)}, artifacts={"trajectories": "1 s"})
+    )
+
+
+def asked_at(function: Decide) -> tuple[list[int], Decide]:
+    """A list that fills with the steps at which the function is asked."""
+    steps: list[int] = []
+
+    def asked(now: Situation) -> Plan | None:
+        steps.append(now.step)
+        return function(now)
+
+    return steps, asked
+
+
+def minute(now: Situation) -> Plan:
+    return now.plan().stay(timedelta(minutes=1))
+
+
+# --- Legs --------------------------------------------------------------------------------------
+
+
+def test_a_turn_takes_the_long_way_if_told_to() -> None:
+    poses = path(run(lambda now: now.plan().turn_by(-1.5).stay(), turn_rate_deg=18), "ana")
+    turned = np.unwrap(poses.heading)
+    assert turned[:31] == pytest.approx(np.linspace(0, -3 * np.pi, 31), abs=0.01)
+    assert turned[32:] == pytest.approx(-3 * np.pi, abs=0.01)
+
+
+def test_staying_until_a_past_time_takes_no_time() -> None:
+    steps, asked = asked_at(
+        lambda now: now.plan().stay(until=now.time - timedelta(hours=1)).stay(timedelta(seconds=30))
+    )
+    run(asked)
+    assert list(range(0, 300, 30)) == steps
+
+
+def test_staying_until_a_time_ends_at_it() -> None:
+    when = datetime(2026, 1, 5, 7, 1, 40)
+    steps, asked = asked_at(lambda now: now.plan().stay(until=when) if now.time < when else now.plan().stay())
+    run(asked)
+    assert [0, 100] == steps
+
+
+def test_a_plan_that_ends_between_two_steps_is_followed_up_at_the_next() -> None:
+    steps, asked = asked_at(lambda now: now.plan().stay(timedelta(seconds=10.4)))
+    run(asked, duration="1 min")
+    assert [0, 11, 22, 33, 44, 55] == steps
+
+
+def test_a_plan_that_takes_no_time_is_asked_for_once_a_step() -> None:
+    steps, asked = asked_at(lambda now: now.plan())
+    run(asked, duration="1 min")
+    assert list(range(60)) == steps
+
+
+def test_a_plan_knows_the_time_up_to_which_it_is_made() -> None:
+    times = []
+
+    def decide(now: Situation) -> Plan:
+        plan = now.plan().stay(timedelta(seconds=90))
+        times.append((now.time, plan.time))
+        return plan
+
+    run(decide, duration="3 min")
+    start = datetime(2026, 1, 5, 7)
+    assert [(start, start + timedelta(seconds=90)), (start + timedelta(seconds=90), start + timedelta(minutes=3))] == times
+
+
+def test_leaving_and_coming_home() -> None:
+    def decide(now: Situation) -> Plan:
+        plan = now.plan().leave_home().note("gone").stay(timedelta(seconds=60)).come_home()
+        return plan.note("back").stay()
+
+    stored = run(decide)
+    events = table(stored, "events")
+    assert ["left_home", "gone", "came_home", "back"] == events["event"].tolist()
+    gone, back = events["step"][0], events["step"][2]
+    away = path(stored, "ana").away
+    assert 60 <= back - gone <= 61
+    assert away[gone:back].all()
+    assert not away[:gone].any()
+    assert not away[back:].any()
+
+
+def test_leaving_twice_and_coming_home_at_home_do_nothing() -> None:
+    stored = run(lambda now: now.plan().come_home().leave_home().leave_home().stay())
+    assert ["left_home"] == table(stored, "events")["event"].tolist()
+
+
+@pytest.mark.parametrize("leg", ["go_to", "go_to_point"])
+def test_who_is_away_comes_home_before_walking(leg: str) -> None:
+    def decide(now: Situation) -> Plan:
+        if not now.actor.state.away:
+            return now.plan().leave_home().stay(timedelta(seconds=30))
+        assert now.room is None
+        plan = now.plan()
+        if leg == "go_to":
+            return plan.go_to("kitchen").stay()
+        return plan.go_to_point(*now.actor.find("kitchen", 0, "spot")).stay()
+
+    stored = run(decide)
+    assert ["left_home", "came_home"] == table(stored, "events")["event"].tolist()
+    poses = path(stored, "ana")
+    assert not poses.away[-1]
+    assert stored.plan.room("kitchen_0").index == poses.room[-1]
+
+
+def test_notes_are_told_at_the_first_step_not_before_them() -> None:
+    def decide(now: Situation) -> Plan:
+        plan = now.plan().note("now").stay(timedelta(seconds=2.5)).note("later", "why")
+        return plan.stay(timedelta(seconds=1.5)).note("on the step").stay(timedelta(days=1)).note("never")
+
+    events = table(run(decide), "events")
+    assert ["now", "later", "on the step"] == events["event"].tolist()
+    assert [0, 3, 4] == events["step"].tolist()
+    assert ["", "why", ""] == events["detail"].tolist()
+
+
+# --- Who decides -------------------------------------------------------------------------------
+
+
+def test_the_first_behavior_with_a_plan_is_followed() -> None:
+    third, asked_third = asked_at(minute)
+    second, asked_second = asked_at(lambda now: minute(now) if now.step >= 120 else None)
+    first, asked_first = asked_at(lambda now: minute(now) if now.step == 180 else None)
+    run(asked_first, asked_second, asked_third)
+    assert [0, 60, 120, 180, 240] == first
+    assert [0, 60, 120, 240] == second
+    assert [0, 60] == third
+
+
+def test_if_nobody_has_a_plan_it_stays_still_and_asks_again() -> None:
+    steps, asked = asked_at(lambda now: None)
+    stored = run(asked)
+    assert [0, 60, 120, 180, 240] == steps
+    poses = path(stored, "ana")
+    assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
+
+
+def test_without_behaviors_it_stays_still_for_good() -> None:
+    poses = path(run(), "ana")
+    assert (1.0, 3.0) == (poses.x[0], poses.y[0])
+    assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
+
+
+def test_a_situation_tells_where_and_when_it_is() -> None:
+    seen: list[Any] = []
+
+    def decide(now: Situation) -> Plan:
+        seen.append((now.step, now.time, now.xy, now.room.name if now.room else None, now.events))
+        return now.plan().go_to([7.0, 1.0]).stay(timedelta(minutes=2))
+
+    run(decide, duration="3 min")
+    assert (0, datetime(2026, 1, 5, 7), (1.0, 3.0), "living_room_0", ()) == seen[0]
+    assert (7.0, 1.0) == seen[1][2]
+    assert "kitchen_0" == seen[1][3]
+    assert datetime(2026, 1, 5, 7) + timedelta(seconds=seen[1][0]) == seen[1][1]
+
+
+def test_draws_depend_on_body_purpose_and_step_only() -> None:
+    drawn: dict[Any, float] = {}
+
+    def decide(now: Situation) -> Plan:
+        for purpose in ("this", "that"):
+            again = {now.random(purpose).uniform() for _ in range(2)}
+            assert 1 == len(again)
+            drawn[now.actor.name, purpose, now.step] = again.pop()
+        return minute(now)
+
+    fleet2d.run(scenario("3 min", users={"ana": told(decide), "ben": told(decide)}))
+    assert 12 == len(drawn) == len(set(drawn.values()))
+    before = dict(drawn)
+    drawn.clear()
+    fleet2d.run(scenario("3 min", users={"cleo": told(minute), "ana": told(minute, decide), "ben": told(decide)}))
+    assert before.items() >= {k: v for k, v in drawn.items()}.items()
+
+
+# --- Interruptions -----------------------------------------------------------------------------
+
+
+def watched(decide: Decide, *others: Decide, **camera: Any) -> dict[str, Any]:
+    """A user who leaves the living room after 100 s and comes back at 200 s, and a robot in it."""
+
+    def leave(now: Situation) -> Plan:
+        plan = now.plan().stay(timedelta(seconds=100)).go_to([7.0, 6.0])
+        return plan.stay(until=datetime(2026, 1, 5, 7, 3, 20)).go_to([1.0, 3.0]).stay()
+
+    lens = {"range": [0, 10], "angle_deg": 360, "lost_after": "5 s", **camera}
+    robot = told(decide, *others, start=[1.0, 1.0], camera=lens)
+    return scenario("5 min", users={"ana": told(leave)}, robots={"astro": robot})
+
+
+def test_events_that_a_plan_names_end_it_at_the_next_step() -> None:
+    asked: list[Any] = []
+
+    def decide(now: Situation) -> Plan:
+        asked.append((now.step, [(e.event, e.user) for e in now.events]))
+        return now.plan().interrupt_on("user_seen", "user_lost").stay()
+
+    stored = fleet2d.run(watched(decide))
+    events = table(stored, "events", entity="astro")
+    told_events = [
+        (step + 1, [(event, "ana")])
+        for step, event in zip(events["step"].tolist(), events["event"].tolist(), strict=True)
+    ]
+    assert [(0, []), *told_events] == asked
+    assert ["user_seen", "user_lost", "user_seen"] == events["event"].tolist()
+    assert events["step"][0] == 0
+
+
+def test_events_that_a_plan_does_not_name_leave_it_alone() -> None:
+    steps, decide = asked_at(lambda now: now.plan().interrupt_on("user_lost").stay())
+    stored = fleet2d.run(watched(decide))
+    lost = table(stored, "events", event="user_lost")["step"].tolist()
+    assert [0, *(step + 1 for step in lost)] == steps
+
+
+def test_an_event_says_where_the_user_was_perceived_last() -> None:
+    events: list[Any] = []
+
+    def decide(now: Situation) -> Plan:
+        events.extend(now.events)
+        return now.plan().interrupt_on("user_seen", "user_lost").stay()
+
+    stored = fleet2d.run(watched(decide))
+    observations = table(stored, "observations")
+    lost_step = table(stored, "events", event="user_lost")["step"][0]
+    last = np.flatnonzero(observations["step"] <= lost_step)[-1]
+    assert [(1.0, 3.0), (observations["x"][last], observations["y"][last])] == [
+        (event.x, event.y) for event in events[:2]
+    ]
+
+
+def test_a_user_counts_as_lost_when_not_noticed_for_so_long() -> None:
+    for patience in (5, 20):
+        stored = fleet2d.run(watched(lambda now: now.plan().stay(), lost_after=patience))
+        seen = table(stored, "observations")["step"]
+        lost = table(stored, "events", event="user_lost")["step"].tolist()
+        gap = np.flatnonzero(np.diff(seen) > 5)
+        assert [seen[gap[0]] + patience] == lost
+
+
+def test_an_interrupted_body_goes_on_from_where_it_is() -> None:
+    def decide(now: Situation) -> Plan:
+        plan = now.plan().interrupt_on("user_lost", "user_seen")
+        return plan.go_to([1.0, 3.0] if now.events else [4.5, 0.6]).stay()
+
+    poses = path(fleet2d.run(watched(decide)), "astro")
+    assert np.hypot(np.diff(poses.x), np.diff(poses.y)).max() <= 0.6 + 2e-3
+
+
+# --- What a behavior may not do ----------------------------------------------------------------
+
+
+def returns_the_same_plan_again() -> Decide:
+    kept: list[Plan] = []
+
+    def decide(now: Situation) -> Plan:
+        kept.append(minute(now))
+        return kept[0]
+
+    return decide
+
+
+@pytest.mark.parametrize(
+    ("decide", "words"),
+    [
+        (lambda now: 1 / 0, ["step 0", "ZeroDivisionError", "division by zero"]),
+        (lambda now: now.outputs["ltp"], ["step 0", "KeyError", "ltp"]),
+        (lambda now: "kitchen", ["decide() returned 'kitchen'", "plan or None"]),
+        (lambda now: now.plan().go_to("attic"), ["step 0", "no room 'attic'", "kitchen_0"]),
+        (lambda now: now.plan().go_to([10.0, 1.0]), ["can't be reached"]),
+        (lambda now: now.plan().go_to(3), ["step 0", "a place is wanted"]),
+        (lambda now: now.plan().stay(timedelta(seconds=-1)), ["can't stay for"]),
+        (lambda now: now.plan().stay().go_to("kitchen"), ["can't go on"]),
+        (lambda now: now.plan().stay().stay(timedelta(1)), ["can't go on"]),
+        (lambda now: now.plan().interrupt_on("doorbell"), ["'doorbell'", "user_lost, user_seen"]),
+        (returns_the_same_plan_again(), ["begin here and now", "now.plan()"]),
+    ],
+)
+def test_a_behavior_that_breaks_its_contract_is_named(decide: Decide, words: list[str]) -> None:
+    with pytest.raises(ComponentError) as caught:
+        run(decide)
+    assert not isinstance(caught.value, InputError)
+    for word in ["users.ana", *words]:
+        assert word in str(caught.value)
+
+
+def test_what_was_stored_before_a_failure_is_readable(tmp_path: Any) -> None:
+    def decide(now: Situation) -> Plan:
+        assert now.step < 120, "enough"
+        return minute(now)
+
+    content = scenario(users={"ana": told(decide)})
+    with pytest.raises(ComponentError, match="users.ana failed at step 120: AssertionError: enough"):
+        fleet2d.run(content, out=tmp_path / "run")
+    stored = fleet2d.open_run(tmp_path / "run")
+    assert "failed" == stored.status
+    assert 120 == stored.manifest["steps"]
+    assert [0, 60] == table(stored, "trajectories")["step"].tolist()
+
+
+def test_a_start_that_fails_is_named_and_nothing_is_written(tmp_path: Any) -> None:
+    class Broken(Behavior):
+        def start(self, actor: Any) -> None:
+            raise ValueError("not today")
+
+    content = scenario(users={"ana": {"behaviors": [Broken()]}})
+    with pytest.raises(ComponentError, match=r"users\.ana failed when it was started: ValueError: not today"):
+        fleet2d.run(content, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
