@@ -20,8 +20,8 @@ def main() -> None:
     """Compare the share of her time at home in which Ana is seen, over five seeds."""
     gains = []
     for seed in range(5):
-        one = fleet2d.run(None, WEEK, seed=seed)
-        two = fleet2d.run(None, WEEK, seed=seed, robots=SECOND)  # merged: astro stays
+        one = fleet2d.run(WEEK, seed=seed)
+        two = fleet2d.run(WEEK, seed=seed, robots=SECOND)  # merged: astro stays
         life, again = (run.path("ana", every=timedelta(minutes=1)) for run in (one, two))
         assert np.array_equal(life.x, again.x)
         assert np.array_equal(life.y, again.y)

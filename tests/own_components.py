@@ -1,5 +1,6 @@
 """Behaviors, algorithms and metrics as a user would write them, for the tests of whole runs."""
 
+import time
 from collections.abc import Mapping
 from datetime import timedelta
 from typing import Any
@@ -126,3 +127,10 @@ class Spy(Metric):
 
     def result(self) -> dict[str, Any]:
         return {"handed": self.handed}
+
+
+class Slow(Algorithm):
+    """Takes much longer than anybody waits."""
+
+    def update(self, history: History, state: Present) -> None:
+        time.sleep(30)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
@@ -132,6 +132,8 @@ def show(
 
         target = out or what / "picture.png"
         draw_run(open_run(what), target)
+    elif what is not None and what.is_dir():
+        raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
     else:
         from fleet2d.floorplan.load import load_floorplan
         from fleet2d.view.floorplan import draw_floorplan
@@ -260,6 +262,7 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
         f" save {wall['save']:.2f} s;"
         f" whole process {wall['total']:.2f} s, {summary['peak_rss_mb']:.0f} MB)",
         highlight=False,
+        soft_wrap=True,
     )
     table = Table("metric", "of", "value", show_edge=False)
     for metric, result in summary["metrics"].items():

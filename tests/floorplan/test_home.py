@@ -82,5 +82,5 @@ def test_way_out_of_another_part_is_in_that_part() -> None:
 def test_way_out_of_a_part_that_is_not_there_says_so() -> None:
     home = home_with(("kitchen", 0, 2))
 
-    with pytest.raises(PlacementError, match="a body of radius 0.2 m fits nowhere in test home"):
+    with pytest.raises(PlacementError, match=r"a body of radius 0\.2 m fits nowhere in test home"):
         home.way_out(home.space(0.2), 2)

@@ -12,15 +12,15 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
+from tests.homes import JIT_IS_OFF, needs_jit, walls_of
+from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
+from tests.reference.sight import visible
+from tests.strategies import homes, quick, seeds
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.houseexpo import read_houseexpo
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import ROUNDING, Space
-from tests.homes import JIT_IS_OFF, needs_jit, walls_of
-from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
-from tests.reference.sight import visible
-from tests.strategies import homes, quick, seeds
 
 Int64 = npt.NDArray[np.int64]
 
@@ -133,7 +133,7 @@ def space_in(polygons: list[Polygon], radius: float) -> Space | None:
 
 
 def _is_pinched(space: Space) -> bool:
-    """Return whether walls of the space meet in a point, where a body would be stuck on all sides."""
+    """Return whether more than two walls of the space meet in a point, where a body is stuck."""
     triangle, k = np.nonzero(space.mesh.neighbors < 0)
     starts = space.mesh.triangles[triangle, k]
     return len(set(starts.tolist())) < len(starts)
@@ -159,7 +159,7 @@ def test_space_is_what_is_a_radius_off_the_walls_and_no_farther_off_than_stated(
 
 @pytest.mark.parametrize("degrees", [0.0, 22.5, 33.0, 45.0])
 def test_clearance_from_a_wall_at_any_angle_is_as_stated(degrees: float) -> None:
-    """At most 8.3 % more than the radius, and the rounding of the lattice; nothing more at 0 and 45."""
+    """At most 8.3 % more than the radius, next to rounding; nothing more at 0 and 45 degrees."""
     room = shapely.affinity.rotate(shapely.box(1, 1, 5, 4), degrees)
     space = Space(built(room), 0.3)
     reach = 0.3 * UNITS_PER_M
@@ -239,7 +239,11 @@ def check_symmetry(plan: FloorPlan, radius: float, slip: float) -> None:
 @pytest.mark.parametrize("radius", [0.2, 0.217])
 def test_space_of_a_turned_and_mirrored_home_is_the_same(radius: float) -> None:
     """Known failure 15: erosion with even kernels left other clearance on each side."""
-    pillars = [shapely.box(1, 1, 1.3, 2), shapely.box(2.5, 0.8, 2.6, 2.2), shapely.box(1, 3, 3, 3.1)]
+    pillars = [
+        shapely.box(1, 1, 1.3, 2),
+        shapely.box(2.5, 0.8, 2.6, 2.2),
+        shapely.box(1, 3, 3, 3.1),
+    ]
     home = shapely.box(0, 0, 5, 4).difference(shapely.union_all(pillars))
 
     check_symmetry(built(home), radius, 0.0)
@@ -305,17 +309,13 @@ def test_route_to_a_place_without_room_is_none() -> None:
 
 
 @needs_jit
-def test_spaces_in_all_homes_are_built_or_refused_in_plain_words(shared_data: Path) -> None:
+def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> None:
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert len(paths) == 50
 
     for path in paths:
         for radius in RADII:
-            try:
-                space = space_of(path, radius)
-            except FloorPlanError as error:
-                assert f"a body of radius {radius:g} m fits nowhere" in str(error)
-                continue
+            space = space_of(path, radius)
             sizes = [np.count_nonzero(space.part_of_cell == i) for i in range(space.parts)]
             assert space.parts >= 1
             assert sizes == sorted(sizes, reverse=True)

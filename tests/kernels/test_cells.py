@@ -3,12 +3,12 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-
-from fleet2d.kernels.cells import label_triangles
-from fleet2d.kernels.mesh import rasterize_cells
 from tests.homes import home_of
 from tests.reference.routes import parts_of
 from tests.strategies import homes, quick
+
+from fleet2d.kernels.cells import label_triangles
+from fleet2d.kernels.mesh import rasterize_cells
 
 
 @quick

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.homes import JIT_IS_OFF
+from tests.reference import headings as slow
+from tests.strategies import quick
 
 from fleet2d.kernels.headings import (
     HALF_TURN,
@@ -20,9 +23,6 @@ from fleet2d.kernels.headings import (
     sine,
     turn_between,
 )
-from tests.homes import JIT_IS_OFF
-from tests.reference import headings as slow
-from tests.strategies import quick
 
 # Two libms differ by an ulp of the sine, times UNIT: 2**-53 * 2**30.
 LIBM_ERROR = 2.0**-22
@@ -115,7 +115,7 @@ def test_heading_of_large_vectors_is_the_nearest(dx: int, dy: int) -> None:
 
 
 def test_heading_of_vectors_beside_a_half_way_direction_is_the_nearest() -> None:
-    """The hardest vectors: up to 700 units long, as near as can be to the middle of two headings."""
+    """The hardest vectors: up to 700 units long, all but in the middle between two headings."""
     rng = np.random.default_rng(5)
     for part in 2 * rng.integers(0, TURN, 8 if JIT_IS_OFF else 60) + 1:
         c, s = float(slow.cosine(int(part))), float(slow.sine(int(part)))

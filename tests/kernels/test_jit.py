@@ -1,4 +1,4 @@
-"""What holds for every kernel: how it is compiled, that it is compiled once, and where it is kept."""
+"""What holds for every kernel: how it is compiled, that it is once, and where it is kept."""
 
 import ast
 import json
@@ -13,10 +13,10 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from tests.homes import needs_jit
 
 import fleet2d.kernels
 from fleet2d.kernels import _jit
-from tests.homes import needs_jit
 
 KERNELS = Path(fleet2d.kernels.__file__).parent
 SOURCES = sorted(KERNELS.parent.rglob("*.py"))
@@ -108,14 +108,14 @@ def test_numba_is_imported_in_one_place(path: Path) -> None:
 
 @needs_jit
 def test_a_run_compiles_each_kernel_once() -> None:
-    """A second set of types doubles the time of the first run, and hides a type that is not meant."""
+    """A second set of types doubles the time of the first run, and hides a type not meant."""
     command = [sys.executable, "-c", COUNT_SIGNATURES % (MODULES,)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
     counts = json.loads(done.stdout)
 
-    assert {name: 1 for name in CALLED_FROM_PYTHON} == {n: counts[n] for n in CALLED_FROM_PYTHON}
+    assert dict.fromkeys(CALLED_FROM_PYTHON, 1) == {n: counts[n] for n in CALLED_FROM_PYTHON}
 
 
 def _with_cache_in(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:

@@ -9,6 +9,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
+from tests.homes import JIT_IS_OFF, Home, home_of
+from tests.reference import look as slow
+from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels.look import (
     USER_LOST,
@@ -22,9 +25,6 @@ from fleet2d.kernels.look import (
     look,
 )
 from fleet2d.kernels.motion import Poses
-from tests.homes import JIT_IS_OFF, Home, home_of
-from tests.reference import look as slow
-from tests.strategies import homes, quick, seeds
 
 Int64 = npt.NDArray[np.int64]
 
@@ -117,13 +117,11 @@ def looked_slowly(
         known,
         stops,
     )
-    return Seen(
-        done, sightings, events, [k.noticed for k in known], [int(k.seen) for k in known]
-    )
+    return Seen(done, sightings, events, [k.noticed for k in known], [int(k.seen) for k in known])
 
 
 def scene_in(home: Home, rng: np.random.Generator, count: int, steps: int = STEPS) -> Scene:
-    """Return a scene where much goes on: bodies at one point, due north, on walls, outside, away."""
+    """Return a scene where much goes on: bodies at one point, on borders, on walls, away."""
     size = [64 * home.columns, 64 * home.rows]
     cells = home.cells if len(home.cells) else rng.integers(0, size, (5, 2))
     robot = np.empty((steps, 4), np.int64)

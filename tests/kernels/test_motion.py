@@ -1,7 +1,7 @@
 """Poses over time against fractions, and the random walk against a look at every wall."""
 
 from fractions import Fraction
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,10 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
+from tests.homes import JIT_IS_OFF, Home, home_of, houseexpo
+from tests.reference import motion as slow
+from tests.reference.sight import is_inside, touches_any_wall
+from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import (
@@ -23,10 +27,6 @@ from fleet2d.kernels.motion import (
     trace_meander,
     trace_track,
 )
-from tests.homes import JIT_IS_OFF, Home, home_of, houseexpo
-from tests.reference import motion as slow
-from tests.reference.sight import is_inside, touches_any_wall
-from tests.strategies import homes, quick, seeds
 
 Int64 = npt.NDArray[np.int64]
 
@@ -205,12 +205,12 @@ corners = st.one_of(
 def test_time_route_turns_then_walks_no_faster_than_it_can(
     route: list[tuple[int, int]], speed: float, rate: float, heading: int
 ) -> None:
-    """Each leg takes the least whole microseconds; a rounding of a float may show by one of them."""
+    """Each leg takes the least whole microseconds; a rounded float may add or take one."""
     rows = iter(timed(route, speed, rate, heading).tolist())
     state = [1_000_000, *route[0], heading]
     assert state == next(rows)
 
-    for (ax, ay), (bx, by) in zip(route, route[1:], strict=False):
+    for (ax, ay), (bx, by) in pairwise(route):
         squared = (bx - ax) ** 2 + (by - ay) ** 2
         if squared == 0:
             continue
@@ -268,7 +268,7 @@ def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: Int64, c
 
 
 def shrunk(home: Home, reach: int) -> Home | None:
-    """Return the home as a body that reaches this far on all sides has it; None if there is none."""
+    """Return the home as a body that reaches so far on all sides has it; None if it has none."""
     outside = shapely.box(-500, -500, 20_000, 20_000).difference(shapely.union_all(home.polygons))
     grown = [
         shapely.affinity.translate(outside, x, y)
@@ -349,6 +349,17 @@ def test_trace_meander_from_the_border_gets_inside_and_stays() -> None:
         assert away[0] < 150
         assert len(away) == len(inside)
         assert check_walk(space, inside, rule) > 50
+
+
+def test_trace_meander_from_the_border_does_not_step_through_a_wall() -> None:
+    """Beyond the wall is space too, one stride away, and it would be strictly inside."""
+    home = home_of([shapely.box(0, 0, 2000, 1000), shapely.box(2010, 0, 4000, 1000)])
+    space = home_of([shapely.box(300, 300, 1700, 700), shapely.box(2310, 300, 3700, 700)])
+    rule = WalkRule(np.uint64(3), 900 * 256, 0, 1024)
+
+    steps = walked(home, space, rule, 0, np.array([1700, 500, 0]), 5)
+
+    assert [[1700, 500, 0]] * 5 == steps.tolist()
 
 
 @pytest.mark.parametrize("stride", [256, 0.1 * 1280 * 256, 1280 * 256])

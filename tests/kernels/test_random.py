@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.reference import random as slow
+from tests.strategies import quick
 
 from fleet2d.kernels.random import (
     BELL_MEAN,
     BELL_STD,
-    random_below,
     random_bell,
+    random_below,
     random_bits,
     random_uniform,
 )
-from tests.reference import random as slow
-from tests.strategies import quick
 
 keys = st.integers(0, 2**64 - 1)
 counters = st.integers(0, 2**63 - 1)

@@ -8,11 +8,11 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-
-from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, distance, find_route
 from tests.homes import JIT_IS_OFF, Home, home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
+
+from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, distance, find_route
 
 Int64 = npt.NDArray[np.int64]
 
@@ -126,7 +126,9 @@ def crowded(seed: int) -> Home:
         centre, spread = rng.integers(300, 3800, 2), rng.integers(60, 500)
         outline = centre + rng.integers(-spread, spread, (6, 2))
         pillars.append(shapely.convex_hull(shapely.multipoints(outline)))
-    hall = shapely.difference(shapely.box(0, 0, 4096, 4096), shapely.union_all(pillars), grid_size=2)
+    hall = shapely.difference(
+        shapely.box(0, 0, 4096, 4096), shapely.union_all(pillars), grid_size=2
+    )
     return home_of([part for part in shapely.get_parts(hall) if part.area > 0])
 
 
@@ -183,6 +185,17 @@ def test_find_route_along_a_row_of_corners_touches_each() -> None:
 
     assert path is not None
     assert length_of(path) == 448
+
+
+def test_find_route_through_a_point_where_two_pillars_meet_bends_at_it() -> None:
+    """The string bends round one pillar there, though it runs into the walls of the other."""
+    pillars = [shapely.box(128, 320, 320, 512), shapely.box(320, 128, 512, 320)]
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
+
+    path = route(home, routes_of(home), np.array([319, 129]), np.array([321, 511]))
+
+    assert path is not None
+    assert [[319, 129], [320, 320], [321, 511]] == path.tolist()
 
 
 def test_find_route_of_equal_ways_is_always_the_same() -> None:

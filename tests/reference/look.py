@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-
 from tests.reference.headings import DIGITS, alignment, cosine
 from tests.reference.random import random_bits
 from tests.reference.sight import visible
@@ -16,7 +15,7 @@ LOST, SEEN = 0, 1
 
 
 class Eye(NamedTuple):
-    """A camera: ranges [lattice], half angle [1/8192 turn], chance times 2**53, patience [steps]."""
+    """A camera: ranges [lattice], half angle [1/8192 turn], chance * 2**53, patience [steps]."""
 
     near: int
     far: int
@@ -46,8 +45,8 @@ def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
     """Return whether the angle between (dx, dy) and the heading is at most `half_angle`.
 
     The angle is at most half a turn, so its cosine decides. A border runs right through a lattice
-    point only at multiples of an eighth of a turn. Elsewhere the kernel's borders are rounded, and a
-    point so near to one that this could matter is refused.
+    point only at multiples of an eighth of a turn. Elsewhere the kernel's borders are rounded, and
+    a point so near to one that this could matter is refused.
     """
     if half_angle >= 4096 or (dx, dy) == (0, 0):
         return True

@@ -1,4 +1,4 @@
-"""Slow, obvious twins of the motion kernels: fractions, one moment at a time, every wall looked at."""
+"""Slow, obvious twins of the motion kernels: fractions, and a look at every wall."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
-
 from tests.reference.headings import cosine, sine
 from tests.reference.random import random_bell
 from tests.reference.sight import visible
@@ -31,7 +30,7 @@ def shorter_turn(start: int, end: int) -> int:
 
 
 def pose_at(track: Sequence[Row], moment: int) -> Pose:
-    """Return the pose at a moment [us]: where the track stands before it begins and after it ends."""
+    """Return the pose at a moment [us]; before its begin and after its end a track stands."""
     if moment < track[0][0]:
         return track[0][1:]
     i = max(i for i, row in enumerate(track) if row[0] <= moment)
@@ -67,8 +66,8 @@ def walk(
 ) -> Iterator[tuple[int, int, int]]:
     """Yield the poses of a random walk from step 0 on, by a look at every wall of the space.
 
-    Both are int64 (w, 4) pieces of wall. `stride` is in 1/256 lattice units, `sway` in 2**-16 headings
-    per unit of the bell, `limit` in headings.
+    Both are int64 (w, 4) pieces of wall. `stride` is in 1/256 lattice units, `sway` in 2**-16
+    headings per unit of the bell, `limit` in headings.
     """
     x, y, heading = start
     step = 0
@@ -77,10 +76,8 @@ def walk(
         turn = half_up(Fraction(random_bell(key, step) * sway, 2**16))
         heading = (heading + max(-limit, min(limit, turn))) % TURN
         here = np.array([x, y])
-        there = here + [
-            half_up(Fraction(cosine(2 * heading)) * stride / 256),
-            half_up(Fraction(sine(2 * heading)) * stride / 256),
-        ]
+        ahead = (cosine(2 * heading), sine(2 * heading))
+        there = here + np.array([half_up(Fraction(part) * stride / 256) for part in ahead])
         on_border = not _sees(space, here, here)
         may_go = _sees(walls, here, there) if on_border else _sees(space, here, there)
         if may_go and _sees(space, there, there):

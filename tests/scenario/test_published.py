@@ -100,19 +100,19 @@ WALKS = ("users.user0.base", "users.user1.base", "robot.base")
 USUAL = [
     "floorplan.he.ppm: the grid's cells are 0.05 m; walls and poses are not rounded to them",
     "floorplan.he.border_pad: left out: the grid has a margin of its own",
-    f"{', '.join(f'{walk}.pose_config.meander_strategy.lin_speed' for walk in WALKS)}: metres per step"
-    " there, a speed here, and the same walk at this step; a move across a wall is never made, where"
-    " the published Fleet2D looked at the end of it only",
-    f"{', '.join(f'{walk}.pose_config.meander_strategy.ang_speed' for walk in WALKS)}: degrees per"
-    " step there, per square root of a second here, and the same walk at this step; turns are cut at"
-    " 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
-    "simulation.seed: the same seed draws other numbers here: the walks are of the same kind, not the"
-    " same",
+    f"{', '.join(f'{walk}.pose_config.meander_strategy.lin_speed' for walk in WALKS)}: metres per"
+    " step there, a speed here, and the same walk at this step; a move across a wall is never"
+    " made, where the published Fleet2D looked at the end of it only",
+    f"{', '.join(f'{walk}.pose_config.meander_strategy.ang_speed' for walk in WALKS)}: degrees"
+    " per step there, per square root of a second here, and the same walk at this step; turns"
+    " are cut at 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
+    "simulation.seed: the same seed draws other numbers here: the walks are of the same kind, not"
+    " the same",
     "simulation.outputs.output_dir: left out: `fleet2d run --out DIR` says where a run is stored",
     "simulation.outputs.save, simulation.outputs.every_n_steps: poses are stored every 10 min,"
     " observations and events in full; the published Fleet2D wrote nothing",
-    "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute: not needed: what is in"
-    " view is worked out exactly and at once",
+    "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute: not needed: what is"
+    " in view is worked out exactly and at once",
 ]
 
 
@@ -210,7 +210,7 @@ def test_converted_scenario_runs_for_two_hours(folder: Path) -> None:
     run = fleet2d.run(scenario)
     assert 7200 == run.manifest["steps"]
     rows = run.tables["trajectories"].to_pylist()
-    assert 3 * 13 == len(rows)
+    assert 3 * 12 == len(rows)
     first = {row["entity"]: (row["x"], row["y"]) for row in rows if row["step"] == 0}
     assert {"user0": (8.0, 3.0), "user1": (7.0, 4.0), "robot": (4.0, 2.0)} == {
         name: (pytest.approx(x, abs=1e-3), pytest.approx(y, abs=1e-3))
@@ -221,13 +221,13 @@ def test_converted_scenario_runs_for_two_hours(folder: Path) -> None:
 
 
 def test_remarks_are_in_the_new_file_as_comments(folder: Path) -> None:
-    remarks, _ = converted(folder, ("ppm: 20", "ppm: 20\n    'odd\\nkey': 1"))
-    text = (folder / "new.yaml").read_text()
-    comment = " ".join(line[2:] for line in text.splitlines() if line.startswith("#"))
+    remarks, _ = converted(folder, ("ppm: 20", 'ppm: 20\n    "odd\\nkey": 1'))
+    lines = (folder / "new.yaml").read_text().splitlines()
+    comment = " ".join(" ".join(line[2:] for line in lines if line.startswith("#")).split())
     assert comment.startswith("Converted by `fleet2d convert` from old.yaml, a configuration of")
+    assert any("odd\nkey" in remark for remark in remarks)
     for remark in remarks:
-        assert " ".join(remark.split()).replace("odd key", "odd?key") in " ".join(comment.split())
-    assert max(map(len, text.splitlines())) <= 100
+        assert remark.replace("\n", "?") in comment
 
 
 def test_steps_of_other_length_keep_the_walk_per_step(folder: Path) -> None:
@@ -247,9 +247,10 @@ def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder
         simulation.advance()
         after = simulation.state["user0"]
         moves.append(math.hypot(after["x"] - before["x"], after["y"] - before["y"]))
-        turns.append(((after["heading"] - before["heading"] + 2048) % 4096 - 2048) * 360 / 4096)
+        turns.append(math.remainder(after["heading"] - before["heading"], math.tau))
     assert 0.1 == pytest.approx(max(moves), abs=2e-3)
-    assert 15 == pytest.approx(math.sqrt(sum(turn**2 for turn in turns) / 400), rel=0.15)
+    std = math.degrees(math.sqrt(sum(turn**2 for turn in turns) / 400))
+    assert 15 == pytest.approx(std, rel=0.15)
 
 
 @pytest.mark.parametrize(
@@ -267,16 +268,17 @@ def test_duration_adds_up_its_units(folder: Path, old: str, new: timedelta) -> N
 
 def test_duration_no_multiple_of_the_step_is_remarked(folder: Path) -> None:
     assert [
-        "simulation.duration: 2 h is no multiple of delta, 7 s: there, a run went one step beyond it;"
-        " here it ends with the last full step within it"
+        "simulation.duration: 2 h is no multiple of delta, 7 s: there, a run went one step beyond"
+        " it; here it ends with the last full step within it"
     ] == [r for r in extra(folder, ("seconds: 1", "seconds: 7")) if "duration" in r]
 
 
 def test_start_with_a_time_zone_keeps_the_clock_and_is_remarked(folder: Path) -> None:
     remarks, scenario = converted(folder, ("'2010-11-17 13:12:11'", "'2010-11-17 13:12:11+02:00'"))
     assert datetime(2010, 11, 17, 13, 12, 11) == scenario.simulation.start
-    assert "simulation.start_ts: its time zone is left out: time is that of the clock on the home's wall" in (
-        remarks
+    assert (
+        "simulation.start_ts: its time zone is left out: time is that of the clock on the"
+        " home's wall" in remarks
     )
 
 
@@ -296,8 +298,8 @@ def test_speedup_is_kept_and_remarked(folder: Path) -> None:
     remarks, scenario = converted(folder, ("speedup: null", "speedup: 10"))
     assert 10 == scenario.simulation.speedup
     assert (
-        "simulation.speedup: kept to in full here; there, each step slept for its share of it on top"
-        " of computing"
+        "simulation.speedup: kept to in full here; there, each step slept for its share of it on"
+        " top of computing"
     ) in remarks
 
 
@@ -313,8 +315,8 @@ def test_progress_and_provider_and_prefix_are_left_out(folder: Path) -> None:
     assert [
         "simulation.show_progress: left out: `fleet2d run --quiet` shows none",
         "simulation.fov_provider: left out: there is one way of seeing here, and it is exact",
-        "simulation.outputs.output_dir, simulation.outputs.prefix: left out: `fleet2d run --out DIR`"
-        " says where a run is stored",
+        "simulation.outputs.output_dir, simulation.outputs.prefix: left out: `fleet2d run --out"
+        " DIR` says where a run is stored",
     ] == extra(
         folder,
         ("show_progress: True", "show_progress: False\n  fov_provider: Flashlight"),
@@ -326,9 +328,10 @@ def test_save_false_stores_nothing(folder: Path) -> None:
     remarks, scenario = converted(folder, ("save: True", "save: False"))
     assert "off" == scenario.artifacts.trajectories
     stored = scenario.artifacts
-    assert not (stored.key_frames or stored.observations or stored.events or stored.outputs)
+    assert not any((stored.key_frames, stored.observations, stored.events, stored.outputs))
     assert (
-        "simulation.outputs.save: every table is off; a run still makes a directory with its manifest"
+        "simulation.outputs.save: every table is off; a run still makes a directory with its"
+        " manifest"
     ) in remarks
     assert [] == list(fleet2d.run(scenario, "simulation.duration=1 min").tables)
 
@@ -362,9 +365,10 @@ def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
     old = written(folder, ('"plan.json"', '"f2d/he/gone.json"'))
     remarks = convert_file(old, folder / "new.yaml")
     assert [
-        "floorplan.he.json_fpath: there is no file f2d/he/gone.json beside old.yaml, in the folders"
-        " above it or in the current one; kept as written, it counts from the folder of new.yaml: put"
-        " the plan there, or run with floorplan.path=PLAN.json. Where everybody starts was not checked"
+        "floorplan.he.json_fpath: there is no file f2d/he/gone.json beside old.yaml, in the"
+        " folders above it or in the current one; kept as written, it counts from the folder of"
+        " new.yaml: put the plan there, or run with floorplan.path=PLAN.json. Where everybody"
+        " starts was not checked"
     ] == [remark for remark in remarks if remark not in USUAL]
     with pytest.raises(ScenarioError, match=r"floorplan\.path: no such file: .*gone\.json"):
         load_scenario(folder / "new.yaml")
@@ -377,8 +381,9 @@ def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
 def test_ppm_becomes_the_cell_within_its_limits(folder: Path, ppm: str, cell: float) -> None:
     remarks, scenario = converted(folder, ("ppm: 20", f"ppm: {ppm}"))
     assert cell == plan_of(scenario)[2]
-    assert f"floorplan.he.ppm: the grid's cells are {cell:.4g} m; walls and poses are not rounded to them" in (
-        remarks
+    assert (
+        f"floorplan.he.ppm: the grid's cells are {cell:.4g} m; walls and poses are not"
+        " rounded to them" in remarks
     )
 
 
@@ -421,16 +426,16 @@ def test_start_in_a_wall_moves_to_the_nearest_free_point(folder: Path) -> None:
     start = scenario.users["user0"].start
     assert start is not None
     assert (
-        "users.user0.base.pose_config.init_pose: [-3.0, 3.0] is in a wall or nearer to one than its"
-        f" radius, 0.2 m: it starts at {list(start)}, the nearest free point"
+        "users.user0.base.pose_config.init_pose: [-3.0, 3.0] is in a wall or nearer to one than"
+        f" its radius, 0.2 m: it starts at {list(start)}, the nearest free point"
     ) == moved
     fleet2d.Simulation(scenario)  # would refuse a start in a wall
 
 
 def test_start_is_moved_for_a_body_too_wide_for_it(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("radius: 0.1", "radius: 0.6"))
+    remarks, scenario = converted(folder, ("radius: 0.2", "radius: 2"))
     fleet2d.Simulation(scenario)
-    assert ["robot.base.pose_config.init_pose"] == [
+    assert ["users.user0.base.pose_config.init_pose"] == [
         remark.split(":")[0] for remark in remarks if "init_pose" in remark
     ]
 
@@ -443,8 +448,9 @@ def test_ranges_that_were_ignored_take_effect_and_are_remarked(folder: Path) -> 
     assert camera is not None
     assert (1.0, 4.5) == camera.range
     assert [
-        "robot.base.fov_config.min_distance, robot.base.fov_config.max_distance: accepted and ignored"
-        " there, where it saw from 0 to distance, 3 m; here they hold, and camera.range is [1, 4.5]"
+        "robot.base.fov_config.min_distance, robot.base.fov_config.max_distance: accepted and"
+        " ignored there, where it saw from 0 to distance, 3 m; here they hold, and camera.range"
+        " is [1, 4.5]"
     ] == [remark for remark in remarks if remark not in USUAL]
 
 
@@ -457,8 +463,8 @@ def test_angle_beyond_a_turn_sees_all_round(folder: Path) -> None:
 def test_no_stride_stands_still_and_turns(folder: Path) -> None:
     remarks, scenario = converted(folder, ("lin_speed: 0.1", "lin_speed: 0"))
     assert (
-        "users.user0.base.pose_config.meander_strategy.lin_speed: missing or 0; a speed is above 0,"
-        " and 1e-9 m/s moves nobody"
+        "users.user0.base.pose_config.meander_strategy.lin_speed: missing or 0; a speed is above"
+        " 0, and 1e-9 m/s moves nobody"
     ) in remarks
     simulation = fleet2d.Simulation(scenario)
     before = simulation.state["user0"]
@@ -482,8 +488,8 @@ def test_turns_beyond_the_fastest_are_remarked(folder: Path) -> None:
     )
     assert 36000 == scenario.users["user0"].turn_rate_deg
     assert (
-        "users.user0.base.pose_config.meander_strategy.ang_speed: turns are cut at 36000 deg/s, the"
-        " fastest there is"
+        "users.user0.base.pose_config.meander_strategy.ang_speed: turns are cut at 36000 deg/s,"
+        " the fastest there is"
     ) in remarks
 
 
@@ -498,7 +504,8 @@ robot: {base: {radius: 0.1, fov_config: {}}}
     remarks = convert_file(folder / "old.yaml", folder / "new.yaml")
     assert [
         "simulation.delta: missing; the step is 1 s",
-        "floorplan.he.ppm: missing; the grid's cells are 0.05 m; walls and poses are not rounded to them",
+        "floorplan.he.ppm: missing; the grid's cells are 0.05 m; walls and poses are not rounded"
+        " to them",
         "users.ana.base.radius: missing or 0; a body has a radius, and this one has 0.01 m",
         "users.ana.base.pose_config.init_pose, robot.base.pose_config.init_pose: has no x and y;"
         " where it starts is drawn",
@@ -527,13 +534,16 @@ def test_no_robot(folder: Path) -> None:
 def test_type_of_ones_own_is_read_as_base(folder: Path) -> None:
     remarks, scenario = converted(folder, ("type: base\n    base:", "type: cat\n    cat:"))
     assert 0.2 == scenario.users["user0"].radius
-    assert "users.user0.type: cat is no type of the published Fleet2D: read as if it were base" in remarks
+    assert (
+        "users.user0.type: cat is no type of the published Fleet2D: read as if it were base"
+        in remarks
+    )
 
 
 def test_unknown_keys_are_left_out_with_their_lines(folder: Path) -> None:
     assert [
         f"simulation.speed_up: not known, left out ({folder / 'old.yaml'}:10)",
-        f"users.user0.base.mood: not known, left out ({folder / 'old.yaml'}:32)",
+        f"users.user0.base.mood: not known, left out ({folder / 'old.yaml'}:34)",
         f"weather: not known, left out ({folder / 'old.yaml'}:77)",
     ] == extra(
         folder,
@@ -549,43 +559,43 @@ def test_unknown_keys_are_left_out_with_their_lines(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("hours: 2", "month: 2", "old.yaml:3: simulation.duration: a mapping of days, hours, micro"),
-        ("hours: 2", "hours: -2", "old.yaml:3: simulation.duration: found -7200 s; a duration can't be"),
-        ("hours: 2", "hours: two", "old.yaml:3: simulation.duration: found 'two'; a duration is wanted"),
-        ("hours: 2", "seconds: 0.5", "simulation.duration: 0.5 s is shorter than one step, delta: 1 s"),
+        ("hours: 2", "month: 2", "old.yaml:3: simulation.duration: a mapping of days, hours, micr"),
+        ("hours: 2", "hours: -2", "old.yaml:3: simulation.duration: found -2 h; a duration can't"),
+        ("hours: 2", "hours: two", "old.yaml:3: simulation.duration: found {'hours': 'two', 'days"),
+        ("hours: 2", "seconds: 0.5", "simulation.duration: 0.5 s is shorter than one step, delta:"),
         ("seconds: 1", "seconds: 0", "old.yaml:6: simulation.delta: found 0; a step longer than 0"),
-        ("'2010-11-17 13:12:11'", "2010-02-31", "simulation.start_ts: found '2010-02-31'; a date and"),
-        ("!!timestamp '2010-11-17 13:12:11'", "7", "simulation.start_ts: found 7; a date and time is"),
+        ("'2010-11-17 13:12:11'", "2010-02-31", "simulation.start_ts: found '2010-02-31'; a date"),
+        ("!!timestamp '2010-11-17 13:12:11'", "7", "simulation.start_ts: found 7; a date and time"),
         ("speedup: null", "speedup: 0", "simulation.speedup: found 0; a number above 0 is wanted"),
         ("seed: 4", "seed: 0.5", "simulation.seed: found 0.5; a whole number from 0 on is wanted"),
         ("save: True", "save: 3", "simulation.outputs.save: found 3; true or false is wanted"),
-        ("every_n_steps: 600", "every_n_steps: 0", "every_n_steps: found 0; a whole number from 1 on"),
+        ("every_n_steps: 600", "every_n_steps: 0", "every_n_steps: found 0; a whole number from 1"),
         ("every_n_steps: 600", f"every_n_steps: {10**15}", "that many steps are over 1000 years"),
-        ("type: he", "type: svg", "floorplan.type: found 'svg'; only he (HouseExpo) can be converted"),
-        ('"plan.json"', "null", "floorplan.he.json_fpath: missing; the path of a HouseExpo JSON file"),
+        ("type: he", "type: svg", "floorplan.type: found 'svg'; only he (HouseExpo) can be conver"),
+        ('"plan.json"', "null", "floorplan.he.json_fpath: missing; the path of a HouseExpo JSON f"),
         ('"plan.json"', "5", "floorplan.he.json_fpath: found 5; text is wanted"),
         ("ppm: 20", "ppm: -1", "floorplan.he.ppm: found -1; a number above 0 is wanted"),
         ('"user0,user1"', "7", "users.names: found 7; names with commas between them are wanted"),
-        ("user0,user1", "user0,bob", "users.names: 'bob' has no section users.bob: add or unname it"),
-        ("type: base", "type: cat", "users.user0: its type is 'cat', and it has no section of that name"),
+        ("user0,user1", "user0,bob", "users.names: 'bob' has no section users.bob: add or unname"),
+        ("type: base", "type: cat", "users.user0: its type is 'cat', and it has no section of tha"),
         ("radius: 0.2", "radius: wide", "radius: found 'wide'; a number of 0 or more, 2 at most"),
-        ("radius: 0.2", "radius: .nan", "radius: found nan; a number of 0 or more, 2 at most is wanted"),
+        ("radius: 0.2", "radius: .nan", "radius: found nan; a number of 0 or more, 2 at most is w"),
         ("radius: 0.2", f"radius: 1{'0' * 400}", "a number of 0 or more, 2 at most is wanted"),
-        ("x: 8.0", "x: [1]", "users.user0.base.pose_config.init_pose.x: found [1]; a number is wanted"),
+        ("x: 8.0", "x: [1]", "users.user0.base.pose_config.init_pose.x: found [1]; a number is wa"),
         ("x: 8.0", "x: 8.0e+9", "old.yaml is no scenario: users.user0.start: found"),
-        ("lin_speed: 0.1", "lin_speed: 30", "lin_speed: 30 m in a step of 1 s is 30 m/s; 20 m/s at most"),
+        ("lin_speed: 0.1", "lin_speed: 30", "lin_speed: 30 m in a step of 1 s is 30 m/s; 20 m/s a"),
         ("lin_speed: 0.1", "lin_speed: -1", "lin_speed: found -1; a number of 0 or more is wanted"),
-        ("ang_speed: 15", "ang_speed: 1.0e+9", "ang_speed: found 1000000000.0; a number of -3600 or more"),
-        ("angle: 108", "angle: 0", "robot.base.fov_config.angle: found 0; a number above 0 is wanted"),
+        ("ang_speed: 15", "ang_speed: 1.0e+9", "ang_speed: found 1000000000.0; a number of -3600"),
+        ("angle: 108", "angle: 0", "robot.base.fov_config.angle: found 0; a number above 0 is wan"),
         (
             "distance: 3.0",
             "distance: 3.0\n      min_distance: 3",
-            "robot.base.fov_config: the camera would see from 3 m to 3 m; a farthest distance beyond",
+            "robot.base.fov_config: the camera would see from 3 m to 3 m; a farthest distance"
+            " beyond",
         ),
-        ("    base:\n      radius", "    base: 3\n    bass:\n      radius", "users.user0.base: found 3; a mapp"),
-        ("radius: 0.1", "radius: 2", "robot.base.radius: a body of radius 2 m fits nowhere in"),
+        ("    base:\n      radius", "    base: 3\n    bass:\n      radius", "users.user0.base: fo"),
         ("!!timestamp", "!!python/name:os.sep", "a !!python tag runs code, so none is read"),
-        ("seed: 4", "seed: [", "old.yaml:10: not valid YAML: "),
+        ("seed: 4", "seed: [", "old.yaml:12: not valid YAML: "),
     ],
 )  # fmt: skip
 def test_wrong_value_is_refused(folder: Path, before: str, after: str, message: str) -> None:
@@ -599,7 +609,10 @@ def test_wrong_value_is_refused(folder: Path, before: str, after: str, message: 
         ("[1, 2]", "old.yaml: a scenario is a mapping"),
         ("floorplan: {type: he}", "and robot, and here is no simulation"),
         ("simulation: {duration: 1}", "old.yaml is no configuration of the published Fleet2D"),
-        ("simulation: {start: 2026-01-05}\nfloorplan: {}", "old.yaml is a scenario already: run it"),
+        (
+            "simulation: {start: 2026-01-05}\nfloorplan: {}",
+            "old.yaml is a scenario already: run it",
+        ),
         ("simulation: {}\nfloorplan: {type: he, he: {json_fpath: plan.json}}", "duration: missing"),
     ],
 )
@@ -617,6 +630,13 @@ def test_plan_that_is_no_plan_is_refused(folder: Path) -> None:
     with pytest.raises(FloorPlanError, match="it has no key `verts`"):
         convert_file(written(folder), folder / "new.yaml")
     assert not (folder / "new.yaml").exists()
+
+
+def test_body_too_wide_for_the_plan_is_refused(folder: Path) -> None:
+    (folder / "plan.json").write_text('{"verts": [[0, 0], [3, 0], [3, 3], [0, 3]]}')
+    assert "robot.base.radius: a body of radius 2 m fits nowhere in plan" in refused(
+        folder, ("radius: 0.1", "radius: 2")
+    )
 
 
 def test_existing_file_is_not_overwritten(folder: Path) -> None:

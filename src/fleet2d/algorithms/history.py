@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.floorplan.home import Home
+
+Array = TypeVar("Array", bound=NDArray[Any])
 
 NOWHERE = -1  # the room of who is away
 
@@ -50,7 +52,7 @@ class BodyPoses:
     def xy(self) -> NDArray[np.float64]:
         """Positions (n, 2) [m]; where it left while it is away."""
         lattice = self._home.plan.lattice
-        return lattice.to_metres(np.stack([self._poses.x, self._poses.y], axis=-1))
+        return _shared(lattice.to_metres(np.stack([self._poses.x, self._poses.y], axis=-1)))
 
     def at(self, index: int) -> tuple[float, float]:
         """Return the position (x, y) [m] at one step; -1 is the last."""
@@ -72,30 +74,36 @@ class BodyPoses:
     def heading(self) -> NDArray[np.float64]:
         """Headings, counter-clockwise from +x, 0 to 2 pi [rad]."""
         radians: NDArray[np.float64] = in_radians(self._poses.heading)
-        return radians
+        return _shared(radians)
 
     @cached_property
     def away(self) -> NDArray[np.bool_]:
         """Whether it is out of the home."""
-        return self._poses.away.astype(bool)
+        return _shared(self._poses.away.astype(bool))
 
     @cached_property
     def room(self) -> NDArray[np.int16]:
         """Index of the room, NOWHERE while it is away."""
         room = self._home.plan.room_of_cell[self._poses.y // SUB, self._poses.x // SUB]
-        return np.where(self.away, np.int16(NOWHERE), room)
+        return _shared(np.where(self.away, np.int16(NOWHERE), room))
 
     @cached_property
     def time_in_rooms(self) -> NDArray[np.int64]:
         """Number of steps in each room, and last away: int64 (rooms + 1,)."""
         counts = np.zeros(len(self._home.rooms) + 1, np.int64)
         count_rooms(self._poses, self._home.plan.room_of_cell, counts)
-        return counts
+        return _shared(counts)
 
     @cached_property
     def distance(self) -> float:
         """Length of the way from the first to the last step [m]."""
         return float(sum_moves(self._poses)) / self._home.plan.lattice.units_per_m
+
+
+def _shared(array: Array) -> Array:
+    """Refuse changes: whoever is updated at the same step gets the same array."""
+    array.setflags(write=False)
+    return array
 
 
 @dataclass(frozen=True)

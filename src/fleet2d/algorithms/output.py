@@ -9,6 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from fleet2d.errors import ComponentError
 
 
+# The columns of every table.
+RESERVED = frozenset({"step", "time"})
+
+
 class RoomDistribution:
     """A probability for each room: weights that are divided by their sum (uniform if that is zero).
 
@@ -73,19 +77,30 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
     columns = {
         str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()
     }
+    for name, values in columns.items():
+        _check_column(name, values, where)
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         raise ComponentError(f"{where} put out arrays of different lengths: {lengths}")
-    for name, values in columns.items():
-        if values.dtype.kind not in "biufO":
-            raise ComponentError(
-                f"{where} put out {name!r} of dtype {values.dtype}; numbers or strings are wanted"
-            )
-        if values.dtype.kind == "f" and not np.isfinite(values).all():
-            raise ComponentError(
-                f"{where} put out {name!r} with a value that is not finite: {values}"
-            )
     return columns
+
+
+def _check_column(name: str, values: NDArray[Any], where: str) -> None:
+    if name in RESERVED:
+        raise ComponentError(f"{where} put out {name!r}, a column that every table has: rename it")
+    if values.ndim != 1:
+        raise ComponentError(
+            f"{where} put out {name!r} of shape {values.shape}; a number or an array of one"
+            " dimension is wanted"
+        )
+    words = values.dtype.kind == "O" and all(isinstance(value, str) for value in values)
+    if values.dtype.kind not in "biuf" and not words:
+        what = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
+        raise ComponentError(f"{where} put out {name!r} with {what}; numbers or strings are wanted")
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        raise ComponentError(
+            f"{where} put out {name!r} with a value that is not finite: {values}"
+        )
 
 
 def _column(values: NDArray[Any]) -> NDArray[Any]:

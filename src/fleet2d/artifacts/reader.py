@@ -121,8 +121,8 @@ class Run:
         if self._plan is None:
             from fleet2d.floorplan.native import read_native
 
-            path = (self.directory or Path()) / FLOORPLAN_NAME
-            if not path.exists():
+            path = Path() if self.directory is None else self.directory / FLOORPLAN_NAME
+            if not path.is_file():
                 raise ArtifactError(f"{path} is missing: the run can't be shown in its home")
             self._plan = read_native(path, self.manifest["scenario"]["floorplan"]["cell"])
         return self._plan

@@ -1,7 +1,7 @@
 """Algorithms and metrics in a run: their order, when they are due, and what they put out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
@@ -15,7 +15,7 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.engine.blame import blame
 from fleet2d.engine.clock import Clock
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean
@@ -30,6 +30,8 @@ class Learner:
 
     Attributes:
         every: Steps between two updates.
+        table: The name of the table of what it puts out.
+        kinds: The kinds of that table's columns; empty before the first output.
         since: First step of its next history.
     """
 
@@ -37,6 +39,8 @@ class Learner:
     path: str
     component: Algorithm | Metric
     every: int
+    table: str
+    kinds: dict[str, Kind] = field(default_factory=dict)
     since: int = 0
 
     @property
@@ -113,7 +117,10 @@ class Learners:
         component = component.model_copy()
         with blame(path, None):
             component.start(self.home)
-        self.all.append(Learner(name, path, component, every))
+        # Metrics and algorithms may share a name.
+        taken = {*_FIXED, *(learner.table for learner in self.all)}
+        table = path.replace(".", "_") if name in taken else name
+        self.all.append(Learner(name, path, component, every, table))
 
     def _update(self, learner: Learner, end: int, log: Log, outputs: Mapping[str, Any]) -> Any:
         knows_truth = isinstance(learner.component, Metric)
@@ -133,18 +140,34 @@ class Learners:
     def _store(self, learner: Learner, step: int, columns: dict[str, NDArray[Any]]) -> None:
         if self.store is None:
             return
-        # Metrics and algorithms may share a name.
-        table = learner.path.replace(".", "_") if learner.name in _FIXED else learner.name
-        steps = np.full(len(next(iter(columns.values()))), step, np.int64)
-        if table not in self.store.names:
-            kinds = [Column(n, KINDS[values.dtype.kind]) for n, values in columns.items()]
+        kinds = {name: KINDS[values.dtype.kind] for name, values in columns.items()}
+        if not learner.kinds:
+            learner.kinds = kinds
+            added = [Column(name, kind) for name, kind in kinds.items()]
             self.store.add_table(
-                TableSpec(table, (Column("step", "step"), Column("time", "time"), *kinds))
+                TableSpec(learner.table, (Column("step", "step"), Column("time", "time"), *added))
             )
-        self.store.append(table, step=steps, time=self.clock.times(steps), **columns)
+        _check_kinds(learner, kinds)
+        steps = np.full(len(next(iter(columns.values()))), step, np.int64)
+        self.store.append(learner.table, step=steps, time=self.clock.times(steps), **columns)
 
 
 _FIXED = {"trajectories", "key_frames", "observations", "events"}
+
+
+def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
+    """Refuse columns that don't fit the table that the first output made."""
+    if kinds.keys() != learner.kinds.keys():
+        raise ComponentError(
+            f"{learner.path} put out {', '.join(kinds)}, but {', '.join(learner.kinds)} before: the"
+            " names must be the same each time"
+        )
+    for name, kind in kinds.items():
+        if kind != learner.kinds[name] and (kind, learner.kinds[name]) != ("int64", "float64"):
+            raise ComponentError(
+                f"{learner.path} put out {name!r} as {kind}, but as {learner.kinds[name]} before: the"
+                " first output fixes what a column holds (0.0 for fractions, not 0)"
+            )
 
 
 def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:

@@ -102,17 +102,19 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str
     names = [*entities["users"], *entities["robots"]]
     if entity not in names:
         raise ArtifactError(f"there is no {entity!r} in the run; there are: {', '.join(names)}")
+    from pyarrow import array, compute
+
     table = run.tables["key_frames"]
-    mine = table["entity"].combine_chunks().cast("string").to_numpy(zero_copy_only=False) == entity
-    column = {n: table[n].to_numpy()[mine] for n in ("step", "time", "x", "y", "heading", "away")}
-    kind = table["kind"].combine_chunks().cast("string").to_numpy(zero_copy_only=False)[mine]
+    mine = table.filter(compute.equal(table["entity"].cast("string"), entity))
+    column = {n: mine[n].to_numpy() for n in ("step", "time", "x", "y", "heading", "away")}
+    kind = compute.index_in(mine["kind"].cast("string"), array(KEY_KINDS)).to_numpy()
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
     return {
         "step": column["step"],
         "time": (column["time"].astype("M8[us]") - np.datetime64(clock.start, "us")).astype(
             np.int64
         ),
-        "kind": np.array([KEY_KINDS.index(k) for k in kind], np.int64),
+        "kind": kind.astype(np.int64),
         "x": np.ascontiguousarray(xy[:, 0]),
         "y": np.ascontiguousarray(xy[:, 1]),
         "heading": np.rint(column["heading"] * (TURN / (2 * np.pi))).astype(np.int64) % TURN,
@@ -173,10 +175,17 @@ def _follow_walk(
     home, actor, behavior = walker
     step = int(keys["step"][begin])
     state = State(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
-    row = empty_poses(stop - step)
+    row = empty_poses(stop - step + 1)
     trace_meander(home.plan.mesh, actor.space.mesh, behavior.rule, step, np.array(state[:3]), row)
+    if begin + 1 < len(keys["x"]):  # where the walk came to, as it was stored
+        found = (row.x[-1], row.y[-1], row.heading[-1])
+        if found != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):
+            raise ArtifactError(
+                f"the random walk of {actor.name} from step {step} on can't be rebuilt: it was"
+                " walked by other rules than those of its behavior 'meander', or by another version"
+            )
     first = -(-step // stride)
-    paste_poses(out, first, row, slice(first * stride - step, None, stride))
+    paste_poses(out, first, row, slice(first * stride - step, stop - step, stride))
 
 
 def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:

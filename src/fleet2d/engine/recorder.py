@@ -93,7 +93,7 @@ class Recorder:
         self._walk_every = max(1, WALK_KEY_US // clock.step_us)
         # Breakpoints of the present plan already gathered; the plan before the first has none to
         # tell.
-        self._emitted = [1] * len(actors)
+        self._emitted = [2] * len(actors)
         self._told_until = [-1] * len(actors)
         self._notes_told = [0] * len(actors)
         self._samples: list[NDArray[np.int64]] = []
@@ -143,7 +143,8 @@ class Recorder:
     def end(self, step: int) -> None:
         """Gather what is under way when the run ends before `step`, and hand over everything."""
         for row in range(len(self.actors)):
-            self._break_off(row, max(0, step - 1))
+            # Not at the last step, whose rows may be with the store already: order would be lost.
+            self._break_off(row, step)
         self.drain()
 
     def drain(self) -> None:

@@ -46,7 +46,8 @@ class Reproduction:
     """What running a stored run again showed.
 
     Attributes:
-        differing: Tables whose digest is another now; empty if the run was reproduced.
+        differing: Tables that came out otherwise, or aren't as they were stored; empty if the run
+            was reproduced.
         causes: What is different about this attempt, in plain words.
     """
 
@@ -57,8 +58,8 @@ class Reproduction:
 
     @property
     def same(self) -> bool:
-        """Whether every table came out the same."""
-        return self.stored == self.digest
+        """Whether every table is as it was stored, and came out the same."""
+        return self.stored == self.digest and not self.differing
 
 
 def reproduce(directory: str | Path) -> Reproduction:
@@ -73,13 +74,19 @@ def reproduce(directory: str | Path) -> Reproduction:
             f"{directory} holds a run that is {stored.status}: only a complete run can be compared"
         )
     causes = _differences(stored)
-    scenario = load_scenario({**stored.manifest["scenario"]})
+    damaged = stored.verify()
+    causes += [f"{name} in {directory} was changed after the run" for name in damaged]
+    content = stored.manifest["scenario"]
+    # Running it at a pace of its own would only take longer.
+    scenario = load_scenario({**content, "simulation": {**content["simulation"], "speedup": None}})
     with tempfile.TemporaryDirectory() as folder:
         again = Simulation(scenario, out=Path(folder) / "run").run()
         before, after = stored.manifest["tables"], again.manifest["tables"]
     names = sorted(before.keys() | after.keys())
     differing = [
-        n for n in names if before.get(n, {}).get("digest") != after.get(n, {}).get("digest")
+        n
+        for n in names
+        if n in damaged or before.get(n, {}).get("digest") != after.get(n, {}).get("digest")
     ]
     return Reproduction(stored.digest, again.digest, differing, causes)
 

@@ -30,8 +30,10 @@ from fleet2d.engine.recorder import Recorder, table_specs
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
+from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import in_radians
+from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario, load_scenario
 
 
@@ -155,8 +157,17 @@ class Simulation:
 
         For scripts that changed something that its behaviors go by. The run can't be reproduced
         from its manifest then, which says so.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
         """
-        self.actors[name].ask_at = self.step
+        actors = self.actors
+        if name not in actors:
+            hint = did_you_mean(name, actors)
+            raise ScenarioError(
+                f"there is nobody named {name!r}{hint} There are: {', '.join(actors)}"
+            )
+        actors[name].ask_at = self.step
         notes, text = self._store.manifest.notes, "steered by a script: reproduce it by that script"
         if text not in notes:
             notes.append(text)

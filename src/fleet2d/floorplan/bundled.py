@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Literal
 
+from pydantic import Field
+
 from fleet2d.component import register
 from fleet2d.floorplan.native import read_native
 from fleet2d.floorplan.plan import FloorPlan
@@ -19,7 +21,7 @@ class Bundled(FloorPlanSource):
         name: Which one.
     """
 
-    name: Literal["family_home"] = "family_home"
+    name: Literal["family_home"] = Field(default="family_home", description="which one")
 
     def load(self) -> FloorPlan:
         """Read the plan."""

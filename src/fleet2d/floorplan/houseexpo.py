@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import shapely
+from pydantic import Field
 from shapely import Polygon
 from shapely.geometry import MultiPolygon
 
@@ -21,7 +22,7 @@ class HouseExpo(FloorPlanSource):
         path: The plan's JSON file.
     """
 
-    path: InputPath
+    path: InputPath = Field(description="the plan's JSON file")
 
     def load(self) -> FloorPlan:
         """Read the plan."""

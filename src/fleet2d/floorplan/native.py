@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pydantic import Field
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.component import register
@@ -45,7 +46,7 @@ class Native(FloorPlanSource):
         path: The plan's JSON file.
     """
 
-    path: InputPath
+    path: InputPath = Field(description="the plan's JSON file")
 
     def load(self) -> FloorPlan:
         """Read the plan."""

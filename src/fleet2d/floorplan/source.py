@@ -6,6 +6,8 @@ from abc import abstractmethod
 from pathlib import Path
 from typing import Any, ClassVar
 
+from pydantic import Field
+
 from fleet2d.component import Component
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan
@@ -26,7 +28,7 @@ class FloorPlanSource(Component):
 
     kind: ClassVar[str] = "floorplan"
 
-    cell: Length = 0.05
+    cell: Length = Field(default=0.05, description="side of a grid cell, 0.01 m to 1 m")
 
     @abstractmethod
     def load(self) -> FloorPlan:

@@ -173,7 +173,8 @@ def load_scenario(
     """Load a scenario, change it, and check all of it.
 
     Args:
-        source: a YAML file, 'bundled:NAME', a mapping or a scenario; None: the bundled base.
+        source: a YAML file, 'bundled:NAME', a mapping or a scenario; None, or an override in
+            its place: the bundled base.
         overrides: texts like 'simulation.duration.days=60', the value in YAML.
         settings: keys of ``simulation`` (``seed=4``) or whole sections (``name="night"``).
 
@@ -181,6 +182,8 @@ def load_scenario(
         ScenarioError: what is wrong, where it is written, and what is wanted; a line per problem.
     """
     folder = Path.cwd()
+    if isinstance(source, str) and "=" in source and not Path(source).exists():
+        overrides, source = (source, *overrides), None  # as on the command line
     if isinstance(source, Scenario):
         if not overrides and not settings:
             return source

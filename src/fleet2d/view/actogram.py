@@ -113,7 +113,7 @@ def _draw_marks(marks: NDArray[Any], axes: Axes) -> None:
     # The rows of a year are a pixel or two high: dark marks would hide the rooms.
     alpha = 1.0 if len(marks) <= GAPS_UP_TO else 0.35
     boxes = PolyCollection(
-        boxes, facecolors=TEXT_COLOR, alpha=alpha, lw=0, zorder=2
+        [*corners.reshape(-1, 4, 2)], facecolors=TEXT_COLOR, alpha=alpha, lw=0, zorder=2
     )
     axes.add_collection(boxes, autolim=False)
 

@@ -259,7 +259,9 @@ class _Picture:
         self.page.write(x, y + 0.09, SEPARATOR.join(facts), SMALL, color=QUIET_COLOR)
 
     def _room_chips(self) -> Iterator[Chip]:
-        here = np.unique(np.concatenate([rooms.ravel() for rooms in self.days] or [[]]))
+        here = np.unique([room for rooms in self.days for room in np.unique(rooms)]).astype(
+            np.int64
+        )
         told = set()
         for index in here[here >= 0].tolist():
             kind = self.plan.rooms[index].type

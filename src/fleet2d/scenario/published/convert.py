@@ -139,7 +139,13 @@ def _header(old: Path, remarks: list[str]) -> str:
     # Only what can be printed: a line break in a key would end the comment.
     printable = ("".join(c if c.isprintable() else "?" for c in line) for line in lines)
     wrapped = (
-        textwrap.wrap(line, 97, subsequent_indent="  " * line.startswith("- "))
+        textwrap.wrap(
+            line,
+            98,
+            subsequent_indent="  " * line.startswith("- "),
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
         for line in printable
     )
     return "".join(f"# {line}\n" for part in wrapped for line in part) + "\n"

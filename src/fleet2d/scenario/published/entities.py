@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from datetime import timedelta
 from fractions import Fraction
-from itertools import count
+from itertools import chain, count
 from typing import Any
 
 from fleet2d.problems import shown
@@ -204,4 +204,5 @@ def free_name(name: str, taken: Iterable[str]) -> str:
     """Return a name for an entity that is valid and not taken, as close to `name` as can be."""
     valid = re.sub(r"[^A-Za-z0-9_-]", "_", name)
     valid = valid if valid[0].isalpha() else f"user_{valid}"
-    return next(n for n in (valid, *(f"{valid}_{i}" for i in count(2))) if n not in taken)
+    numbered = (f"{valid}_{number}" for number in count(2))
+    return next(free for free in chain([valid], numbered) if free not in taken)

@@ -51,9 +51,8 @@ def convert_simulation(reader: Reader, step: timedelta) -> dict[str, Any]:
             f"{format_duration(duration)} is no multiple of delta, {format_duration(step)}: there,"
             " a run went one step beyond it; here it ends with the last full step within it",
         )
-    result: dict[str, Any] = {"start": _start(reader), "duration": format_duration(duration)}
-    if result["start"] is None:
-        del result["start"]
+    start = _start(reader)
+    result: dict[str, Any] = {"start": start.isoformat()} if start else {}
     seed = reader.integer((*_SIMULATION, "seed"), least=0)
     if seed is not None:
         reader.remark(
@@ -67,7 +66,12 @@ def convert_simulation(reader: Reader, step: timedelta) -> dict[str, Any]:
             "kept to in full here; there, each step slept for its share of it on top of computing",
         )
     _windows(reader)
-    return result | {"step": format_duration(step), "seed": seed, "speedup": speedup}
+    return result | {
+        "duration": format_duration(duration),
+        "step": format_duration(step),
+        "seed": seed,
+        "speedup": speedup,
+    }
 
 
 def _start(reader: Reader) -> datetime | None:

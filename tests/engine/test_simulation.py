@@ -1,0 +1,206 @@
+"""Simulation in Python: step it, look at it, branch it, finish it."""
+
+import copy
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fleet2d
+from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
+from tests.scenes import OWN, digests, everything, run, scenario, table
+
+
+def small(duration: str = "10 min", **sections: Any) -> dict[str, Any]:
+    return scenario(
+        duration,
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol", "dwell": "30 s"}},
+        **sections,
+    )
+
+
+def test_the_state_is_that_of_the_next_step() -> None:
+    content = small("3 min")
+    rows = table(run(content, "artifacts.trajectories=every step"), "trajectories", entity="ana")
+    simulation = fleet2d.Simulation(content)
+    for k in (0, 1, 2, 60, 61, 179):
+        simulation.run_until(k)
+        state = simulation.state["ana"]
+        assert (rows["x"][k], rows["y"][k]) == (state["x"], state["y"])
+        assert rows["heading"][k] == pytest.approx(state["heading"])
+        assert rows["room"][k] == state["room"]
+    assert not simulation.done
+    simulation.advance()
+    assert simulation.done
+
+
+def test_advancing_beyond_the_end_stops_at_the_end() -> None:
+    simulation = fleet2d.Simulation(small("1 min"))
+    simulation.advance(1000)
+    assert (60, True) == (simulation.step, simulation.done)
+    simulation.advance()
+    simulation.run_until(datetime(2030, 1, 1))
+    assert 60 == simulation.step
+    assert "complete" == simulation.finish().status
+
+
+def test_running_until_a_past_time_does_nothing() -> None:
+    simulation = fleet2d.Simulation(small())
+    simulation.advance(100)
+    for when in (50, timedelta(seconds=3), datetime(2026, 1, 5, 6)):
+        simulation.run_until(when)
+        assert 100 == simulation.step
+
+
+def test_a_run_finished_early_is_interrupted_and_whole_until_then() -> None:
+    simulation = fleet2d.Simulation(small())
+    simulation.advance(150)
+    stored = simulation.finish()
+    assert "interrupted" == stored.status
+    assert (150, 150.0) == (stored.manifest["steps"], stored.manifest["simulated_s"])
+    assert [0, 0, 60, 60, 120, 120] == table(stored, "trajectories")["step"].tolist()
+    assert stored.digest == run(small("150 s")).digest
+    assert [] == stored.verify()
+
+
+def test_a_finished_run_can_not_go_on() -> None:
+    simulation = fleet2d.Simulation(small())
+    simulation.advance(1)
+    simulation.finish()
+    with pytest.raises(ArtifactError, match="closed"):
+        simulation.run()
+
+
+def test_outputs_of_algorithms_can_be_looked_at() -> None:
+    content = small(algorithms={"share": {"type": f"{OWN}:Share", "period": "2 min"}})
+    simulation = fleet2d.Simulation(content)
+    simulation.advance(119)
+    assert {} == simulation.outputs
+    simulation.advance(1)
+    assert 1 == pytest.approx(simulation.outputs["share"].share.sum())
+
+
+def test_without_a_seed_one_is_drawn_stored_and_repeats_the_run() -> None:
+    content = small("2 min")
+    del content["simulation"]["seed"]
+    first, second = (run(content) for _ in range(2))
+    assert first.manifest["seed"] != second.manifest["seed"]
+    assert first.digest != second.digest
+    seed = first.manifest["seed"]
+    assert seed == first.manifest["scenario"]["simulation"]["seed"]
+    assert first.digest == run(content, seed=seed).digest
+
+
+def test_branches_share_the_home_and_nothing_else() -> None:
+    simulation = fleet2d.Simulation(everything("20 min"))
+    simulation.advance(600)
+    branch = copy.deepcopy(simulation)
+    assert branch.home is simulation.home
+    assert branch._users[0] is not simulation._users[0]
+    assert branch._users[0].behaviors[0] is not simulation._users[0].behaviors[0]
+
+
+def test_a_branch_can_be_changed_without_the_other_noticing() -> None:
+    simulation = fleet2d.Simulation(small())
+    simulation.advance(200)
+    branch = copy.deepcopy(simulation)
+    robot = branch._robots[0]
+    robot.state = robot.state._replace(x=robot.state.x + 2)
+    robot.ask_at = branch.step
+    assert digests(run(small())) == digests(simulation.run())
+    assert digests(branch.run())["trajectories"] != digests(run(small()))["trajectories"]
+
+
+def test_a_simulation_that_stores_in_a_directory_can_not_be_copied(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(small(), out=tmp_path / "run")
+    with pytest.raises(ArtifactError, match="stores in"):
+        copy.deepcopy(simulation)
+    simulation.finish()
+
+
+def test_a_directory_and_memory_get_the_same_tables(tmp_path: Path) -> None:
+    stored = run(everything("20 min"), out=tmp_path / "run")
+    assert digests(run(everything("20 min"))) == digests(stored)
+    assert [] == stored.verify()
+    assert stored.directory == tmp_path / "run"
+
+
+def test_a_directory_that_holds_something_is_refused_before_anything_is_computed(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "mine.txt").write_text("precious")
+    with pytest.raises(RunDirectoryError, match="not empty"):
+        fleet2d.Simulation(small(), out=tmp_path)
+    assert ["mine.txt"] == [path.name for path in tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"users": {"ana": {"type": "meander", "start": [5.05, 1.0]}}},
+        {"robots": {"astro": {"type": "patrol", "rooms": ["attic"]}}},
+        {"algorithms": {"a": {"type": f"{OWN}:Share", "reads": ["b"]}}},
+        {"metrics": {"distance": {"period": "1.5 s"}}},
+        {"artifacts": {"trajectories": "1.5 s"}},
+    ],
+)
+def test_wrong_input_leaves_no_directory(tmp_path: Path, change: dict[str, Any]) -> None:
+    with pytest.raises(InputError):
+        fleet2d.Simulation(small() | change, out=tmp_path / "deep" / "run")
+    assert [] == list(tmp_path.iterdir())
+
+
+def test_progress_is_told_now_and_then() -> None:
+    told: list[int] = []
+    content = small("1 h", algorithms={"tick": {"type": f"{OWN}:Tick", "period": "1 s"}})
+    fleet2d.Simulation(content).run(lambda simulation: told.append(simulation.step))
+    assert told == sorted(told)
+    assert told
+
+
+def test_wall_times_add_up(tmp_path: Path) -> None:
+    import time
+
+    began = time.perf_counter()
+    stored = run(small("2 h"), out=tmp_path / "run")
+    took = time.perf_counter() - began
+    wall = stored.manifest["wall_s"]
+    assert {"setup", "simulate", "save"} == set(wall)
+    assert all(seconds > 0 for seconds in wall.values())
+    assert 0.5 * took < sum(wall.values()) <= took
+
+
+def test_users_without_robots_robots_without_users_and_nobody_run() -> None:
+    for content in (
+        scenario("1 h", users={"ana": {"type": "meander"}}),
+        scenario("1 h", robots={"astro": {"type": "patrol"}}),
+        scenario("1 h"),
+    ):
+        stored = run(content)
+        assert 3600 == stored.manifest["steps"]
+        assert "observations" not in stored.tables
+        assert [] == stored.verify()
+
+
+def test_the_manifest_tells_what_was_run() -> None:
+    stored = run(small("90 s", simulation={"step": "500 ms"}))
+    manifest = stored.manifest
+    assert ("complete", 180, 90.0, 500_000) == (
+        manifest["status"], manifest["steps"], manifest["simulated_s"], manifest["step_us"]
+    )  # fmt: skip
+    assert "2026-01-05T07:00:00" == manifest["start"]
+    assert {"users": ["ana"], "robots": ["astro"]} == manifest["entities"]
+    assert {"fleet2d", "numpy", "numba", "python"} <= set(manifest["versions"])
+    (record,) = manifest["inputs"]
+    assert record["path"].endswith("flat.json")
+    assert 64 == len(record["sha256"])
+    again = fleet2d.load_scenario(manifest["scenario"])
+    assert stored.digest == run(again).digest
+
+
+def test_the_files_of_own_components_are_among_the_inputs() -> None:
+    stored = run(everything("1 min"))
+    names = {Path(record["path"]).name for record in stored.manifest["inputs"]}
+    assert {"flat.json", "own_components.py"} == names

@@ -1,0 +1,71 @@
+"""Random streams: one for each component and purpose, addressed by step."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from fleet2d.engine.streams import Draws, stream_key
+
+
+def test_every_seed_path_and_purpose_has_a_stream_of_its_own() -> None:
+    paths = ["users.ana", "users.ben", "users.anax", "robots.ana", ""]
+    keys = {int(stream_key(*key)) for key in product([0, 1, 4, 2**63 - 1], paths, ["spot", "x", ""])}
+    assert 4 * 5 * 3 == len(keys)
+
+
+def test_names_that_run_into_each_other_are_told_apart() -> None:
+    assert stream_key(1, "users.ana", "x") != stream_key(11, "sers.ana", "x")
+    assert stream_key(1, "users.a", "nax") != stream_key(1, "users.ana", "x")
+
+
+def test_keys_are_the_same_on_every_machine() -> None:
+    assert 0xB2018C82EE74584F == int(stream_key(4, "users.ana", "spot"))
+    draws = Draws(stream_key(4, "users.ana", "spot"), 0)
+    assert [3, 4, 4, 3, 4] == [draws.below(6) for _ in range(5)]
+
+
+def test_draws_of_one_step_do_not_depend_on_how_many_were_taken_at_another() -> None:
+    key = stream_key(4, "users.ana", "spot")
+    greedy = Draws(key, 7)
+    for _ in range(1000):
+        greedy.uniform()
+    assert [Draws(key, 8).below(10**9)] == [Draws(key, 8).below(10**9)]
+    first = Draws(key, 8)
+    assert [first.below(100) for _ in range(5)] != [Draws(key, 7).below(100) for _ in range(5)]
+
+
+def test_draws_below_are_even() -> None:
+    counts = np.bincount(
+        [Draws(stream_key(1, "p", "q"), step).below(7) for step in range(14_000)], minlength=7
+    )
+    assert 7 == len(counts)
+    assert ((counts - 2000) ** 2 / 2000).sum() < 22.5  # chi squared, 6 degrees of freedom, 0.1 %
+
+
+def test_successive_draws_of_one_step_are_even_and_independent() -> None:
+    draws = Draws(stream_key(1, "p", "q"), 3)
+    values = np.array([draws.uniform() for _ in range(10_000)])
+    assert 0 <= values.min() < values.max() < 1
+    assert values.mean() == pytest.approx(0.5, abs=0.01)
+    assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 0.03
+
+
+def test_every_order_of_a_shuffle_is_as_likely() -> None:
+    counts: dict[tuple[str, ...], int] = {}
+    for step in range(6000):
+        order = tuple(Draws(stream_key(2, "p", "q"), step).shuffled("abc"))
+        counts[order] = counts.get(order, 0) + 1
+    assert 6 == len(counts)
+    assert sum((n - 1000) ** 2 / 1000 for n in counts.values()) < 20.5  # 5 degrees, 0.1 %
+
+
+def test_a_choice_is_one_of_the_items() -> None:
+    chosen = {Draws(stream_key(2, "p", "q"), step).choice("abc") for step in range(50)}
+    assert {"a", "b", "c"} == chosen
+
+
+@pytest.mark.parametrize("bound", [0, -1, 2**31])
+def test_a_bound_that_can_not_be_is_refused(bound: int) -> None:
+    with pytest.raises(ValueError, match="bound"):
+        Draws(stream_key(1, "p", "q"), 0).below(bound)
