@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fleet2d.engine.run import reproduce as reproduce
     from fleet2d.engine.run import run as run
     from fleet2d.engine.simulation import Simulation as Simulation
+    from fleet2d.entities.actor import Actor as Actor
     from fleet2d.entities.behavior import Behavior as Behavior
     from fleet2d.entities.behavior import Situation as Situation
     from fleet2d.entities.plan import Plan as Plan
@@ -27,10 +28,13 @@ if TYPE_CHECKING:
     from fleet2d.scenario.model import Scenario as Scenario
     from fleet2d.scenario.model import load_scenario as load_scenario
     from fleet2d.units import Duration as Duration
+    from fleet2d.units import Length as Length
+    from fleet2d.units import Share as Share
 
 __version__ = "0.1.0"
 
 _HOME_OF = {
+    "Actor": "entities.actor",
     "Algorithm": "algorithms.algorithm",
     "Behavior": "entities.behavior",
     "Duration": "units",
@@ -38,12 +42,14 @@ _HOME_OF = {
     "FloorPlan": "floorplan.plan",
     "History": "algorithms.history",
     "Home": "floorplan.home",
+    "Length": "units",
     "Metric": "metrics.metric",
     "Plan": "entities.plan",
     "Present": "algorithms.algorithm",
     "RoomDistribution": "algorithms.output",
     "Run": "artifacts.reader",
     "Scenario": "scenario.model",
+    "Share": "units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
     "load_floorplan": "floorplan.load",

@@ -4,6 +4,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -21,6 +22,7 @@ _LOADED = time.perf_counter()
 app = typer.Typer(
     help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
     no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -33,6 +35,20 @@ Arguments = Annotated[
         help="A scenario (left out: the bundled base scenario), and changes to it.",
     ),
 ]
+
+
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Simulate weeks of a home in a fraction of a second, exactly reproducible."""
+    if version:
+        import fleet2d
+
+        typer.echo(f"fleet2d {fleet2d.__version__}")
+        raise typer.Exit
 
 
 @app.command()
@@ -79,8 +95,9 @@ def validate(arguments: Arguments = None) -> None:
     simulation = Simulation(scenario, *overrides)
     plan, settings = simulation.home.plan, simulation.scenario.simulation
     typer.echo(
-        f"ok: {len(simulation.scenario.users)} users and {len(simulation.scenario.robots)} robots"
-        f" in {plan.name} ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
+        f"ok: {_count(simulation.scenario.users, 'user')} and"
+        f" {_count(simulation.scenario.robots, 'robot')} in {plan.name}"
+        f" ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
         f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
     )
     for note in plan.notes:
@@ -189,6 +206,10 @@ def main() -> NoReturn:
     sys.exit(0)
 
 
+def _count(things: Collection[Any], noun: str) -> str:
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
+
+
 def _split(arguments: list[str] | None) -> tuple[str | None, list[str]]:
     """Tell the scenario from the overrides: it comes first, and has no '='."""
     rest = list(arguments or [])
@@ -264,17 +285,28 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
         highlight=False,
         soft_wrap=True,
     )
-    table = Table("metric", "of", "value", show_edge=False)
+    table = Table("metric", "of", "value", "", show_edge=False)
     for metric, result in summary["metrics"].items():
+        unit = _unit_of(stored, metric)
         for name, value in _flat(result):
-            table.add_row(metric, name, f"{value:.4g}" if isinstance(value, float) else str(value))
-            metric = ""
+            shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+            table.add_row(metric, name, shown, unit)
+            metric = unit = ""
     if table.row_count:
         console.print(table)
     for note in stored.notes or stored.manifest["notes"]:
         console.print(f"note: {note}", highlight=False)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
     console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True)
+
+
+def _unit_of(stored: "Run", metric: str) -> str:
+    """Return the unit that a metric's class declares."""
+    from fleet2d.component import lookup
+
+    configured = stored.manifest["scenario"]["metrics"][metric]
+    unit: str = getattr(lookup("metric", configured["type"]), "unit", "")
+    return unit
 
 
 def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:

@@ -308,6 +308,20 @@ def test_route_to_a_place_without_room_is_none() -> None:
     assert space.route(start, tuple(lattice.to_lattice((2.05, 0.5)).tolist())) is None
 
 
+def test_route_to_the_border_of_the_space_is_none() -> None:
+    """It used to lead round by a corner of the space, as a sight line never ends on a wall."""
+    free = shapely.box(0, 0, 5, 4).difference(shapely.box(2, 1, 3, 3))
+    space = Space(built(free), 0.2)
+    low = space.mesh.vertices[0]
+    start = space.plan.lattice.to_lattice((1.0, 2.0)).tolist()
+
+    for goal in low + np.array([[0, 0], [0, 801], [801, 0]]):
+        assert space.part_at(*goal.tolist()) == -1
+        assert space.part_at(*(goal + 1).tolist()) == 0
+        assert space.route(tuple(start), tuple(goal.tolist())) is None
+        assert space.route(tuple(start), tuple((goal + 1).tolist())) is not None
+
+
 @needs_jit
 def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> None:
     paths = sorted((shared_data / "houseexpo").glob("*.json"))

@@ -84,14 +84,14 @@ class BodyPoses:
     @cached_property
     def room(self) -> NDArray[np.int16]:
         """Index of the room, NOWHERE while it is away."""
-        room = self._home.plan.room_of_cell[self._poses.y // SUB, self._poses.x // SUB]
+        room = self._home.plan.room_of_place[self._poses.y // SUB, self._poses.x // SUB]
         return _shared(np.where(self.away, np.int16(NOWHERE), room))
 
     @cached_property
     def time_in_rooms(self) -> NDArray[np.int64]:
         """Number of steps in each room, and last away: int64 (rooms + 1,)."""
         counts = np.zeros(len(self._home.rooms) + 1, np.int64)
-        count_rooms(self._poses, self._home.plan.room_of_cell, counts)
+        count_rooms(self._poses, self._home.plan.room_of_place, counts)
         return _shared(counts)
 
     @cached_property

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.errors import ComponentError
 
-
 # The columns of every table.
 RESERVED = frozenset({"step", "time"})
 
@@ -98,9 +97,7 @@ def _check_column(name: str, values: NDArray[Any], where: str) -> None:
         what = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
         raise ComponentError(f"{where} put out {name!r} with {what}; numbers or strings are wanted")
     if values.dtype.kind == "f" and not np.isfinite(values).all():
-        raise ComponentError(
-            f"{where} put out {name!r} with a value that is not finite: {values}"
-        )
+        raise ComponentError(f"{where} put out {name!r} with a value that is not finite: {values}")
 
 
 def _column(values: NDArray[Any]) -> NDArray[Any]:

@@ -165,8 +165,8 @@ def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
     for name, kind in kinds.items():
         if kind != learner.kinds[name] and (kind, learner.kinds[name]) != ("int64", "float64"):
             raise ComponentError(
-                f"{learner.path} put out {name!r} as {kind}, but as {learner.kinds[name]} before: the"
-                " first output fixes what a column holds (0.0 for fractions, not 0)"
+                f"{learner.path} put out {name!r} as {kind}, but as {learner.kinds[name]} before:"
+                " the first output fixes what a column holds (0.0 for fractions, not 0)"
             )
 
 

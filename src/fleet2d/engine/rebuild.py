@@ -84,7 +84,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     out = empty_poses(len(steps))
     _trace(run, plan, entity, clock, keys, stride, out)
     xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
-    room = np.where(out.away, -1, plan.room_of_cell[out.y // SUB, out.x // SUB])
+    room = np.where(out.away, -1, plan.room_of_place[out.y // SUB, out.x // SUB])
     return Path(
         steps,
         clock.times(steps),

@@ -237,7 +237,7 @@ class Recorder:
             step, user, robot, x, y = (column[order] for column in (step, user, robot, x, y))
         plan = self.home.plan
         xy = plan.lattice.to_metres(np.stack([x, y], axis=-1))
-        room = plan.room_of_cell[y // SUB, x // SUB]
+        room = plan.room_of_place[y // SUB, x // SUB]
         observations = Observations(step, robot, user, xy[:, 0], xy[:, 1], room)
         if self._keeps_observations and len(step):
             self._observations.append(observations)
@@ -262,7 +262,7 @@ class Recorder:
         gone = away.astype(bool)
         xy = plan.lattice.to_metres(rows[:, 2:4])
         xy[gone] = np.nan
-        room = plan.room_of_cell[y // SUB, x // SUB].astype(np.int32)
+        room = plan.room_of_place[y // SUB, x // SUB].astype(np.int32)
         self.store.append(
             "trajectories",
             **self._when(step),

@@ -128,7 +128,7 @@ class Actor:
         if part == self.part:
             return x, y
         near = self.space.nearest(x, y, self.part)
-        there = lattice.to_metres(near).round(2).tolist() if near else None
+        there = None if near is None else self._shown(near)
         why = (
             "can't be reached from where it starts"
             if part >= 0
@@ -137,6 +137,15 @@ class Actor:
         raise PlacementError(
             f"{self.path}: the point {list(xy)} {why}; the nearest free point is {there}"
         )
+
+    def _shown(self, point: tuple[int, int]) -> list[float]:
+        """Return a free lattice point in metres, with as few decimals as leave it free."""
+        lattice = self.home.plan.lattice
+        short: list[float] = lattice.to_metres(point).round(2).tolist()
+        if self.space.part_at(*lattice.to_lattice(short).tolist()) == self.part:
+            return short
+        exact: list[float] = lattice.to_metres(point).round(4).tolist()
+        return exact
 
     def decide(self, step: int, events: tuple[object, ...], outputs: dict[str, object]) -> None:
         """Ask the behaviors, in order, for a plan that begins at `step`."""
@@ -156,7 +165,7 @@ class Actor:
             )
         if plan.began != (step, self.state):
             raise ComponentError(
-                f"{self.path}: decide() returned a plan that doesn't begin here and now: make a new one"
+                f"{self.path}: decide() returned a plan that doesn't begin here and now: make one"
                 " by now.plan()"
             )
         self.plan, self.motion, self.planned_at = plan, plan.finish(), step
@@ -186,7 +195,7 @@ class Actor:
         return State(x, y, round(heading / 360 * TURN) % TURN, away)
 
     def _first_part(self, names: RoomChoice) -> int:
-        """Return the largest part of its space that has one of these rooms; the largest if none has."""
+        """Return the largest part of its space with one of these rooms; else the largest."""
         for part in range(self.space.parts):
             reachable = [r for r in self.home.rooms if len(self.space.cells(r.index, part))]
             if {ANY, *(r.name for r in reachable), *(r.type for r in reachable)} & set(names):

@@ -217,8 +217,12 @@ class Plan:
         """Ask the behavior again as soon as one of these events happens.
 
         Raises:
-            ComponentError: There is no such event.
+            ComponentError: There is no such event, or the body has no camera to notice it.
         """
+        if getattr(self._actor.entity, "camera", None) is None:
+            raise ComponentError(
+                f"{self._actor.path}: a camera interrupts plans by what it sees, but there is none"
+            )
         unknown = set(events) - INTERRUPTS
         if unknown:
             allowed = ", ".join(sorted(INTERRUPTS))
@@ -240,8 +244,8 @@ class Plan:
     def _check_goes_on(self) -> None:
         if self.endless:
             raise ComponentError(
-                f"{self._actor.path}: a plan that stays or meanders for good can't go on: give stay()"
-                " a duration, or make that the end"
+                f"{self._actor.path}: a plan that stays or meanders for good can't go on: give"
+                " stay() a duration, or make that the end"
             )
 
     def _mark(self) -> None:

@@ -15,7 +15,7 @@ from shapely import MultiPolygon, Polygon
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import GRID, Snapped, build_mesh, snap_polygon
-from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, assign_rooms
+from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, assign_rooms, beside_rooms
 from fleet2d.floorplan.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.problems import did_you_mean
@@ -148,6 +148,17 @@ class FloorPlan:
         return float(units2) / self.lattice.units_per_m**2
 
     @cached_property
+    def room_of_place(self) -> NDArray[np.int16]:
+        """Index of the room of a place in each cell, int16 (rows, columns), -1 inside walls.
+
+        As `room_of_cell`, but a cell that a wall cuts, so that its centre isn't free, has the room
+        of a free cell beside it: somebody may stand in the part that is.
+        """
+        rooms = beside_rooms(self.room_of_cell)
+        rooms.setflags(write=False)
+        return rooms
+
+    @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """The smallest box around the free space (x0, y0, x1, y1) [m]."""
         corners = np.reshape(shapely.total_bounds(self.polygons), (2, 2))
@@ -171,15 +182,11 @@ class FloorPlan:
         return content.hexdigest()
 
     def room_at(self, x: float, y: float) -> Room | None:
-        """Return the room whose cell holds a place [m], or None.
-
-        None also comes for places in free space whose cell's centre isn't: closer than a cell to a
-        wall.
-        """
+        """Return the room that holds a place [m], or None outside the home and inside a wall."""
         row, column = self.lattice.cell_of(*self.lattice.to_lattice((x, y)).tolist())
         if not (0 <= row < self.lattice.rows and 0 <= column < self.lattice.columns):
             return None
-        index = int(self.room_of_cell[row, column])
+        index = int(self.room_of_place[row, column])
         return None if index == NO_ROOM else self.rooms[index]
 
     def room(self, name: str | int) -> Room:

@@ -237,3 +237,17 @@ def _lost_note(lattice: Lattice, region: _Snapped) -> str:
         f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m has no free cell"
         " that isn't a smaller room's: it is no room"
     )
+
+
+def beside_rooms(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the rooms of cells, where cells without one take that of a neighbor.
+
+    First of a neighbor to the side, then of one across a corner; west before east, south before
+    north.
+    """
+    filled = room_of_cell.copy()
+    sides, corners = ((0, -1), (0, 1), (-1, 0), (1, 0)), ((-1, -1), (-1, 1), (1, -1), (1, 1))
+    for row, column in (*sides, *corners):
+        shifted = np.roll(room_of_cell, (-row, -column), axis=(0, 1))  # the margin is never free
+        filled = np.where(filled == NO_ROOM, shifted, filled)
+    return filled.astype(np.int16)

@@ -100,6 +100,8 @@ class Space:
 
         A start on the border of the space, where a walk can be broken off, first steps back in.
         """
+        if not strictly_inside(self.mesh, *goal):
+            return None
         prefix: list[tuple[int, int]] = []
         if not strictly_inside(self.mesh, *start):
             inside = self._way_in(*start)

@@ -9,14 +9,12 @@ from fleet2d.kernels.motion import Poses
 
 
 @kernel
-def count_rooms(poses: Poses, room_of_cell: NDArray[np.int16], counts: NDArray[np.int64]) -> None:
+def count_rooms(poses: Poses, room_of_place: NDArray[np.int16], counts: NDArray[np.int64]) -> None:
     """Add the number of poses in each room to counts (rooms + 1,); the last entry is away."""
     x, y, away = poses.x, poses.y, poses.away
     last = counts.shape[0] - 1
     for j in range(x.shape[0]):
-        # Room -1, a cell that a wall cuts, also counts as the last entry.
-        room = -1 if away[j] else int(room_of_cell[y[j] // SUB, x[j] // SUB])
-        counts[room if room >= 0 else last] += 1
+        counts[last if away[j] else room_of_place[y[j] // SUB, x[j] // SUB]] += 1
 
 
 @kernel

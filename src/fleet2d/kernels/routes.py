@@ -124,6 +124,7 @@ def corners_seen(mesh: Mesh, corners: Corners, x: int, y: int, triangle: int, se
 def find_route(mesh: Mesh, graph: RouteGraph, ax: int, ay: int, bx: int, by: int, out: I64) -> int:
     """Write the shortest path from (ax, ay) to (bx, by) to `out` (nodes + 2, 2).
 
+    Both ends are strictly inside the space: a goal on its border is not seen by the last corner.
     Returns the number of its points, or 0 when there is no way or an end lies outside the space.
     Ties go to the lower node id: ids are sorted by position, so the path depends on the walls only.
     """

@@ -1,7 +1,7 @@
 """How far everybody goes."""
 
 from math import dist
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 @register("metric", "distance")
 class Distance(Metric):
     """Metres that each body covers per day, as the sum of its moves from step to step."""
+
+    unit: ClassVar[str] = "m a day"
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

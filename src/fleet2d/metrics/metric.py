@@ -22,6 +22,7 @@ class Metric(Component):
     """
 
     kind: ClassVar[str] = "metric"
+    unit: ClassVar[str] = ""  # of its result, for people to read
 
     period: PositiveDuration = Field(
         default=timedelta(days=1), description="how often it is updated"

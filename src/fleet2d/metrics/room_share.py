@@ -1,6 +1,6 @@
 """Where users really are: the share of time per room."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ class RoomShare(Metric):
 
     Stored per period; the result is over the whole run. Shares of a user sum to one.
     """
+
+    unit: ClassVar[str] = "share of time"
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

@@ -1,6 +1,6 @@
 """How much the robots see of the users."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 @register("metric", "sightings")
 class Sightings(Metric):
     """Share of a user's steps at home in which at least one robot detects the user."""
+
+    unit: ClassVar[str] = "share of time at home"
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

@@ -127,7 +127,10 @@ def _construct_int(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
 def _construct_timestamp(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> Any:
     try:
         return loader.construct_yaml_timestamp(node)
-    except ValueError:  # 2026-02-31: text, which the model refuses with the key's name
+    except (
+        ValueError,
+        AttributeError,
+    ):  # 2026-02-31, or a tagged text: text, which the model refuses with the key's name
         return node.value
 
 

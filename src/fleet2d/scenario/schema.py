@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_json_schema
 from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
 
-from fleet2d.component import PACKAGES, Component, aliases, components
+from fleet2d.component import PACKAGES, Component, Settings, aliases, components
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
 
@@ -139,19 +139,43 @@ def _allow_composition(properties: dict[str, Any]) -> None:
 
 
 def describe_components() -> list[ComponentDescription]:
-    """Describe every component that a scenario can name: its fields, their units and defaults."""
+    """Describe all that a scenario is made of: fields, their units and defaults.
+
+    First the sections that every scenario has (kind `scenario`, named as in Python), then every
+    registered type, and what their fields hold (kind `part`).
+    """
+    types = {(kind, name): cls for kind in PACKAGES for name, cls in components(kind).items()}
+    sections = _parts_of(Scenario)
+    parts = [part for cls in types.values() for part in _parts_of(cls) if part not in sections]
     return [
-        _describe(kind, name, cls) for kind in PACKAGES for name, cls in components(kind).items()
+        *(_describe("scenario", cls.__name__, cls) for cls in sections),
+        *(_describe(kind, name, cls) for (kind, name), cls in types.items()),
+        *(_describe("part", cls.__name__, cls) for cls in dict.fromkeys(parts)),
     ]
 
 
-def _describe(kind: str, name: str, cls: type[Component]) -> ComponentDescription:
+def _parts_of(cls: type[Settings]) -> list[type[Settings]]:
+    """Return the groups of keys below a class that no `type` selects, outermost first."""
+    found: list[type[Settings]] = []
+    for field in cls.model_fields.values():
+        for part in _settings_in(field.annotation):
+            found += [part, *_parts_of(part)]
+    return list(dict.fromkeys(found))
+
+
+def _settings_in(annotation: Any) -> list[type[Settings]]:
+    if isinstance(annotation, type) and issubclass(annotation, Settings):
+        return [] if issubclass(annotation, Component) else [annotation]
+    return [part for argument in get_args(annotation) for part in _settings_in(argument)]
+
+
+def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription:
     written = cls.model_json_schema(schema_generator=_Writer)
     properties, needed = written.get("properties", {}), written.get("required", ())
     return ComponentDescription(
         kind,
         name,
-        aliases(kind, name),
+        aliases(kind, name) if issubclass(cls, Component) else (),
         (cls.__doc__ or "").strip().partition("\n")[0],
         tuple(
             FieldDescription(

@@ -186,7 +186,7 @@ def _entries(day: Day, rest: RoomChoice | Point, number: int = 0) -> list[Entry]
         if begins >= DAY:
             raise problem_at(
                 where,
-                f"it begins at {format_time_of_day(begins)}: an item begins before 24:00 of its day",
+                f"it begins at {format_time_of_day(begins)}: an item begins before 24:00",
             )
         if over is not None and begins > over:
             entries.append(Entry(over, rest, "rest"))
