@@ -184,9 +184,7 @@ def compare_peers(plan: Path, python: str) -> None:
     """Run navground and IR-SIM on the same walls, beside our own agent-steps per second."""
     result = run_once(scenario(plan, {"ana": SCHEDULE}, PATROL, 30))
     rate = 2 * result["steps"] / work_s(result)
-    print(
-        f"\nFleet2D, 1 robot that sees 1 user, all included: {rate:,.0f} agent-steps/s"
-    )
+    print(f"\nFleet2D, 1 robot that sees 1 user, all included: {rate:,.0f} agent-steps/s")
     script = Path(__file__).with_name("peers.py")
     command = [sys.executable, str(script), "--plan", str(plan), "--python", python]
     subprocess.run([*command, "--against", str(rate)], check=True)

@@ -103,49 +103,55 @@ AGENDA = [
 def everything(duration: str = "2 h", **changes: Any) -> dict[str, Any]:
     """A scenario with every behavior, cameras that are unsure, algorithms and metrics."""
     unsure = {"range": [0.2, 4], "angle_deg": 120, "detection": 0.7, "lost_after": "20 s"}
-    return scenario(
-        duration,
-        users={
-            "ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"},
-            "ben": {"type": "meander", "speed": 0.7},
-        },
-        robots={
-            "astro": {
-                "camera": unsure,
-                "behaviors": [
-                    {"type": f"{OWN}:Greet"},
-                    {"type": "patrol", "dwell": "90 s", "order": "random"},
-                ],
+    return (
+        scenario(
+            duration,
+            users={
+                "ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"},
+                "ben": {"type": "meander", "speed": 0.7},
             },
-            "bolt": {
-                "camera": {**unsure, "detection": 1, "lost_after": "3.5 s"},
-                "behaviors": [{"type": f"{OWN}:Greet", "patience": "40 s"}, {"type": "patrol"}],
+            robots={
+                "astro": {
+                    "camera": unsure,
+                    "behaviors": [
+                        {"type": f"{OWN}:Greet"},
+                        {"type": "patrol", "dwell": "90 s", "order": "random"},
+                    ],
+                },
+                "bolt": {
+                    "camera": {**unsure, "detection": 1, "lost_after": "3.5 s"},
+                    "behaviors": [{"type": f"{OWN}:Greet", "patience": "40 s"}, {"type": "patrol"}],
+                },
+                "curio": {
+                    "camera": unsure,
+                    "type": "patrol",
+                    "waypoints": [[1, 1], [7, 1], [7, 6]],
+                    "dwell": "10 s",
+                },
+                "drift": {"type": "meander", "camera": {"range": [0, 2]}, "radius": 0.1},
+                "ego": {"camera": None, "type": f"{OWN}:Obey", "speed": 1.2},
             },
-            "curio": {
-                "camera": unsure,
-                "type": "patrol",
-                "waypoints": [[1, 1], [7, 1], [7, 6]],
-                "dwell": "10 s",
+            algorithms={
+                "smooth": {"type": f"{OWN}:Smooth", "reads": ["share"], "period": "20 min"},
+                "share": {"type": f"{OWN}:Share", "period": "10 min"},
             },
-            "drift": {"type": "meander", "camera": {"range": [0, 2]}, "radius": 0.1},
-            "ego": {"camera": None, "type": f"{OWN}:Obey", "speed": 1.2},
-        },
-        algorithms={
-            "smooth": {"type": f"{OWN}:Smooth", "reads": ["share"], "period": "20 min"},
-            "share": {"type": f"{OWN}:Share", "period": "10 min"},
-        },
-        metrics={
-            "room_share": {"period": "1 h"},
-            "sightings": {"period": "25 min"},
-            "distance": {"period": "7 min"},
-        },
-    ) | changes
+            metrics={
+                "room_share": {"period": "1 h"},
+                "sightings": {"period": "25 min"},
+                "distance": {"period": "7 min"},
+            },
+        )
+        | changes
+    )
 
 
 def every_step(duration: str = "5 min") -> dict[str, Any]:
     """The same with an algorithm that is updated after every step, which no span outlasts."""
     content = everything(duration)
-    content["algorithms"] = {**content["algorithms"], "tick": {"type": f"{OWN}:Tick", "period": "1 s"}}
+    content["algorithms"] = {
+        **content["algorithms"],
+        "tick": {"type": f"{OWN}:Tick", "period": "1 s"},
+    }
     return content
 
 
@@ -181,7 +187,9 @@ def path(stored: Run, entity: str) -> Any:
 
 def each_step(content: Mapping[str, Any], entity: str, *overrides: str) -> dict[str, NDArray[Any]]:
     """Every row of the trajectories table of a body, stored at every step."""
-    return table(run(content, "artifacts.trajectories=every step", *overrides), "trajectories", entity=entity)
+    return table(
+        run(content, "artifacts.trajectories=every step", *overrides), "trajectories", entity=entity
+    )
 
 
 def process(

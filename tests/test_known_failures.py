@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from tests.homes import needs_jit
+from tests.scenes import digests, everything, flat_document, path, run, scenario, table
 
 import fleet2d
 from fleet2d import FloorPlan, History, Metric, Present
@@ -28,8 +30,6 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.scenario.model import SimulationSettings
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.region import VisibleRegion
-from tests.homes import needs_jit
-from tests.scenes import digests, everything, flat_document, path, run, scenario, table
 
 pytestmark = needs_jit
 
@@ -69,7 +69,9 @@ def area_by_rays(plan: FloorPlan, x: float, y: float) -> float:
         reaches = []
         for share in (0.25, 0.75):
             bearing = one + share * width
-            ray = shapely.LineString([(x, y), (x + 100 * np.cos(bearing), y + 100 * np.sin(bearing))])
+            ray = shapely.LineString(
+                [(x, y), (x + 100 * np.cos(bearing), y + 100 * np.sin(bearing))]
+            )
             hit = shapely.shortest_line(eye, shapely.intersection(ray, walls))
             reaches.append(np.array([*hit.coords[1]]) - (x, y))
         (ax, ay), (bx, by) = reaches
@@ -146,7 +148,9 @@ def test_known_failure_02_no_direction_falls_into_a_gap(place: tuple[float, floa
     plan = Simulation(scenario()).home.plan
     eye = plan.lattice.to_lattice(place)
     region = VisibleRegion(plan, *place)
-    ring = [(dx, dy) for dx in range(-20, 21) for dy in range(-20, 21) if max(abs(dx), abs(dy)) == 20]
+    ring = [
+        (dx, dy) for dx in range(-20, 21) for dy in range(-20, 21) if max(abs(dx), abs(dy)) == 20
+    ]
     assert region.contains(plan.lattice.to_metres(eye + np.array(ring))).all()
 
 
@@ -215,7 +219,10 @@ def test_known_failure_04_what_is_seen_and_the_plan_can_be_stored_and_read_again
     region = VisibleRegion(plan, 1.0, 1.0)
     again = pickle.loads(pickle.dumps(region))
     assert region.area_m2 == again.area_m2
-    assert region.contains([(4.0, 3.0), (7.0, 6.0)]).tolist() == again.contains([(4.0, 3.0), (7.0, 6.0)]).tolist()
+    assert (
+        region.contains([(4.0, 3.0), (7.0, 6.0)]).tolist()
+        == again.contains([(4.0, 3.0), (7.0, 6.0)]).tolist()
+    )
 
 
 # --- 5 -----------------------------------------------------------------------------------------
@@ -304,7 +311,11 @@ ELSEWHERE = {
     (SimulationSettings, "max_span"): "test_spans: changes no result by design; see below",
     (SimulationSettings, "speedup"): "test_pace: wall time",
 }
-CASES = [(cls, where, key, value) for (cls, where), keys in CHANGES.items() for key, value in keys.items()]
+CASES = [
+    (cls, where, key, value)
+    for (cls, where), keys in CHANGES.items()
+    for key, value in keys.items()
+]
 
 
 @pytest.mark.parametrize("cls", [cls for cls, _ in CHANGES], ids=lambda cls: cls.__name__)
@@ -323,7 +334,9 @@ def usual() -> Any:
 
 
 @pytest.mark.parametrize(
-    ("cls", "where", "key", "value"), CASES, ids=[f"{cls.__name__}.{key}" for cls, _, key, _ in CASES]
+    ("cls", "where", "key", "value"),
+    CASES,
+    ids=[f"{cls.__name__}.{key}" for cls, _, key, _ in CASES],
 )
 def test_known_failure_05_every_key_has_an_effect(
     usual: Any, cls: type, where: str, key: str, value: Any
@@ -339,8 +352,8 @@ def test_known_failure_05_every_key_has_an_effect(
     if key == "dwell" and cls is Item:
         section["dwell"] = value
     assert usual != effects(content)
+    section[f"{key}x"] = value
     with pytest.raises(InputError, match=f"unknown key '{key}x'"):
-        section[f"{key}x"] = value
         fleet2d.load_scenario(content)
 
 
@@ -414,7 +427,9 @@ def test_known_failure_06_a_plan_without_labels_is_one_room(tmp_path: Path) -> N
 def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path: Path) -> None:
     """The kitchen gets 0 cells there."""
     box = [[0, 0, 3, 4]]
-    plan = houseexpo(tmp_path, room_category={"Dining_Room": box, "Kitchen": box, "Pool": [[50, 50, 60, 60]]})
+    plan = houseexpo(
+        tmp_path, room_category={"Dining_Room": box, "Kitchen": box, "Pool": [[50, 50, 60, 60]]}
+    )
     assert 2 == len(plan.rooms)
     assert plan.rooms_of_type("kitchen") == plan.rooms_of_type("dining_room")
     assert 12 == pytest.approx(plan.rooms_of_type("kitchen")[0].area_m2)
@@ -430,6 +445,7 @@ def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
 ) -> None:
     """At 0.2 m, outlines cross and up to 22 % of the area are lost there, without a word."""
     read = 0
+    refused: dict[str, str] = {}
     for file in plan_paths[::7] if cell < 0.05 else plan_paths[::3]:
         outline = shapely.Polygon(json.loads(file.read_text())["verts"])
         if not outline.is_valid:
@@ -437,7 +453,7 @@ def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
         try:
             plan = fleet2d.load_floorplan(file, cell)
         except InputError as error:
-            assert "cell" in str(error), file.name
+            refused[file.name] = str(error)
             continue
         read += 1
         # Walls move by one lattice unit, 1/64 cell, and what is narrower may close.
@@ -445,6 +461,7 @@ def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
         assert abs(plan.area_m2 - outline.area) <= tolerance, file.name
         assert all(polygon.is_valid for polygon in plan.polygons), file.name
     assert read > 3
+    assert all("cell" in message for message in refused.values()), refused
 
 
 # --- 8 -----------------------------------------------------------------------------------------
@@ -456,7 +473,9 @@ def test_known_failure_08_no_move_crosses_a_wall(speed: float, step: str) -> Non
     """Only the end of a move is checked there: at 1 m per step, 16 to 22 % of the moves cross a wall."""
     seconds = {"100 ms": 0.1, "1 s": 1, "10 s": 10, "7 min": 420, "1 h": 3600}[step]
     content = scenario(
-        f"{2000 * seconds} s", users={"ben": {"type": "meander", "speed": speed}}, simulation={"step": step}
+        f"{2000 * seconds} s",
+        users={"ben": {"type": "meander", "speed": speed}},
+        simulation={"step": step},
     )
     content["artifacts"] = {"trajectories": step, "key_frames": True}
     stored = run(content)
@@ -484,7 +503,13 @@ def test_known_failure_08_walks_go_round_walls_at_any_speed_and_step(step: str) 
     stored = run(content)
     keys = table(stored, "key_frames", entity="astro", kind="track")
     lines = shapely.linestrings(
-        np.stack([np.stack([keys["x"][:-1], keys["y"][:-1]], 1), np.stack([keys["x"][1:], keys["y"][1:]], 1)], 1)
+        np.stack(
+            [
+                np.stack([keys["x"][:-1], keys["y"][:-1]], 1),
+                np.stack([keys["x"][1:], keys["y"][1:]], 1),
+            ],
+            1,
+        )
     )
     assert len(lines) > 100
     assert shapely.distance(shapely.boundary(free_space(stored.plan)), lines).min() >= 0.15 - 1e-3
@@ -526,7 +551,11 @@ class Keep(Metric):
 
     def result(self) -> dict[str, Any]:
         same = [a[0].x.tolist() == b and a[1].x.tolist() == c for a, b, c in self.kept]
-        return {"same": all(same), "periods": len(same), "rows": sum(len(b) for _, b, _ in self.kept)}
+        return {
+            "same": all(same),
+            "periods": len(same),
+            "rows": sum(len(b) for _, b, _ in self.kept),
+        }
 
 
 @pytest.mark.parametrize("span", [None, 1])
@@ -584,7 +613,9 @@ def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell() -> N
         content = scenario(
             "1 s",
             users={"ana": {"start": [6.0, 2.3]}},
-            robots={"astro": {"start": [4.0 + dx, 2.8], "camera": {"range": [0, 9], "angle_deg": 360}}},
+            robots={
+                "astro": {"start": [4.0 + dx, 2.8], "camera": {"range": [0, 9], "angle_deg": 360}}
+            },
         )
         robot = plan.lattice.to_metres(plan.lattice.to_lattice((4.0 + dx, 2.8))).tolist()
         line = shapely.LineString([robot, (6.0, 2.3)])
@@ -606,8 +637,12 @@ def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell() -> N
 # --- 14 ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("duration", "step", "steps"), [("10 s", "3 s", 3), ("1 h", "7 min", 8), ("5 s", "5 s", 1)])
-def test_known_failure_14_a_run_stops_at_its_last_full_step(duration: str, step: str, steps: int) -> None:
+@pytest.mark.parametrize(
+    ("duration", "step", "steps"), [("10 s", "3 s", 3), ("1 h", "7 min", 8), ("5 s", "5 s", 1)]
+)
+def test_known_failure_14_a_run_stops_at_its_last_full_step(
+    duration: str, step: str, steps: int
+) -> None:
     """A duration that is no multiple of the step runs longer than asked there."""
     content = scenario(duration, users={"ana": "meander"}, simulation={"step": step})
     content["artifacts"] = {"trajectories": step}
@@ -618,7 +653,10 @@ def test_known_failure_14_a_run_stops_at_its_last_full_step(duration: str, step:
     assert (steps, steps * step_s) == (stored.manifest["steps"], stored.manifest["simulated_s"])
     assert list(range(steps)) == table(stored, "trajectories")["step"].tolist()
     assert steps == len(path(stored, "ana").x) == simulation.step == simulation.clock.steps
-    assert stored.manifest["simulated_s"] <= fleet2d.load_scenario(content).simulation.duration.total_seconds()
+    assert (
+        stored.manifest["simulated_s"]
+        <= fleet2d.load_scenario(content).simulation.duration.total_seconds()
+    )
 
 
 def test_known_failure_14_a_duration_shorter_than_a_step_is_an_error() -> None:

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 import yaml
+from tests.scenes import OWN, flat_path, fleet2d_process, scenario, write_flat
 
 from fleet2d import cli
 from fleet2d.artifacts import arrow
-from tests.scenes import OWN, fleet2d_process, flat_path, scenario, write_flat
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]
@@ -48,7 +48,11 @@ def written(content: Any, name: str = "home.yaml") -> Path:
 def small(**sections: Any) -> dict[str, Any]:
     return scenario(
         "5 min",
-        **{"users": {"ana": {"type": "meander"}}, "robots": {"astro": {"type": "patrol"}}, **sections},
+        **{
+            "users": {"ana": {"type": "meander"}},
+            "robots": {"astro": {"type": "patrol"}},
+            **sections,
+        },
     )
 
 
@@ -77,7 +81,7 @@ def check(result: Result, code: int, words: list[str], left: set[str]) -> None:
 WRONG: dict[str, tuple[dict[str, Any] | str, list[str]]] = {
     "empty": ("", ["home.yaml", "empty"]),
     "only comments": ("# nothing yet\n", ["home.yaml", "empty"]),
-    "no YAML": ("simulation: {duration: [\n", ["home.yaml", "line"]),
+    "no YAML": ("simulation: {duration: [\n", ["home.yaml:2", "not valid YAML"]),
     "a list": ("- simulation\n", ["home.yaml", "list"]),
     "binary": ("\x00\x01", ["home.yaml"]),
     "no duration": ("floorplan: bundled\nsimulation: {}\n", ["simulation.duration"]),
@@ -174,7 +178,12 @@ def test_a_wrong_scenario_is_refused(fleet2d: Cli, case: str) -> None:
 
 def test_a_missing_scenario_is_refused(fleet2d: Cli) -> None:
     written(small())
-    check(fleet2d("run", "hom.yaml"), 2, ["error:", "hom.yaml", "no such file"], {"home.yaml"})
+    check(
+        fleet2d("run", "hom.yaml"),
+        2,
+        ["error:", "hom.yaml", "there is no file", "did you mean 'home.yaml'"],
+        {"home.yaml"},
+    )
 
 
 def test_a_folder_for_a_scenario_is_refused(fleet2d: Cli) -> None:
@@ -207,7 +216,9 @@ def test_a_file_that_is_no_home_is_refused(fleet2d: Cli, case: str) -> None:
     check(fleet2d("run", *houseexpo, "--out", "out"), 2, ["error:", *words], left)
 
 
-@pytest.mark.parametrize("case", [name for name in PLANS if name not in ("our own format", "not HouseExpo")])
+@pytest.mark.parametrize(
+    "case", [name for name in PLANS if name not in ("our own format", "not HouseExpo")]
+)
 def test_what_is_no_home_is_not_drawn(fleet2d: Cli, case: str) -> None:
     text, words = PLANS[case]
     Path("plan.json").write_text(text)
@@ -237,7 +248,12 @@ def test_a_run_directory_that_exists_is_left_alone(fleet2d: Cli) -> None:
     assert 0 == fleet2d("run", scenario_file, "--out", "run", "--quiet")[0]
     before = {path: path.stat().st_mtime_ns for path in Path("run").iterdir()}
     left = {"home.yaml", "run", *map(str, before)}
-    check(fleet2d("run", scenario_file, "--out", "run"), 2, ["error:", "run", "not empty", "--out"], left)
+    check(
+        fleet2d("run", scenario_file, "--out", "run"),
+        2,
+        ["error:", "run", "not empty", "--out"],
+        left,
+    )
     assert before == {path: path.stat().st_mtime_ns for path in Path("run").iterdir()}
 
 
@@ -255,7 +271,9 @@ def test_a_directory_that_can_not_be_written_is_refused(fleet2d: Cli) -> None:
     check(result, 2, ["error:", "locked", "may not write", "--out"], {"home.yaml", "locked"})
 
 
-@pytest.mark.skipif(not os.access("/proc", os.R_OK), reason="no /proc, where nobody can make a folder")
+@pytest.mark.skipif(
+    not os.access("/proc", os.R_OK), reason="no /proc, where nobody can make a folder"
+)
 def test_a_directory_that_nobody_can_make_is_refused(fleet2d: Cli) -> None:
     scenario_file = written(small())
     result = fleet2d("run", scenario_file, "--out", "/proc/fleet2d/run")
@@ -266,7 +284,9 @@ def no_space(*args: object, **kwargs: object) -> None:
     raise OSError(28, "No space left on device")
 
 
-def test_a_disk_that_is_full_fails_with_exit_1(fleet2d: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full_fails_with_exit_1(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scenario_file = written(small())
     monkeypatch.setattr(arrow.ParquetTable, "write", no_space)
     code, out, err = fleet2d("run", scenario_file, "--out", "run")
@@ -324,7 +344,7 @@ def test_a_real_disk_that_is_full_fails_with_exit_1(fleet2d: Cli, tiny_disk: Pat
 
 # --- Components that fail ----------------------------------------------------------------------
 
-COMPONENTS = '''
+COMPONENTS = """
 import numpy as np
 from fleet2d import Algorithm, Behavior, RoomDistribution
 
@@ -361,7 +381,7 @@ class Lost(Behavior):
 class Nonsense(Behavior):
     def decide(self, now):
         return "kitchen"
-'''
+"""
 
 FAILING = {
     "algorithms.mine": {
@@ -413,7 +433,7 @@ def test_a_module_that_fails_to_import_is_named(fleet2d: Cli) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["run", "--seed", "text"], ["--seed", "text"]),
+        (["run", "--seed", "text"], ["--seed", "integer"]),
         (["run", "--seed", "-1"], ["seed"]),
         (["run", "home.yaml", "simulation.duration"], ["'simulation.duration'", "no '='", "key.path=value"]),
         (["run", "home.yaml", "simulation.duration="], ["'simulation.duration='", "no value"]),
@@ -455,4 +475,9 @@ def test_a_flat_that_moved_is_named_by_the_file_that_names_it(fleet2d: Cli) -> N
     scenario_file = written(content)
     assert 0 == fleet2d("validate", scenario_file)[0]
     plan.unlink()
-    check(fleet2d("validate", scenario_file), 2, ["home.yaml:", "floorplan.path", "flat.json"], {"home.yaml", "plans"})
+    check(
+        fleet2d("validate", scenario_file),
+        2,
+        ["home.yaml:", "floorplan.path", "flat.json"],
+        {"home.yaml", "plans"},
+    )

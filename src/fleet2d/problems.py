@@ -63,7 +63,9 @@ def did_you_mean(name: object, known: Iterable[object]) -> str:
     >>> did_you_mean("sped", ["speed", "radius"])
     ": did you mean 'speed'?"
     """
-    near = difflib.get_close_matches(str(name), [str(k) for k in known], n=1)
+    names = [str(k) for k in known]
+    longer = [k for k in names if str(name) and k.startswith(f"{name}_")]
+    near = longer or difflib.get_close_matches(str(name), names, n=1)
     return f": did you mean {near[0]!r}?" if near else "."
 
 

@@ -33,17 +33,22 @@ def test_what_is_no_distribution_is_refused(weights: Any) -> None:
 
 def test_a_distribution_becomes_a_row_per_room() -> None:
     columns = to_columns(RoomDistribution([3, 1]), ["hall", "bath"], "algorithms.a")
-    assert {"room": ["hall", "bath"], "share": [0.75, 0.25]} == {k: v.tolist() for k, v in columns.items()}
+    assert {"room": ["hall", "bath"], "share": [0.75, 0.25]} == {
+        k: v.tolist() for k, v in columns.items()
+    }
 
 
 @pytest.mark.parametrize(
-    ("value", "kind"), [(1, "i"), (1.5, "f"), (True, "b"), ("word", "O"), (np.float32(2), "f"), ([], "f")]
+    ("value", "kind"),
+    [(1, "i"), (1.5, "f"), (True, "b"), ("word", "O"), (np.float32(2), "f"), ([], "f")],
 )
 def test_scalars_and_lists_become_columns_of_their_kind(value: Any, kind: str) -> None:
     assert kind == to_columns({"x": value}, [], "algorithms.a")["x"].dtype.kind
 
 
-@pytest.mark.parametrize("value", [np.zeros((2, 2)), None, object(), {"a": 1}, [None, 1], ["a", 1.5, None], 1j])
+@pytest.mark.parametrize(
+    "value", [np.zeros((2, 2)), None, object(), {"a": 1}, [None, 1], ["a", 1.5, None], 1j]
+)
 def test_what_is_no_column_is_refused(value: Any) -> None:
     with pytest.raises(ComponentError, match=r"algorithms\.a put out 'x'"):
         to_columns({"x": value}, [], "algorithms.a")

@@ -5,10 +5,10 @@ from datetime import datetime, timedelta
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.scenes import run, scenario, table
 
 import fleet2d
 from fleet2d.engine.clock import Clock
-from tests.scenes import run, scenario, table
 
 START = datetime(2026, 3, 28, 23, 59, 59, 500_000)
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scenes import OWN, digests, every_step, run, scenario
 
 import fleet2d
-from tests.scenes import OWN, digests, every_step, run, scenario
 
 
 def endless(**simulation: Any) -> dict[str, Any]:
@@ -42,7 +42,9 @@ def test_an_interrupted_run_is_whole_until_where_it_stopped(tmp_path: Path) -> N
 
 
 def test_a_paced_run_stops_soon() -> None:
-    simulation = fleet2d.Simulation(scenario("1 d", users={"ana": {"type": "meander"}}), speedup=1.0)
+    simulation = fleet2d.Simulation(
+        scenario("1 d", users={"ana": {"type": "meander"}}), speedup=1.0
+    )
     timer = interrupt_after(0.3)
     began = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):

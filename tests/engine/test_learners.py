@@ -2,16 +2,17 @@
 
 from collections.abc import Callable
 from datetime import datetime, timedelta
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.scenes import each_step, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, History, Home, Metric, Plan, Present, Situation
 from fleet2d.engine.learners import update_order
 from fleet2d.errors import ArtifactError, ComponentError, ScenarioError
-from tests.scenes import each_step, scenario, table
 
 Update = Callable[[History, Present], Any]
 _UPDATES: dict[str, Update] = {}
@@ -90,7 +91,7 @@ def test_a_circle_is_refused_and_named() -> None:
     assert {"a", "b", "c"} == set(circle)
     assert circle[0] == circle[-1]
     reads = {"a": "b", "b": "c", "c": "a"}
-    assert all(reads[x] == y for x, y in zip(circle[:-1], circle[1:], strict=True))
+    assert all(reads[x] == y for x, y in pairwise(circle))
 
 
 def test_reading_itself_is_a_circle() -> None:
@@ -157,7 +158,10 @@ def test_histories_are_whole_periods_without_gaps(max_span: int | None) -> None:
     fleet2d.run(
         watched(
             "10 min",
-            algorithms={"a": algorithm(record("a"), period="3 min"), "b": algorithm(record("b"), period=1)},
+            algorithms={
+                "a": algorithm(record("a"), period="3 min"),
+                "b": algorithm(record("b"), period=1),
+            },
         ),
         max_span=max_span,
     )
@@ -172,7 +176,10 @@ def test_histories_are_whole_periods_without_gaps(max_span: int | None) -> None:
 def test_metrics_get_the_rest_of_a_period_at_the_end() -> None:
     handed: list[tuple[int, int]] = []
     fleet2d.run(
-        watched("10 min", metrics={"m": metric(lambda h, s: handed.append((h.first, h.end)), period="4 min")})
+        watched(
+            "10 min",
+            metrics={"m": metric(lambda h, s: handed.append((h.first, h.end)), period="4 min")},
+        )
     )
     assert [(0, 240), (240, 480), (480, 600)] == handed
 
@@ -180,7 +187,10 @@ def test_metrics_get_the_rest_of_a_period_at_the_end() -> None:
 def test_metrics_of_a_run_that_ends_with_a_period_are_not_asked_again() -> None:
     handed: list[tuple[int, int]] = []
     fleet2d.run(
-        watched("10 min", metrics={"m": metric(lambda h, s: handed.append((h.first, h.end)), period="5 min")})
+        watched(
+            "10 min",
+            metrics={"m": metric(lambda h, s: handed.append((h.first, h.end)), period="5 min")},
+        )
     )
     assert [(0, 300), (300, 600)] == handed
 
@@ -261,7 +271,7 @@ def test_algorithms_may_ask_for_robots_but_not_for_users() -> None:
 
 
 def test_an_unknown_body_is_refused_with_those_there_are() -> None:
-    with pytest.raises(ComponentError, match="no such body.*ana, astro"):
+    with pytest.raises(ComponentError, match=r"no such body.*ana, astro"):
         fleet2d.run(watched(metrics={"m": metric(lambda h, s: h.poses("bob"), period=60)}))
 
 
@@ -294,7 +304,12 @@ def test_outputs_become_rows_with_step_and_time() -> None:
 
 def test_arrays_become_a_row_per_entry() -> None:
     stored = fleet2d.run(
-        watched("1 min", algorithms={"a": algorithm(lambda h, s: {"x": np.arange(3), "y": ["p", "q", "r"]}, period=30)})
+        watched(
+            "1 min",
+            algorithms={
+                "a": algorithm(lambda h, s: {"x": np.arange(3), "y": ["p", "q", "r"]}, period=30)
+            },
+        )
     )
     rows = table(stored, "a")
     assert [29] * 3 + [59] * 3 == rows["step"].tolist()
@@ -303,7 +318,9 @@ def test_arrays_become_a_row_per_entry() -> None:
 
 
 def test_nothing_put_out_is_no_table_and_no_output() -> None:
-    simulation = fleet2d.Simulation(watched("2 min", algorithms={"a": algorithm(lambda h, s: None, period=60)}))
+    simulation = fleet2d.Simulation(
+        watched("2 min", algorithms={"a": algorithm(lambda h, s: None, period=60)})
+    )
     stored = simulation.run()
     assert "a" not in stored.tables
     assert {} == simulation.outputs
@@ -311,14 +328,18 @@ def test_nothing_put_out_is_no_table_and_no_output() -> None:
 
 def test_an_output_of_none_keeps_the_one_before() -> None:
     update = lambda h, s: {"end": h.end} if h.end == 60 else None  # noqa: E731
-    simulation = fleet2d.Simulation(watched("3 min", algorithms={"a": algorithm(update, period=60)}))
+    simulation = fleet2d.Simulation(
+        watched("3 min", algorithms={"a": algorithm(update, period=60)})
+    )
     simulation.run()
     assert {"a": {"end": 60}} == simulation.outputs
 
 
 @pytest.mark.parametrize("name", ["events", "trajectories", "observations", "key_frames"])
 def test_an_algorithm_may_be_called_like_a_table_of_the_engine(name: str) -> None:
-    stored = fleet2d.run(watched("2 min", algorithms={name: algorithm(lambda h, s: {"n": 1}, period=60)}))
+    stored = fleet2d.run(
+        watched("2 min", algorithms={name: algorithm(lambda h, s: {"n": 1}, period=60)})
+    )
     assert [1, 1] == table(stored, f"algorithms_{name}")["n"].tolist()
 
 
@@ -407,7 +428,9 @@ def test_outputs_may_be_left_unstored() -> None:
 )
 def test_an_output_that_can_not_be_is_an_error_with_a_name(output: Any, words: list[str]) -> None:
     with pytest.raises((ComponentError, ArtifactError)) as caught:
-        fleet2d.run(watched("2 min", algorithms={"mine": algorithm(lambda h, s: output(s), period=60)}))
+        fleet2d.run(
+            watched("2 min", algorithms={"mine": algorithm(lambda h, s: output(s), period=60)})
+        )
     for word in ("algorithms.mine", *words):
         assert word in str(caught.value)
 
@@ -417,14 +440,19 @@ def test_an_algorithm_that_fails_to_start_is_named() -> None:
         def start(self, home: Home) -> None:
             raise OSError("no such model")
 
-    with pytest.raises(ComponentError, match="algorithms.a failed when it was started: OSError: no such model"):
+    with pytest.raises(
+        ComponentError, match=r"algorithms\.a failed when it was started: OSError: no such model"
+    ):
         fleet2d.Simulation(watched(algorithms={"a": Broken()}))
 
 
 def test_the_history_is_the_same_whatever_else_is_due_meanwhile() -> None:
     def record(history: History, state: Present) -> Any:
         poses = history.poses("astro")
-        return {"x": poses.x[:: 100], "seen": np.full(len(poses.x[:: 100]), len(history.observations.step))}
+        return {
+            "x": poses.x[::100],
+            "seen": np.full(len(poses.x[::100]), len(history.observations.step)),
+        }
 
     alone = table(fleet2d.run(watched(algorithms={"a": algorithm(record, period="15 min")})), "a")
     beside = {

@@ -4,10 +4,10 @@ import time
 from typing import Any
 
 import pytest
+from tests.scenes import OWN, digests, run, scenario
 
 import fleet2d
 from fleet2d.engine.pace import Pace
-from tests.scenes import OWN, digests, run, scenario
 
 
 def content(duration: str, speedup: float | None, **sections: Any) -> dict[str, Any]:

@@ -63,7 +63,8 @@ class Startled(Behavior):
     def decide(self, now: Situation) -> Plan:
         if now.events:
             return now.plan().turn_by(0.4).stay(timedelta(seconds=4.5))
-        return now.plan().meander(self.walk.rule).interrupt_on("user_seen")
+        plan = now.plan().meander(self.walk.rule)
+        return plan.interrupt_on("user_seen") if hasattr(now.actor.entity, "camera") else plan
 
 
 class Stranger(Startled):

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.scenes import digests, every_step, everything, path, run, scenario, table
 
 from fleet2d.engine import recorder
 from fleet2d.errors import ScenarioError
-from tests.scenes import digests, every_step, everything, path, run, scenario, table
 
 
 def small(**artifacts: Any) -> dict[str, Any]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from tests.scenes import TESTS, everything, scenario, write_flat
 
 import fleet2d
 from fleet2d.errors import RunDirectoryError
-from tests.scenes import TESTS, everything, scenario, write_flat
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,9 @@ def test_a_component_that_is_gone_is_named(tmp_path: Path) -> None:
 
 
 def test_only_a_complete_run_can_be_reproduced(tmp_path: Path) -> None:
-    simulation = fleet2d.Simulation(scenario(users={"ana": {"type": "meander"}}), out=tmp_path / "run")
+    simulation = fleet2d.Simulation(
+        scenario(users={"ana": {"type": "meander"}}), out=tmp_path / "run"
+    )
     simulation.advance(10)
     simulation.finish()
     with pytest.raises(RunDirectoryError, match="interrupted"):

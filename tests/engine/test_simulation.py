@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scenes import OWN, digests, everything, run, scenario, table
 
 import fleet2d
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
-from tests.scenes import OWN, digests, everything, run, scenario, table
 
 
 def small(duration: str = "10 min", **sections: Any) -> dict[str, Any]:

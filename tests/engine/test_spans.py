@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.homes import needs_jit
+from tests.scenes import OWN, digests, every_step, everything, process, run, table
 
 import fleet2d
 from fleet2d.artifacts.reader import Run
-from tests.homes import needs_jit
-from tests.scenes import OWN, digests, every_step, everything, process, run, table
 
 GOLDEN = Path(__file__).parents[1] / "golden.json"
 SPANS = [None, 3600, 7, 1]
@@ -28,9 +28,15 @@ def whole() -> Run:
 
 def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
     events = table(whole, "events")
-    assert {"user_seen", "user_lost", "reacts", "obeys", "activity", "left_home", "came_home"} == set(
-        events["event"]
-    )
+    assert {
+        "user_seen",
+        "user_lost",
+        "reacts",
+        "obeys",
+        "activity",
+        "left_home",
+        "came_home",
+    } == set(events["event"])
     reactions = set(zip(events["entity"], [d.split(" ")[0] for d in events["detail"]], strict=True))
     assert {
         (robot, event) for robot in ("astro", "bolt") for event in ("user_seen", "user_lost")
@@ -128,7 +134,12 @@ def digest_elsewhere(content: dict[str, Any], folder: Path, **environment: str) 
     "environment",
     [
         {"NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
-        {"NUMBA_NUM_THREADS": "4", "PYTHONHASHSEED": "2", "OMP_NUM_THREADS": "4", "TZ": "Asia/Tokyo"},
+        {
+            "NUMBA_NUM_THREADS": "4",
+            "PYTHONHASHSEED": "2",
+            "OMP_NUM_THREADS": "4",
+            "TZ": "Asia/Tokyo",
+        },
     ],
     ids=["1 thread", "4 threads"],
 )
@@ -238,7 +249,10 @@ def test_another_seed_is_another_life(reference: Run) -> None:
     other = run(everything("40 min"), seed=5)
     assert lives(reference, "ben") != lives(other, "ben")
     assert lives(reference, "ana") != lives(other, "ana")
-    assert table(reference, "observations")["step"].tolist() != table(other, "observations")["step"].tolist()
+    assert (
+        table(reference, "observations")["step"].tolist()
+        != table(other, "observations")["step"].tolist()
+    )
 
 
 # --- Pinned ------------------------------------------------------------------------------------
@@ -257,5 +271,3 @@ def test_digests_are_those_pinned(whole: Run) -> None:
         " changes for users and why, and pin the new digests: FLEET2D_WRITE_GOLDEN=1 pytest"
         " tests/engine/test_spans.py. If it is not, or only on this machine, it is a bug."
     )
-
-

@@ -10,7 +10,9 @@ from fleet2d.engine.streams import Draws, stream_key
 
 def test_every_seed_path_and_purpose_has_a_stream_of_its_own() -> None:
     paths = ["users.ana", "users.ben", "users.anax", "robots.ana", ""]
-    keys = {int(stream_key(*key)) for key in product([0, 1, 4, 2**63 - 1], paths, ["spot", "x", ""])}
+    keys = {
+        int(stream_key(*key)) for key in product([0, 1, 4, 2**63 - 1], paths, ["spot", "x", ""])
+    }
     assert 4 * 5 * 3 == len(keys)
 
 

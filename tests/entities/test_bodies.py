@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from tests.scenes import OWN, everything, path, run, scenario
 
 import fleet2d
 from fleet2d.artifacts.reader import Run
-from tests.scenes import OWN, everything, path, run, scenario
 
 # What rounding to the lattice (0.8 mm) and to a step may add.
 LATTICE_M = 2e-3
@@ -17,7 +17,9 @@ LATTICE_M = 2e-3
 def free_space(stored: Run) -> shapely.MultiPolygon:
     """The space between the walls [m], as shapely has it."""
     lattice = stored.plan.lattice
-    return shapely.union_all([shapely.transform(p, lattice.to_metres) for p in stored.plan.polygons])
+    return shapely.union_all(
+        [shapely.transform(p, lattice.to_metres) for p in stored.plan.polygons]
+    )
 
 
 def check_body(stored: Run, name: str, radius: float, speed: float, turn_rate_deg: float) -> None:

@@ -4,49 +4,73 @@ from typing import Any
 
 import numpy as np
 import pytest
-
+from numpy.typing import NDArray
 from tests.scenes import OWN, path, run, scenario
 
 
 def walker(duration: str = "30 min", step: str = "1 s", **fields: Any) -> dict[str, Any]:
-    content = scenario(duration, users={"ben": {"type": "meander", **fields}}, simulation={"step": step})
+    content = scenario(
+        duration, users={"ben": {"type": "meander", **fields}}, simulation={"step": step}
+    )
     content["artifacts"] = {"trajectories": "off"}
     return content
 
 
-def turns_deg(heading: np.ndarray) -> np.ndarray:
-    return np.rad2deg((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)
+def walk(content: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the metres and the turn [deg] of each step."""
+    poses = path(run(content), "ben")
+    metres = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)
+    return metres, np.rad2deg((np.diff(poses.heading) + np.pi) % (2 * np.pi) - np.pi)
 
 
 def test_a_step_is_as_long_as_the_speed_says_or_nothing() -> None:
+    metres, _ = walk(walker(speed=0.8))
+    free = metres > 0
+    assert metres[free] == pytest.approx(0.8, abs=2e-3)
+    assert 0.2 < free.mean() < 1
+
+
+def test_it_goes_where_it_heads() -> None:
     poses = path(run(walker(speed=0.8)), "ben")
-    moves = np.hypot(np.diff(poses.x), np.diff(poses.y))
-    free = moves > 0
-    assert moves[free] == pytest.approx(0.8, abs=2e-3)
-    assert 0.02 < free.mean() < 1
+    dx, dy = np.diff(poses.x), np.diff(poses.y)
+    moved = (dx != 0) | (dy != 0)
+    ahead = dx * np.cos(poses.heading[1:]) + dy * np.sin(poses.heading[1:])
+    assert ahead[moved] == pytest.approx(0.8, abs=2e-3)
 
 
 def test_turns_have_the_standard_deviation_asked_for() -> None:
-    heading = path(run(walker("2 h", turn_std_deg=20, turn_rate_deg=3600)), "ben").heading
-    turns = turns_deg(heading)
+    # At small steps, so that few are cut short by a wall and the choice of those is no bias.
+    metres, turns = walk(walker("2 h", speed=0.02, turn_std_deg=20, turn_rate_deg=3600))
+    assert (metres > 0).mean() > 0.9
+    turns = turns[metres > 0]
     assert turns.std() == pytest.approx(20, rel=0.04)
     assert abs(turns.mean()) < 1
 
 
 def test_the_spread_does_not_depend_on_the_step() -> None:
-    fine = path(run(walker("2 h", "250 ms", turn_std_deg=20, turn_rate_deg=3600)), "ben").heading
-    assert turns_deg(fine).std() == pytest.approx(20 * 0.5, rel=0.04)
+    content = walker("2 h", "250 ms", speed=0.02, turn_std_deg=20, turn_rate_deg=3600)
+    metres, turns = walk(content)
+    assert turns[metres > 0].std() == pytest.approx(20 * 0.5, rel=0.04)
 
 
-def test_turns_keep_to_the_turn_rate() -> None:
-    turns = turns_deg(path(run(walker(turn_std_deg=90, turn_rate_deg=30)), "ben").heading)
-    assert np.abs(turns).max() <= 30
-    assert np.abs(turns).max() > 29
+def test_turns_keep_to_the_turn_rate_also_at_walls() -> None:
+    metres, turns = walk(walker(turn_std_deg=90, turn_rate_deg=30))
+    for kind in (metres > 0, metres == 0):
+        assert np.abs(turns[kind]).max() <= 30
+        assert np.abs(turns[kind]).max() > 28
 
 
-def test_without_spread_it_walks_straight_on() -> None:
-    heading = path(run(walker(turn_std_deg=0)), "ben").heading
-    assert 1 == len(set(heading.tolist()))
+def test_at_a_wall_it_turns_by_any_angle() -> None:
+    metres, turns = walk(walker("8 h", turn_std_deg=5, turn_rate_deg=3600))
+    blocked = turns[metres == 0]
+    assert len(blocked) > 1000
+    assert np.histogram(blocked, bins=4, range=(-180, 180))[0].min() > 0.2 * len(blocked)
+
+
+def test_without_spread_it_walks_straight_on_to_the_next_wall() -> None:
+    metres, turns = walk(walker(turn_std_deg=0))
+    assert not turns[metres > 0].any()
+    assert turns[metres == 0].any()
 
 
 def test_it_gets_everywhere() -> None:
@@ -58,10 +82,15 @@ def test_it_gets_everywhere() -> None:
 def test_it_goes_on_from_where_another_behavior_left_it() -> None:
     content = walker()
     content["users"]["ben"] = {
-        "behaviors": [{"type": f"{OWN}:Scripted", "script": [(7.0, 6.0), 30]}, {"type": "meander"}]
+        "behaviors": [
+            {"type": f"{OWN}:Scripted", "script": [(7.0, 6.0), 30]},
+            {"type": "meander"},
+        ]
     }
     poses = path(run(content), "ben")
-    at = next(k for k in range(len(poses.x)) if abs(poses.x[k] - 7) + abs(poses.y[k] - 6) < 1e-3)
-    left = next(k for k in range(at, len(poses.x)) if poses.x[k] != poses.x[at])
-    assert 30 <= left - at <= 35
-    assert np.hypot(np.diff(poses.x), np.diff(poses.y)).max() < 1.01
+    there = np.abs(poses.x - 7) + np.abs(poses.y - 6) < 1e-3
+    at = int(np.argmax(there))
+    assert there[at : at + 30].all()
+    assert not there[at + 90 :].all()
+    moves = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)
+    assert moves.max() < 1.01

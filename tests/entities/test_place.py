@@ -3,14 +3,16 @@
 from typing import Any
 
 import pytest
+from tests.scenes import scenario
 
 import fleet2d
 from fleet2d.entities.actor import Actor
 from fleet2d.errors import InputError, PlacementError
-from tests.scenes import scenario
 
 
-def actor(seed: int = 4, plan: dict[str, Any] | None = None, name: str = "ana", **body: Any) -> Actor:
+def actor(
+    seed: int = 4, plan: dict[str, Any] | None = None, name: str = "ana", **body: Any
+) -> Actor:
     content = scenario(users={name: {"start": [1.0, 3.0], **body}}, simulation={"seed": seed})
     if plan:
         content["floorplan"] = plan
@@ -113,7 +115,9 @@ def test_the_nearest_free_point_that_an_error_names_is_one_that_will_do() -> Non
     body.find([float(x), float(y)], 0, "spot")
 
 
-@pytest.mark.parametrize("place", [5, True, [], "", [1.0], [1, 2, 3], ["kitchen", 1], [1, "kitchen"], {"x": 1}])
+@pytest.mark.parametrize(
+    "place", [5, True, [], "", [1.0], [1, 2, 3], ["kitchen", 1], [1, "kitchen"], {"x": 1}]
+)
 def test_what_is_no_place_is_refused(place: Any) -> None:
     with pytest.raises(InputError) as caught:
         fleet2d.load_scenario(scenario(users={"ana": {"start": place}}))

@@ -79,6 +79,15 @@ def test_way_out_of_another_part_is_in_that_part() -> None:
         assert 8 < x < 10
 
 
+def test_way_out_of_another_part_is_in_a_room_that_one_can_get_to() -> None:
+    """Not where that part comes nearest to the hallway, which is out of reach."""
+    home = home_with(("hallway", 0, 2), ("bedroom", 8, 9), ("kitchen", 9, 10))
+
+    x, _ = way_out(home, part=1)
+
+    assert 9 < x < 10
+
+
 def test_way_out_of_a_part_that_is_not_there_says_so() -> None:
     home = home_with(("kitchen", 0, 2))
 

@@ -167,12 +167,12 @@ def _wrap_around(value: Any) -> Any:
     return value * np.uint64(2)
 
 
-def test_kernel_leaves_the_cache_of_other_packages_alone() -> None:
-    before = numba.config.CACHE_DIR
+def test_kernel_leaves_the_cache_of_other_packages_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "elsewhere")
 
     _jit.kernel(_wrap_around)
 
-    assert before == numba.config.CACHE_DIR
+    assert numba.config.CACHE_DIR == "elsewhere"
 
 
 def test_kernel_without_the_compiler_is_plain_python_that_may_wrap_around(

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 from tests.homes import JIT_IS_OFF, Home, home_of
 from tests.reference import look as slow
+from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels.look import (
@@ -25,6 +26,7 @@ from fleet2d.kernels.look import (
     look,
 )
 from fleet2d.kernels.motion import Poses
+from fleet2d.sight.camera import Camera
 
 Int64 = npt.NDArray[np.int64]
 
@@ -338,6 +340,14 @@ def _sine(part: int) -> object:
     return slow.cosine(part - 2048)
 
 
+def test_look_of_the_narrowest_camera_does_not_see_behind() -> None:
+    """Rounded to a half angle of 0, its wedge was a line through the robot."""
+    lens = Camera(angle_deg=0.01).lens(1280, 1_000_000)
+
+    assert in_wedge(0, lens.half_angle, 300, 0)
+    assert not in_wedge(0, lens.half_angle, -300, 0)
+
+
 @pytest.mark.parametrize("half", [1, 300, 2047])
 def test_in_wedge_never_takes_what_is_right_behind(half: int) -> None:
     for heading in range(0, 4096, 64):
@@ -364,6 +374,19 @@ def test_look_keeps_a_user_who_is_back_before_its_patience_ends() -> None:
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 100)
 
     assert [(100, 0, USER_SEEN)] == seen.events
+
+
+@pytest.mark.parametrize(
+    ("word", "chance", "expected"),
+    [(0, 0, False), (0, 1, True), (2**64 - 1, SURE - 1, False), (2**64 - 1, SURE, True)],
+)
+def test_look_notices_never_at_chance_0_and_always_at_chance_1(
+    word: int, chance: int, expected: bool
+) -> None:
+    """Even where the random bits are all zeros or all ones."""
+    scene = line_of([(50, 0)])._replace(keys=np.array([key_of_word(word)], np.uint64))
+
+    assert expected == bool(looked(ROOM, slow.Eye(0, 100, 300, chance, 1), scene, 0).sightings)
 
 
 def test_look_of_a_robot_that_is_away_sees_nobody() -> None:

@@ -72,7 +72,7 @@ def test_random_below_reaches_both_ends() -> None:
 def test_random_below_the_largest_bound_does_not_overflow() -> None:
     """The product of 32 random bits and the bound needs 63 bits."""
     bound = 2**31 - 1
-    of_ones, of_zeros = np.uint64(_key_of_word(2**64 - 1)), np.uint64(_key_of_word(0))
+    of_ones, of_zeros = np.uint64(slow.key_of_word(2**64 - 1)), np.uint64(slow.key_of_word(0))
 
     assert bound - 1 == random_below(of_ones, 0, bound)
     assert random_below(of_zeros, 0, bound) == 0
@@ -96,22 +96,10 @@ def test_random_bell_is_the_sum_of_the_bytes(key: int, counter: int) -> None:
 @pytest.mark.parametrize(("word", "expected"), [(0, -1020), (2**64 - 1, 1020), (255 << 56, -765)])
 def test_random_bell_of_extreme_words(word: int, expected: int) -> None:
     """A word of ones has the largest sum: 2040, in lanes of sixteen bits."""
-    key = np.uint64(_key_of_word(word))
+    key = np.uint64(slow.key_of_word(word))
     assert word == int(random_bits(key, 0))
 
     assert expected == int(random_bell(key, 0))
-
-
-def _key_of_word(word: int) -> int:
-    """Return the key whose output 0 is `word`, by running the generator backwards."""
-    mask = 2**64 - 1
-    z = word
-    z = z ^ (z >> 31) ^ (z >> 62)
-    z = z * pow(0x94D049BB133111EB, -1, 2**64) & mask
-    z = z ^ (z >> 27) ^ (z >> 54)
-    z = z * pow(0xBF58476D1CE4E5B9, -1, 2**64) & mask
-    z = z ^ (z >> 30) ^ (z >> 60)
-    return (z - 0x9E3779B97F4A7C15) & mask
 
 
 def test_random_bell_has_the_stated_moments() -> None:

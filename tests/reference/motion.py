@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 from tests.reference.headings import cosine, sine
-from tests.reference.random import random_bell
+from tests.reference.random import random_bell, random_below
 from tests.reference.sight import visible
 
 Int64 = npt.NDArray[np.int64]
@@ -73,6 +73,7 @@ def walk(
     step = 0
     while True:
         yield x, y, heading
+        before = heading
         turn = half_up(Fraction(random_bell(key, step) * sway, 2**16))
         heading = (heading + max(-limit, min(limit, turn))) % TURN
         here = np.array([x, y])
@@ -82,6 +83,8 @@ def walk(
         may_go = _sees(walls, here, there) if on_border else _sees(space, here, there)
         if may_go and _sees(space, there, there):
             x, y = there.tolist()
+        else:
+            heading = (before + random_below(key, 2**62 + step, 2 * limit + 1) - limit) % TURN
         step += 1
 
 

@@ -22,6 +22,17 @@ def random_bits(key: int, counter: int) -> int:
     return splitmix((key + counter * 0x9E3779B97F4A7C15) & MASK, 1)[0]
 
 
+def key_of_word(word: int) -> int:
+    """Return the key whose output 0 is `word`, by running the generator backwards."""
+    z = word
+    z = z ^ (z >> 31) ^ (z >> 62)
+    z = z * pow(0x94D049BB133111EB, -1, 2**64) & MASK
+    z = z ^ (z >> 27) ^ (z >> 54)
+    z = z * pow(0xBF58476D1CE4E5B9, -1, 2**64) & MASK
+    z = z ^ (z >> 30) ^ (z >> 60)
+    return (z - 0x9E3779B97F4A7C15) & MASK
+
+
 def random_below(key: int, counter: int, bound: int) -> int:
     """Return the upper half of the bits, scaled to [0, bound)."""
     return (random_bits(key, counter) // 2**32) * bound // 2**32

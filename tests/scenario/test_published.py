@@ -101,8 +101,9 @@ USUAL = [
     "floorplan.he.ppm: the grid's cells are 0.05 m; walls and poses are not rounded to them",
     "floorplan.he.border_pad: left out: the grid has a margin of its own",
     f"{', '.join(f'{walk}.pose_config.meander_strategy.lin_speed' for walk in WALKS)}: metres per"
-    " step there, a speed here, and the same walk at this step; a move across a wall is never"
-    " made, where the published Fleet2D looked at the end of it only",
+    " step there, a speed here, and the same walk at this step; at a wall it turns away, where the"
+    " published Fleet2D kept to small turns, and a move across a wall is never made, where that one"
+    " looked at the end of the move only",
     f"{', '.join(f'{walk}.pose_config.meander_strategy.ang_speed' for walk in WALKS)}: degrees"
     " per step there, per square root of a second here, and the same walk at this step; turns"
     " are cut at 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
@@ -247,9 +248,10 @@ def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder
         simulation.advance()
         after = simulation.state["user0"]
         moves.append(math.hypot(after["x"] - before["x"], after["y"] - before["y"]))
-        turns.append(math.remainder(after["heading"] - before["heading"], math.tau))
+        if moves[-1]:  # no wall was in the way
+            turns.append(math.remainder(after["heading"] - before["heading"], math.tau))
     assert 0.1 == pytest.approx(max(moves), abs=2e-3)
-    std = math.degrees(math.sqrt(sum(turn**2 for turn in turns) / 400))
+    std = math.degrees(math.sqrt(sum(turn**2 for turn in turns) / len(turns)))
     assert 15 == pytest.approx(std, rel=0.15)
 
 
@@ -460,18 +462,16 @@ def test_angle_beyond_a_turn_sees_all_round(folder: Path) -> None:
     assert 360 == camera.angle_deg
 
 
-def test_no_stride_stands_still_and_turns(folder: Path) -> None:
+def test_no_stride_stands_still(folder: Path) -> None:
     remarks, scenario = converted(folder, ("lin_speed: 0.1", "lin_speed: 0"))
     assert (
-        "users.user0.base.pose_config.meander_strategy.lin_speed: missing or 0; a speed is above"
-        " 0, and 1e-9 m/s moves nobody"
+        "users.user0.base.pose_config.meander_strategy.lin_speed: missing, 0 or below 0.001 m/s;"
+        " it stands still"
     ) in remarks
     simulation = fleet2d.Simulation(scenario)
     before = simulation.state["user0"]
     simulation.advance(1000)
-    after = simulation.state["user0"]
-    assert (before["x"], before["y"]) == (after["x"], after["y"])
-    assert before["heading"] != after["heading"]
+    assert before == simulation.state["user0"]
 
 
 def test_no_turns_walks_straight(folder: Path) -> None:
@@ -687,4 +687,4 @@ def test_commands_convert_and_validate(folder: Path) -> None:
     assert [*(f"note: {remark}" for remark in USUAL), "home/new.yaml"] == told.output.splitlines()
     told = CliRunner().invoke(app, ["validate", "home/new.yaml"])
     assert 0 == told.exit_code
-    assert told.output.startswith("ok: 2 users and 1 robots in ")
+    assert told.output.startswith("ok: 2 users and 1 robot in ")

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from fleet2d.algorithms.history import Log, Piece
+from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import Status, file_record, versions
 from fleet2d.artifacts.reader import FLOORPLAN_NAME, Run
 from fleet2d.artifacts.store import RunStore
@@ -342,8 +343,14 @@ class Simulation:
         """Make the run directory, and put the floor plan in it."""
         self._store.open()
         if self.directory is not None:
-            text = json.dumps(self.home.plan.to_native())
-            (self.directory / FLOORPLAN_NAME).write_text(text, encoding="utf-8")
+            file = self.directory / FLOORPLAN_NAME
+            try:
+                file.write_text(json.dumps(self.home.plan.to_native()), encoding="utf-8")
+            except OSError as error:
+                with suppress(OSError):
+                    file.unlink(missing_ok=True)
+                self._store.discard()
+                raise cannot_write(self.directory, error) from error
 
     def _stop(self) -> None:
         """Let the run end after the present span, where everything stored fits together."""

@@ -17,17 +17,25 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
 
+# A step longer than any home: it is never taken, and its products stay inside 64 bits.
+LONGEST_STRIDE = 256 << 21
+
+
 @register("behavior", "meander")
 class Meander(Behavior):
     """Walk at random, for good: two-dimensional Brownian motion with a steady pace.
 
     In each step the body turns by a normally distributed angle, no faster than its turn rate, and
-    goes forward at its speed; where a wall is in the way it only turns (the walk of the published
-    Fleet2D).
+    goes forward at its speed. Where a wall is in the way it turns instead, by any angle that its
+    turn rate allows. (The published Fleet2D keeps to small turns there, and so stands at walls for
+    most of the time.)
     """
 
     turn_std_deg: AngleDeg = Field(
-        default=15.0, ge=0, description="standard deviation of the turn in one second [deg/sqrt(s)]"
+        default=15.0,
+        ge=0,
+        le=36000,
+        description="standard deviation of the turn in one second [deg/sqrt(s)]",
     )
 
     def start(self, actor: "Actor") -> None:
@@ -36,9 +44,9 @@ class Meander(Behavior):
         std = self.turn_std_deg / 360 * TURN * math.sqrt(step_s)  # headings per step
         self.rule = WalkRule(
             key=actor.stream("meander"),
-            stride=round(actor.speed * step_s * 256),
+            stride=min(round(actor.speed * step_s * 256), LONGEST_STRIDE),
             sway=round(std / BELL_STD * 65536),
-            turn_limit=max(1, math.floor(actor.turn_rate * step_s)),
+            turn_limit=min(max(1, math.floor(actor.turn_rate * step_s)), TURN // 2),
         )
 
     def decide(self, now: Situation) -> Plan:

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from fleet2d.kernels._jit import kernel
 from fleet2d.kernels.headings import TURN, cosine, heading_of, sine, turn_between
 from fleet2d.kernels.mesh import Mesh, inside_triangle, locate, strictly_inside
-from fleet2d.kernels.random import random_bell
+from fleet2d.kernels.random import random_bell, random_below
 from fleet2d.kernels.sight import line_of_sight, walk_line_of_sight
 
 I64 = NDArray[np.int64]
+
+# Draws for blocked steps are this far along the stream, where no step's own draw ever comes.
+BLOCKED = 1 << 62
 
 
 class Breakpoints(NamedTuple):
@@ -144,7 +147,7 @@ class WalkRule(NamedTuple):
     key: np.uint64  # of its random stream
     stride: int  # 1/256 lattice units forward
     sway: int  # standard deviation of the turn, in 2**-16 headings per unit of random_bell
-    turn_limit: int  # headings
+    turn_limit: int  # headings, half a turn at most
 
 
 @kernel
@@ -153,9 +156,10 @@ def trace_meander(
 ) -> None:
     """Walk at random from `start` (x, y, heading at step `first`) for len(out.x) steps.
 
-    In each step the body turns by a bell-shaped random angle and goes one stride forward, unless
-    that would leave `space`, the places its centre may be; then it only turns. out[j] is the pose
-    at step first + j.
+    In each step the body turns by a bell-shaped random angle and goes one stride forward. If that
+    would leave `space`, the places its centre may be, it stays and turns by any angle within its
+    limit instead, all equally likely, so that it comes away from the wall. out[j] is the pose at
+    step first + j.
     """
     x, y, heading = start[0], start[1], start[2]
     # Taking an array out of a tuple costs a counted reference, so it is done once, not per step.
@@ -166,6 +170,7 @@ def trace_meander(
     inside = triangle >= 0 and strictly_inside(space, x, y)
     for j in range(xs.shape[0]):
         xs[j], ys[j], headings[j], aways[j] = x, y, heading, 0
+        before = heading
         turn = (random_bell(rule.key, first + j) * rule.sway + 32768) >> 16
         turn = min(max(turn, -rule.turn_limit), rule.turn_limit)
         heading = (heading + turn) & (TURN - 1)
@@ -174,10 +179,16 @@ def trace_meander(
         if inside:
             if inside_triangle(vertices, triangles, triangle, nx, ny):  # most steps are small
                 x, y = nx, ny
-            elif walk_line_of_sight(vertices, triangles, neighbors, x, y, triangle, nx, ny):
+                continue
+            if walk_line_of_sight(vertices, triangles, neighbors, x, y, triangle, nx, ny):
                 x, y = nx, ny
                 triangle = locate(space, x, y)
+                continue
         elif strictly_inside(space, nx, ny):
             if line_of_sight(walls, x, y, locate(walls, x, y), nx, ny):
                 x, y, inside = nx, ny, True
                 triangle = locate(space, x, y)
+                continue
+        choices = 2 * rule.turn_limit + 1
+        turn = random_below(rule.key, BLOCKED + first + j, choices) - rule.turn_limit
+        heading = (before + turn) & (TURN - 1)

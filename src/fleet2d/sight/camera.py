@@ -11,6 +11,9 @@ from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.look import Lens
 from fleet2d.units import AngleDeg, Duration, Length, Share, micros, problem
 
+# Squares of distances in lattice units stay far inside 64 bits.
+FARTHEST_M = 10_000
+
 
 class Camera(Settings):
     """A camera at the centre of the body that looks where the body heads.
@@ -45,6 +48,8 @@ class Camera(Settings):
             raise problem(
                 f"range is [{near:g}, {far:g}]: the nearest distance must be below the farthest"
             )
+        if far > FARTHEST_M:
+            raise problem(f"range ends at {far:g} m: {FARTHEST_M:g} m is beyond any home")
         return self
 
     def lens(self, units_per_m: float, step_us: int) -> Lens:
@@ -53,7 +58,8 @@ class Camera(Settings):
         return Lens(
             near_squared=near * near,
             far_squared=far * far,
-            half_angle=round(self.angle_deg / 360 * TURN),
+            # At 0, both borders are one line, and what lies right behind is on it, too.
+            half_angle=max(1, round(self.angle_deg / 360 * TURN)),
             chance=round(self.detection * 2**53),
             patience=math.ceil(micros(self.lost_after) / step_us),
         )

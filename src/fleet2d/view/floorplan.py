@@ -1,7 +1,7 @@
 """Draw a floor plan: rooms in soft colours with name and area, dark walls, a scale bar."""
 
 import io
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +113,8 @@ def save_figure(figure: Figure, path: Path) -> None:
         unfinished.write_bytes(picture.getvalue())
         unfinished.replace(path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
         raise InputError(f"can't write the picture {path}: {error.strerror}") from error
 
 

@@ -5,17 +5,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.scenes import path, run, scenario
 
 import fleet2d
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
-from tests.scenes import path, run, scenario
 
 REACHABLE = ["living_room_0", "kitchen_0", "bedroom_0", "bathroom_0"]
 
 
 def patrol(duration: str = "1 h", **fields: Any) -> dict[str, Any]:
-    robot = {"type": "patrol", "dwell": "1 min", "start": [1.0, 3.0], "start_heading_deg": 0, **fields}
+    robot = {
+        "type": "patrol",
+        "dwell": "1 min",
+        "start": [1.0, 3.0],
+        "start_heading_deg": 0,
+        **fields,
+    }
     return scenario(duration, robots={"astro": robot})
 
 
@@ -23,7 +29,9 @@ def stops(stored: Run, still_s: int = 55) -> list[tuple[float, float, int]]:
     """Where it stood for long, in order: x, y and for how many steps."""
     poses = path(stored, "astro")
     found = []
-    for key, steps in groupby(zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True)):
+    for key, steps in groupby(
+        zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True)
+    ):
         count = sum(1 for _ in steps)
         if count >= still_s:
             found.append((key[0], key[1], count))

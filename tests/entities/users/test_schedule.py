@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.scenes import ENTRANCE, OWN, each_step, path, run, scenario, table
 
 import fleet2d
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
-from tests.scenes import ENTRANCE, OWN, each_step, path, run, scenario, table
 
 START = datetime(2026, 1, 5, 7)  # a Monday
 
@@ -22,7 +22,9 @@ def one(*days: dict[str, Any], duration: str = "1 h", **more: Any) -> dict[str, 
     """A scenario with one user on a schedule."""
     simulation = more.pop("simulation", {})
     return scenario(
-        duration, users={"ana": {"type": "schedule", "days": list(days), **more}}, simulation=simulation
+        duration,
+        users={"ana": {"type": "schedule", "days": list(days), **more}},
+        simulation=simulation,
     )
 
 
@@ -83,7 +85,9 @@ def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning: Run) -> None:
     length = np.sqrt(np.diff(poses.x[leg]) ** 2 + np.diff(poses.y[leg]) ** 2).sum()
     arrived = next(k for k in range(at, at + 60) if (poses.x[k], poses.y[k]) == (1.0, 3.0))
     assert arrived - at < length / 1.0 + 2 * 360 / 180 + 2  # m at 1 m/s, and two turns
-    assert {(1.0, 3.0)} == set(zip(poses.x[arrived:].tolist(), poses.y[arrived:].tolist(), strict=True))
+    assert {(1.0, 3.0)} == set(
+        zip(poses.x[arrived:].tolist(), poses.y[arrived:].tolist(), strict=True)
+    )
 
 
 def test_away_and_back_is_at_one_and_the_same_place(morning: Run) -> None:
@@ -95,14 +99,18 @@ def test_away_and_back_is_at_one_and_the_same_place(morning: Run) -> None:
     before, back = gone[0] - 1, gone[-1] + 1
     assert (poses.x[back], poses.y[back]) == (poses.x[gone[0]], poses.y[gone[0]])
     assert (poses.x[back], poses.y[back]) == pytest.approx(ENTRANCE, abs=0.1)
-    assert (poses.x[before], poses.y[before]) == pytest.approx((poses.x[back], poses.y[back]), abs=1.0)
+    assert (poses.x[before], poses.y[before]) == pytest.approx(
+        (poses.x[back], poses.y[back]), abs=1.0
+    )
 
 
 def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: Run) -> None:
     events = table(morning, "events", entity="ana")
     told = {
         (event, detail): step
-        for event, detail, step in zip(events["event"], events["detail"], events["step"], strict=True)
+        for event, detail, step in zip(
+            events["event"], events["detail"], events["step"], strict=True
+        )
     }
     poses = path(morning, "ana")
     gone = np.flatnonzero(poses.away)
@@ -113,7 +121,10 @@ def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: 
     arrivals = [told["activity", "wash"], told["activity", "breakfast"], told["activity", "rest"]]
     for left, arrived in zip(still, arrivals, strict=True):
         assert left < arrived < left + 30
-        assert (poses.x[arrived], poses.y[arrived]) == (poses.x[arrived + 60], poses.y[arrived + 60])
+        assert (poses.x[arrived], poses.y[arrived]) == (
+            poses.x[arrived + 60],
+            poses.y[arrived + 60],
+        )
         assert (poses.x[arrived - 1], poses.y[arrived - 1]) != (poses.x[arrived], poses.y[arrived])
 
 
@@ -158,7 +169,11 @@ def test_the_agenda_of_the_next_day_follows_at_midnight() -> None:
     stored = run(
         one(
             agenda({"at": "06:00", "place": "kitchen"}, on=["monday", "wednesday"]),
-            agenda({"at": "00:00", "place": "bedroom"}, {"at": "12:00", "place": "bathroom"}, on="tuesday"),
+            agenda(
+                {"at": "00:00", "place": "bedroom"},
+                {"at": "12:00", "place": "bathroom"},
+                on="tuesday",
+            ),
             duration="3 d",
             simulation={"step": "1 min"},
         )
@@ -209,7 +224,9 @@ def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_co
 def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() -> None:
     schedule = {"type": "schedule", "days": [agenda({"at": "06:00", "place": "kitchen"})]}
     detour = {"type": f"{OWN}:Scripted", "script": ["bedroom", 60]}
-    content = scenario("10 min", users={"ana": {"start": "bathroom", "behaviors": [detour, schedule]}})
+    content = scenario(
+        "10 min", users={"ana": {"start": "bathroom", "behaviors": [detour, schedule]}}
+    )
     names = rooms(run(content))
     assert "bedroom_0" in names
     assert "kitchen_0" == names[-1]
@@ -218,7 +235,9 @@ def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() ->
 def test_it_does_not_move_when_it_begins_where_it_should_be() -> None:
     stored = run(one(agenda({"at": "06:00", "place": "kitchen"}), duration="30 min"))
     poses = path(stored, "ana")
-    assert 1 == len(set(zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True)))
+    assert 1 == len(
+        set(zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True))
+    )
 
 
 def test_a_room_is_entered_at_another_spot_each_time() -> None:
@@ -233,7 +252,8 @@ def test_a_room_is_entered_at_another_spot_each_time() -> None:
 
 def test_a_run_may_begin_away() -> None:
     content = one(
-        agenda({"at": "06:00", "away": True}, {"at": "07:10", "place": "kitchen"}), duration="30 min"
+        agenda({"at": "06:00", "away": True}, {"at": "07:10", "place": "kitchen"}),
+        duration="30 min",
     )
     simulation = fleet2d.Simulation(content)
     state = simulation.state["ana"]
@@ -255,10 +275,16 @@ def test_a_run_may_begin_away() -> None:
             ["items.1", "07:00", "08:00", "order"],
         ),
         (
-            [{"at": "08:00", "place": "kitchen", "dwell": "1 h"}, {"at": "08:30", "place": "bedroom"}],
+            [
+                {"at": "08:00", "place": "kitchen", "dwell": "1 h"},
+                {"at": "08:30", "place": "bedroom"},
+            ],
             ["items.1", "08:30", "09:00"],
         ),
-        ([{"at": "23:30", "place": "kitchen", "dwell": "1 h"}, {"place": "bedroom"}], ["items.1", "24:30", "day"]),
+        (
+            [{"at": "23:30", "place": "kitchen", "dwell": "1 h"}, {"place": "bedroom"}],
+            ["items.1", "24:30", "day"],
+        ),
         ([{"at": "24:00", "place": "kitchen"}], ["items.0", "24:00", "day"]),
         ([{"at": "08:00"}], ["place", "away"]),
         ([{"at": "08:00", "place": "kitchen", "away": True}], ["place", "away", "both"]),

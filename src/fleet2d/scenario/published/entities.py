@@ -24,8 +24,7 @@ _FASTEST_TURN_DEG_S = 36_000
 _WIDEST_TURN_DEG = 3600
 _FASTEST_M_S = 20
 _WIDEST_M = 2
-# An entity needs a speed. One that went nowhere gets this: it rounds to no move in any step.
-_STANDSTILL_M_S = 1e-9
+_SLOWEST_M_S = 0.001
 
 
 def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict[str, Keys]]:
@@ -108,20 +107,23 @@ def _walk(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
         reader.remark(keys, "missing; it stands still")
         return {}
     step_s = Fraction(micros(step), 10**6)
+    pace = _pace(reader, (*keys, "lin_speed"), step_s)
+    if pace is None:
+        return {}
     return {
         "type": "meander",
-        **_pace(reader, (*keys, "lin_speed"), step_s),
+        "speed": pace,
         **_sway(reader, (*keys, "ang_speed"), step_s),
     }
 
 
-def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
-    """Return how fast it walks; it is written in metres per step."""
+def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
+    """Return how fast it walks [m/s], None for not at all; it is written in metres per step."""
     stride = reader.number(keys, least=0)
-    if not stride:
-        reader.remark(keys, "missing or 0; a speed is above 0, and 1e-9 m/s moves nobody")
-        return {"speed": _STANDSTILL_M_S}
-    speed = float(Fraction(repr(stride)) / step_s)
+    speed = float(Fraction(repr(stride)) / step_s) if stride else 0.0
+    if speed < _SLOWEST_M_S:
+        reader.remark(keys, f"missing, 0 or below {_SLOWEST_M_S} m/s; it stands still")
+        return None
     if speed > _FASTEST_M_S:
         raise reader.wrong(
             keys,
@@ -130,10 +132,11 @@ def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
         )
     reader.remark(
         keys,
-        "metres per step there, a speed here, and the same walk at this step; a move across a wall"
-        " is never made, where the published Fleet2D looked at the end of it only",
+        "metres per step there, a speed here, and the same walk at this step; at a wall it turns"
+        " away, where the published Fleet2D kept to small turns, and a move across a wall is never"
+        " made, where that one looked at the end of the move only",
     )
-    return {"speed": speed}
+    return speed
 
 
 def _sway(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:

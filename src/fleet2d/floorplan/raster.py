@@ -1,0 +1,148 @@
+"""Grey pictures from PGM and PNG files."""
+
+import io
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.errors import FloorPlanError
+
+MAX_PIXELS = 2**26
+"""A map of 8192 x 8192 pixels: 400 m a side at 5 cm."""
+
+_PNG = b"\x89PNG\r\n\x1a\n"
+# Three numbers, each after white space and comments; then one white space.
+_PGM_HEADER = re.compile(
+    rb"P([25])" + rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" * 3 + rb"(?:#[^\r\n]*)?\s"
+)
+_PGM_COMMENT = re.compile(rb"#[^\r\n]*")
+
+
+@dataclass(frozen=True)
+class GreyPicture:
+    """A picture in shades of grey.
+
+    Attributes:
+        values: Shades, uint8 or uint16 (rows, columns), the first row on top.
+        white: The value of white; black is 0.
+        clear: Where the picture is not fully opaque, bool (rows, columns), or None for nowhere.
+    """
+
+    values: NDArray[np.uint8] | NDArray[np.uint16]
+    white: int
+    clear: NDArray[np.bool_] | None = None
+
+
+def read_grey(path: Path) -> GreyPicture:
+    """Read a PGM (P2 or P5, 8 or 16 bits) or PNG file; its content tells which.
+
+    Raises:
+        FloorPlanError: It can't be read, is damaged, too large or of another kind, or is a PNG and
+            Pillow is not installed.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise FloorPlanError(f"the image {path} can't be read: {error.strerror}") from None
+    try:
+        if content.startswith((b"P2", b"P5")):
+            return _read_pgm(content)
+        if content.startswith(_PNG):
+            return _read_png(content)
+    except FloorPlanError as error:
+        raise FloorPlanError(f"the image {path} {error}") from error
+    raise FloorPlanError(
+        f"the image {path} is neither PGM (P2, P5) nor PNG: convert it to one of them"
+    )
+
+
+# --- PGM ---------------------------------------------------------------------------------------
+
+
+def _read_pgm(content: bytes) -> GreyPicture:
+    header = _PGM_HEADER.match(content)
+    if header is None:
+        raise FloorPlanError("has no PGM header: width, height and white are missing")
+    columns, rows, white = (int(number) for number in header.groups()[1:])
+    _check_size(columns, rows)
+    if not 0 < white < 65536:
+        raise FloorPlanError(f"has {white} for white: PGM allows 1 to 65535")
+    body = content[header.end() :]
+    if header[1] == b"2":
+        values = _plain_values(body, columns, rows)
+    else:
+        values = _packed_values(body, columns, rows, 1 if white < 256 else 2)
+    if values.max() > white:
+        raise FloorPlanError(f"has a pixel of {values.max()}, above its white, {white}")
+    small = values.astype(np.uint8 if white < 256 else np.uint16)
+    return GreyPicture(small.reshape(rows, columns), white)
+
+
+def _packed_values(body: bytes, columns: int, rows: int, depth: int) -> NDArray[np.integer[Any]]:
+    expected = columns * rows * depth
+    # Some writers end the file with a line break; anything more means that the size is wrong.
+    if len(body) < expected or body[expected:].strip():
+        _refuse_count(len(body) / depth, columns, rows)
+    return np.frombuffer(body[:expected], np.uint8 if depth == 1 else ">u2")
+
+
+def _plain_values(body: bytes, columns: int, rows: int) -> NDArray[np.integer[Any]]:
+    words = _PGM_COMMENT.sub(b"", body).split()
+    if len(words) != columns * rows:
+        _refuse_count(len(words), columns, rows)
+    wrong = next((word for word in words if not word.isdigit() or len(word) > 9), None)
+    if wrong is not None:
+        raise FloorPlanError(f"has the pixel {wrong[:20].decode('latin-1')!r}: not a whole number")
+    return np.array(words).astype(np.int64)
+
+
+def _refuse_count(count: float, columns: int, rows: int) -> None:
+    what = "it is cut off" if count < columns * rows else "its header is wrong"
+    raise FloorPlanError(
+        f"holds {count:.0f} pixels, but its header says {columns} x {rows} = {columns * rows}:"
+        f" {what}"
+    )
+
+
+def _check_size(columns: int, rows: int) -> None:
+    if columns * rows == 0:
+        raise FloorPlanError(f"is {columns} x {rows} pixels: it is empty")
+    if columns * rows > MAX_PIXELS:
+        raise FloorPlanError(
+            f"is {columns} x {rows} pixels: at most {MAX_PIXELS // 2**20} million are read;"
+            " cut out the home, or scale it down"
+        )
+
+
+# --- PNG ---------------------------------------------------------------------------------------
+
+
+def _read_png(content: bytes) -> GreyPicture:
+    try:
+        from PIL import Image
+    except ImportError:
+        raise FloorPlanError(
+            'is PNG, and to read that takes Pillow: pip install "fleet2d[viz]", or convert the'
+            " image to PGM"
+        ) from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size
+            picture = Image.open(io.BytesIO(content), formats=["PNG"])
+        _check_size(*picture.size)
+        if picture.mode.startswith("I"):  # 16 bits, grey only
+            return GreyPicture(np.asarray(picture).astype(np.uint16), 65535)
+        channels = np.asarray(picture.convert("RGBA"))
+    except Image.DecompressionBombError as error:
+        raise FloorPlanError(f"is too large: {error}") from error
+    except (OSError, SyntaxError, ValueError) as error:
+        raise FloorPlanError(f"is a damaged PNG: {error}") from error
+    # The mean of the colours, times three to keep it whole.
+    shades = channels[..., :3].sum(axis=-1, dtype=np.uint16)
+    clear = channels[..., 3] < 255
+    return GreyPicture(shades, 3 * 255, clear if clear.any() else None)

@@ -1,0 +1,405 @@
+"""The command line: what each command prints, stores and returns."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from tests.scenes import every_step, everything, flat_path, fleet2d_process, scenario
+
+import fleet2d as package
+from fleet2d import cli, component
+from fleet2d.scenario.compose import bundled_path
+from fleet2d.scenario.document import read_document
+
+Result = tuple[int, str, str]
+Cli = Callable[..., Result]
+
+PNG = b"\x89PNG\r\n\x1a\n"
+SUMMARY = {
+    "run_dir": str, "steps": int, "simulated_s": float, "seed": int, "digest": str, "wall_s": dict,
+    "speedup": float, "peak_rss_mb": float, "metrics": dict,
+}  # fmt: skip
+
+
+@pytest.fixture
+def fleet2d(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Cli:
+    """The command line in this process, in an empty folder: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str | Path) -> Result:
+        monkeypatch.setattr(sys, "argv", ["fleet2d", *map(str, arguments)])
+        with pytest.raises(SystemExit) as caught:
+            cli.main()
+        out, err = capsys.readouterr()
+        return int(caught.value.code or 0), out, err
+
+    return call
+
+
+def written(content: dict[str, Any], name: str = "home.yaml") -> Path:
+    path = Path(name)
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def small(**sections: Any) -> dict[str, Any]:
+    return scenario(
+        "5 min",
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol"}},
+        metrics={"room_share": {}, "sightings": {}},
+        **sections,
+    )
+
+
+# --- run ---------------------------------------------------------------------------------------
+
+
+def test_json_is_exactly_one_object_with_the_documented_keys(fleet2d: Cli) -> None:
+    code, out, err = fleet2d("run", written(small()), "--out", "run", "--json")
+    assert (0, 1) == (code, out.count("\n"))
+    summary = json.loads(out)
+    assert SUMMARY.keys() == summary.keys()
+    for key, kind in SUMMARY.items():
+        assert isinstance(summary[key], kind), key
+    wall = summary["wall_s"]
+    assert {"setup", "simulate", "save", "total"} == wall.keys()
+    assert (300, 300.0, 4) == tuple(summary[k] for k in ("steps", "simulated_s", "seed"))
+    assert Path("run").resolve() == Path(summary["run_dir"]).resolve()
+    phases = wall["setup"] + wall["simulate"] + wall["save"]
+    assert summary["speedup"] == pytest.approx(300 / phases)
+    assert phases < wall["total"]
+    assert 10 < summary["peak_rss_mb"] < 10_000
+    stored = package.open_run("run")
+    assert (stored.digest, stored.metrics) == (summary["digest"], summary["metrics"])
+    assert {"room_share", "sightings"} == summary["metrics"].keys()
+    assert "Traceback" not in err
+
+
+def test_a_summary_for_people_names_what_matters(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("run", written(small()), "--out", "run")
+    stored = package.open_run("run")
+    assert 0 == code
+    for word in (
+        "x real time",
+        "room_share",
+        "sightings",
+        "ana",
+        "seed 4",
+        (stored.digest or "")[:16],
+        "stored in",
+    ):
+        assert word in out
+    with pytest.raises(json.JSONDecodeError):
+        json.loads(out)
+
+
+def test_quiet_prints_nothing(fleet2d: Cli) -> None:
+    assert (0, "", "") == fleet2d("run", written(small()), "--out", "run", "--quiet")
+    assert "complete" == package.open_run("run").status
+
+
+def test_quiet_with_json_prints_the_object_alone(fleet2d: Cli) -> None:
+    code, out, err = fleet2d("run", written(small()), "--out", "run", "--quiet", "--json")
+    assert (0, "") == (code, err)
+    assert Path("run").resolve() == Path(json.loads(out)["run_dir"]).resolve()
+
+
+def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d: Cli) -> None:
+    scenario_file = written(small())
+    named = written(small() | {"name": "quiet_week"}, "other.yaml")
+    for file in (scenario_file, scenario_file, named):
+        assert 0 == fleet2d("run", file, "--quiet")[0]
+    Path("runs/home-004").mkdir()
+    assert 0 == fleet2d("run", scenario_file, "--quiet")[0]
+    assert 0 == fleet2d("run", scenario_file, "--quiet")[0]
+    names = sorted(path.name for path in Path("runs").iterdir() if any(path.iterdir()))
+    assert ["home-001", "home-002", "home-003", "home-005", "quiet_week-001"] == names
+
+
+def test_without_a_scenario_the_base_scenario_runs_changed_as_told(fleet2d: Cli) -> None:
+    arguments = [
+        "simulation.duration.days=1",
+        "users.ana=null",
+        "--seed",
+        "7",
+        "--json",
+        "--out",
+        "run",
+    ]
+    code, out, _ = fleet2d("run", *arguments)
+    assert 0 == code
+    summary = json.loads(out)
+    assert (86400, 7) == (summary["steps"], summary["seed"])
+    assert {"users": [], "robots": ["astro"]} == package.open_run("run").manifest["entities"]
+
+
+def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:
+    scenario_file = written(small())
+    digests = []
+    for number, arguments in enumerate((["--seed", "9"], ["simulation.seed=9"], ["--seed", "0"])):
+        code, out, _ = fleet2d("run", scenario_file, *arguments, "--json", "--out", f"run{number}")
+        assert 0 == code
+        digests.append(json.loads(out)["digest"])
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_any_plan_goes_under_the_base_scenario(fleet2d: Cli, shared_data: Path) -> None:
+    for plan in sorted((shared_data / "houseexpo").glob("*.json"))[:6]:
+        arguments = ["floorplan.type=he", f"floorplan.path={plan}", "simulation.duration=3 h"]
+        code, _, err = fleet2d("run", *arguments, "--quiet", "--out", plan.stem)
+        assert (0, "") == (code, err), plan.stem
+
+
+def test_progress_is_shown_on_a_terminal_only(fleet2d: Cli) -> None:
+    done = fleet2d_process("run", str(written(small())), "--out", "run", cwd=Path.cwd())
+    assert 0 == done.returncode
+    assert "x real time" not in done.stderr
+    assert "\x1b" not in done.stdout + done.stderr
+
+
+# --- validate, schema, components --------------------------------------------------------------
+
+
+def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
+    code, out, err = fleet2d("validate", written(small()), "simulation.step=2 s")
+    assert (0, "") == (code, err)
+    for word in ("ok", "1 user", "1 robot", "flat", "150 steps of 2 s", "2026-01-05 07:00"):
+        assert word in out
+    assert ["home.yaml"] == [path.name for path in Path().iterdir()]
+    assert 0 == fleet2d("validate")[0]
+
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    from fleet2d.scenario.schema import schema as scenario_schema
+
+    return scenario_schema()
+
+
+def test_the_schema_is_valid_and_says_which_it_is(fleet2d: Cli, schema: dict[str, Any]) -> None:
+    code, out, err = fleet2d("schema")
+    assert (0, "", schema) == (code, err, json.loads(out))
+    jsonschema.validators.validator_for(schema).check_schema(schema)
+    assert schema["$schema"].startswith("https://json-schema.org/")
+
+
+def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> None:
+    validator = jsonschema.validators.validator_for(schema)(schema)
+    base = read_document(bundled_path("base")).data
+    for content in (base, small(), everything()):
+        plain = json.loads(json.dumps(content, default=str))
+        assert [] == [error.message for error in validator.iter_errors(plain)]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"users": {"ana": {"type": "meander", "turn_std": 3}}},
+        {"robots": {"astro": {"camera": {"angle": 3}}}},
+        {"simulation": {"durations": "1 h"}},
+        {"simulaton": {}},
+        {"users": {"ana": {"type": "meander", "speed": [3]}}},
+    ],
+)
+def test_what_is_wrong_does_not_fit_the_schema(
+    schema: dict[str, Any], wrong: dict[str, Any]
+) -> None:
+    validator = jsonschema.validators.validator_for(schema)(schema)
+    assert list(validator.iter_errors(small() | wrong))
+
+
+def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("components")
+    assert 0 == code
+    for kind in component.PACKAGES:
+        found = component.components(kind)
+        for name, cls in found.items():
+            assert f"{kind}: {name}" in out
+            for field in cls.model_fields:
+                assert re.search(rf"^ +{field}:", out, re.MULTILINE), (name, field)
+    for word in ("houseexpo or he", "[deg", "dwell", "5 min"):
+        assert word in out
+
+
+def test_components_as_json_are_a_list(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("components", "--json")
+    assert 0 == code
+    listed = {(entry["kind"], entry["type"]) for entry in json.loads(out)}
+    types = {(kind, name) for kind in component.PACKAGES for name in component.components(kind)}
+    assert types == {entry for entry in listed if entry[0] in component.PACKAGES}
+    assert {("behavior", "schedule"), ("floorplan", "bundled"), ("metric", "distance")} <= listed
+
+
+# --- show --------------------------------------------------------------------------------------
+
+
+def test_show_draws_a_plan_and_says_where(fleet2d: Cli) -> None:
+    assert (0, "flat.png\n") == fleet2d("show", flat_path())[:2]
+    assert Path("flat.png").read_bytes().startswith(PNG)
+    assert (0, "home.svg\n") == fleet2d("show", flat_path(), "--out", "home.svg")[:2]
+    drawn = Path("home.svg").read_text()
+    for word in ("<svg", "kitchen", "bedroom", "bathroom"):
+        assert word in drawn
+    assert 2 == len(list(Path().iterdir()))
+
+
+def test_show_without_a_plan_draws_the_bundled_home(fleet2d: Cli) -> None:
+    assert (0, "family_home.png\n") == fleet2d("show")[:2]
+    assert Path("family_home.png").read_bytes().startswith(PNG)
+
+
+def test_show_draws_a_run_in_its_home(fleet2d: Cli) -> None:
+    assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
+    code, out, err = fleet2d("show", "run")
+    assert (0, "") == (code, err)
+    assert Path(out.strip()).read_bytes().startswith(PNG)
+    assert 0 == fleet2d("show", "run", "--out", "run.svg")[0]
+    drawn = Path("run.svg").read_text()
+    for word in ("<svg", "ana", "astro"):
+        assert word in drawn
+    assert [] == package.open_run("run").verify()
+
+
+def test_show_without_matplotlib_says_what_to_install(tmp_path: Path) -> None:
+    (tmp_path / "matplotlib.py").write_text("raise ImportError('No module named matplotlib')")
+    script = "import sys; sys.path.insert(0, sys.argv.pop(1)); from fleet2d.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path), "show", "--out", str(tmp_path / "x.png")],
+        capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
+    )  # fmt: skip
+    assert done.returncode in (1, 2), done.stderr
+    assert "Traceback" not in done.stderr
+    for word in ("matplotlib", "fleet2d[viz]"):
+        assert word in done.stderr
+
+
+# --- reproduce ---------------------------------------------------------------------------------
+
+
+def test_reproduce_says_reproduced(fleet2d: Cli) -> None:
+    assert 0 == fleet2d("run", written(everything("5 min")), "--out", "run", "--quiet")[0]
+    code, out, err = fleet2d("reproduce", "run")
+    assert (0, "") == (code, err)
+    assert f"reproduced: digest {package.open_run('run').digest}" in out
+
+
+def test_reproduce_fails_on_a_table_that_was_tampered_with(fleet2d: Cli) -> None:
+    assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
+    file = Path("run/trajectories.parquet")
+    rows = pq.read_table(file)
+    x = rows["x"].to_numpy().copy()
+    x[0] += 1e-9
+    changed = rows.set_column(rows.column_names.index("x"), rows.schema.field("x"), [x])
+    pq.write_table(changed, file)
+    code, _, err = fleet2d("reproduce", "run")
+    assert 1 == code
+    assert "not reproduced" in err
+    assert "trajectories" in err
+
+
+def test_reproduce_fails_on_a_manifest_that_was_tampered_with(fleet2d: Cli) -> None:
+    assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
+    file = Path("run/manifest.json")
+    manifest = json.loads(file.read_text())
+    manifest["scenario"]["users"]["ana"]["speed"] = 0.5
+    file.write_text(json.dumps(manifest))
+    code, _, err = fleet2d("reproduce", "run")
+    assert 1 == code
+    assert "trajectories" in err
+
+
+# --- Interruption, help ------------------------------------------------------------------------
+
+
+def interrupted(
+    folder: Path, *arguments: str, ready: Callable[[], bool]
+) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process, and send it Ctrl-C once it is ready."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fleet2d.cli", *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while not ready() and time.monotonic() < deadline and process.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are posix")
+def test_ctrl_c_leaves_a_readable_run(tmp_path: Path) -> None:
+    (tmp_path / "home.yaml").write_text(yaml.safe_dump(every_step("300 d")))
+    floorplan = tmp_path / "run" / "floorplan.json"
+    done = interrupted(
+        tmp_path, "run", "home.yaml", "--out", "run", "--json", ready=floorplan.exists
+    )
+    assert 130 == done.returncode, done.stderr
+    assert "" == done.stdout
+    assert "interrupted at 2026-" in done.stderr
+    assert "run" in done.stderr
+    assert "Traceback" not in done.stderr
+    stored = package.open_run(tmp_path / "run")
+    assert "interrupted" == stored.status
+    assert stored.manifest["steps"] > 0
+    assert stored.tables["trajectories"].num_rows > 0
+    assert [] == stored.verify()
+    assert [] == list((tmp_path / "run").glob("*.partial"))
+
+
+@pytest.mark.parametrize("command", ["run", "validate"])
+def test_ctrl_c_during_set_up_exits_130(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    def interrupt(*args: object, **kwargs: object) -> None:
+        raise KeyboardInterrupt
+
+    scenario_file = written(small())
+    monkeypatch.setattr("fleet2d.engine.simulation.Home", interrupt)
+    code, out, err = fleet2d(command, scenario_file)
+    assert (130, "") == (code, out)
+    assert "Traceback" not in err
+    assert ["home.yaml"] == [path.name for path in Path().iterdir()]
+
+
+@pytest.mark.parametrize(
+    "command", ["run", "validate", "schema", "components", "show", "convert", "reproduce"]
+)
+def test_every_command_has_help(fleet2d: Cli, command: str) -> None:
+    code, out, err = fleet2d(command, "--help")
+    assert (0, "") == (code, err)
+    assert "Usage" in out
+    assert len(out.splitlines()) > 5
+
+
+def test_help_lists_the_commands(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("--help")
+    assert 0 == code
+    for command in ("run", "validate", "schema", "components", "show", "convert", "reproduce"):
+        assert command in out
+
+
+def test_importing_does_not_load_the_compiler() -> None:
+    script = "import sys, fleet2d, fleet2d.cli; print(sorted({'numba', 'pyarrow', 'shapely', 'matplotlib'} & set(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    assert "[]" == done.stdout.strip()

@@ -1,0 +1,64 @@
+"""Everything in examples/ runs, as its first lines say, and leaves what it says."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+from tests.scenes import fleet2d_process, process
+
+import fleet2d
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+SCRIPTS = sorted(EXAMPLES.rglob("*.py"))
+RUNNABLE = [path for path in SCRIPTS if '__name__ == "__main__"' in path.read_text()]
+SCENARIOS = sorted(EXAMPLES.rglob("*.yaml"))
+
+
+@pytest.fixture
+def examples(tmp_path: Path) -> Path:
+    """A copy of the examples, in which nothing of the repository can be written over."""
+    return shutil.copytree(
+        EXAMPLES, tmp_path / "examples", ignore=shutil.ignore_patterns("__pycache__")
+    )
+
+
+def test_there_are_examples_of_an_own_behavior_and_an_own_algorithm() -> None:
+    sources = [path.read_text() for path in SCRIPTS]
+    assert any("(Behavior)" in source for source in sources)
+    assert any("(Algorithm)" in source for source in sources)
+    assert RUNNABLE
+    assert SCENARIOS
+
+
+@pytest.mark.parametrize("path", RUNNABLE, ids=lambda path: path.name)
+def test_a_script_runs(examples: Path, path: Path) -> None:
+    done = process(str(examples / path.relative_to(EXAMPLES)), cwd=examples.parent, timeout=300)
+    assert 0 == done.returncode, done.stderr
+    assert "" == done.stderr
+    assert done.stdout.strip()
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: str(path.relative_to(EXAMPLES)))
+def test_a_scenario_runs_from_anywhere(examples: Path, path: Path) -> None:
+    target = examples.parent / "run"
+    content = yaml.safe_load(path.read_text())
+    done = fleet2d_process(
+        "run", str(examples / path.relative_to(EXAMPLES)), "--out", str(target), "--quiet",
+        cwd=examples.parent, timeout=300,
+    )  # fmt: skip
+    assert (0, "", "") == (done.returncode, done.stdout, done.stderr)
+    stored = fleet2d.open_run(target)
+    assert "complete" == stored.status
+    assert all(rows.num_rows for name, rows in stored.tables.items() if name != "observations")
+    for name in content.get("algorithms", {}):
+        assert name in stored.tables
+
+
+@pytest.mark.parametrize(
+    "path", [*SCRIPTS, *SCENARIOS], ids=lambda path: str(path.relative_to(EXAMPLES))
+)
+def test_an_example_begins_by_saying_what_it_is(path: Path) -> None:
+    first = path.read_text().splitlines()[0]
+    assert first.startswith(('"""', "# "))
+    assert len(first) > 20
