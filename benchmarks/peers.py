@@ -284,7 +284,8 @@ def main() -> None:
     if options.child:
         name, users, what = options.child
         done = measure(name, options.plan, int(users), what, options.seconds)
-        return print(json.dumps(asdict(done)))  # one line, for `measure_apart`
+        print(json.dumps(asdict(done)))  # one line, for `measure_apart`
+        return
     todo = [(name, users, what) for name in CASES for what in CASES[name] for users in USERS]
     results = [measure_apart(*case, options) for case in todo]
     machine = f"{os.cpu_count()} cores, 1-minute load {os.getloadavg()[0]:.1f} at the end"

@@ -14,6 +14,7 @@ from tests.scenes import OWN, flat_path, fleet2d_process, scenario, write_flat
 
 from fleet2d import cli
 from fleet2d.artifacts import arrow
+from fleet2d.artifacts.reader import open_run
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]
@@ -415,6 +416,22 @@ def test_a_component_that_fails_is_named_with_exit_1(fleet2d: Cli, where: str, n
         assert word in err
     # What was stored until then is readable and says that it is not whole.
     assert "failed" == json.loads(Path("run/manifest.json").read_text())["status"]
+
+
+def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d: Cli) -> None:
+    Path("mine.py").write_text(
+        "from fleet2d import Metric\n\n\nclass Breaks(Metric):\n"
+        "    def update(self, history, state):\n        raise RuntimeError('no ruler')\n"
+    )
+    content = small()
+    content["metrics"] = {"broken": {"type": "mine:Breaks", "period": 60}}
+    code, _, err = fleet2d("run", written(content), "--out", "run")
+    assert 1 == code
+    assert "metrics.broken" in err
+    run = open_run("run")
+    assert "failed" == run.status
+    assert run.tables["key_frames"].num_rows > 0
+    assert [] == run.verify()
 
 
 def test_a_module_that_fails_to_import_is_named(fleet2d: Cli) -> None:

@@ -41,6 +41,20 @@ def test_a_place_is_the_first_that_there_is(place: Any, room: str) -> None:
         assert room == room_of(body, body.find(place, moment, "spot"))
 
 
+def test_a_body_has_one_room_of_a_kind_however_it_is_listed() -> None:
+    home = {"type": "bundled"}  # with three bedrooms
+    for seed in range(6):
+        body = actor(seed, home, start="any")
+        lists = ("bedroom", ["bedroom", "any"], ["attic", "bedroom"])
+        found = {room_of(body, body.find(place, 0, "spot")) for place in lists}
+        assert 1 == len(found)
+    rooms = {
+        room_of(b, b.find("bedroom", 0, "spot"))
+        for b in (actor(s, home, start="any") for s in range(12))
+    }
+    assert len(rooms) > 1
+
+
 def test_a_point_is_that_point_exactly() -> None:
     body = actor()
     assert [7.0, 1.0] == body.home.plan.lattice.to_metres(body.find([7.0, 1.0], 0, "spot")).tolist()

@@ -198,7 +198,10 @@ class Simulation:
         if not self.done and status == "complete":
             status = "interrupted"
         began = time.perf_counter()
-        results = self._learners.finish(self.step, self._log) if self._log else {}
+        # Where a component failed, asking the metrics could fail again, and lose what is stored.
+        results = {}
+        if self._log and status != "failed":
+            results = self._learners.finish(self.step, self._log)
         self._simulate_s += time.perf_counter() - began
         began = time.perf_counter()
         self._recorder.end(self.step)

@@ -76,11 +76,14 @@ class Actor:
         return [room for room in self.home.rooms if len(self.space.cells(room.index, self.part))]
 
     def rooms(self, names: RoomChoice) -> list[Room]:
-        """Return the rooms that a list of names stands for.
+        """Return the rooms that a list of names stands for: those of the first name that fits.
 
         Raises:
             PlacementError: It names no room, or none that can be reached.
         """
+        return self._match(names)[1]
+
+    def _match(self, names: RoomChoice) -> tuple[str, list[Room]]:
         try:
             return matching_rooms(names, self.home.rooms, self.reachable_rooms())
         except PlacementError as error:
@@ -101,9 +104,9 @@ class Actor:
         if is_point(where):
             return self.point(where)  # type: ignore[arg-type]
         draws = Draws(self.stream(purpose), time_us)
-        rooms = self.rooms(where)  # type: ignore[arg-type]
-        habit = Draws(self.stream(f"room of {where}"), 0)
-        room = draws.choice(rooms) if rooms == self.reachable_rooms() else habit.choice(rooms)
+        name, rooms = self._match(where)  # type: ignore[arg-type]
+        habit = Draws(self.stream(f"room of {name}"), 0)
+        room = (draws if name == ANY else habit).choice(rooms)
         cells = self.space.cells(room.index, self.part)
         row, column = cells[draws.below(len(cells))].tolist()
         return self.home.plan.lattice.cell_centre(row, column)

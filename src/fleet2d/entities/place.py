@@ -71,18 +71,18 @@ def is_point(place: RoomChoice | Point) -> bool:
 
 def matching_rooms(
     names: RoomChoice, rooms: Sequence[Room], reachable: Sequence[Room]
-) -> list[Room]:
-    """Return the reachable rooms of the first name that has any.
+) -> tuple[str, list[Room]]:
+    """Return the first name that fits a reachable room, and all reachable rooms that it fits.
 
     Raises:
         PlacementError: No name fits a room that can be reached; says which rooms there are.
     """
     for name in names:
         if name == ANY:
-            return list(reachable)
+            return ANY, list(reachable)
         found = [room for room in reachable if name in (room.name, room.type)]
         if found:
-            return found
+            return name, found
     known = any(name in (room.name, room.type) for name in names for room in rooms)
     wanted = " or ".join(repr(name) for name in names)
     listed = ", ".join(room.name for room in reachable)

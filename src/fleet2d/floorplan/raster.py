@@ -33,7 +33,7 @@ class GreyPicture:
         clear: Where the picture is not fully opaque, bool (rows, columns), or None for nowhere.
     """
 
-    values: NDArray[np.uint8] | NDArray[np.uint16]
+    values: NDArray[np.integer[Any]]
     white: int
     clear: NDArray[np.bool_] | None = None
 
@@ -79,8 +79,8 @@ def _read_pgm(content: bytes) -> GreyPicture:
         values = _packed_values(body, columns, rows, 1 if white < 256 else 2)
     if values.max() > white:
         raise FloorPlanError(f"has a pixel of {values.max()}, above its white, {white}")
-    small = values.astype(np.uint8 if white < 256 else np.uint16)
-    return GreyPicture(small.reshape(rows, columns), white)
+    picture = values.reshape(rows, columns)
+    return GreyPicture(picture.astype(np.uint8 if white < 256 else np.uint16), white)
 
 
 def _packed_values(body: bytes, columns: int, rows: int, depth: int) -> NDArray[np.integer[Any]]:

@@ -1,6 +1,7 @@
 """Maps of the ROS `map_server`: a YAML file, and an image that says what is free and occupied."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 import shapely
 import yaml
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 from shapely import Polygon
 
 from fleet2d.component import register
@@ -74,6 +75,18 @@ class Ros(FloorPlanSource):
         ge=0,
         description="how far straightened walls may be from the map's pixels; 0: exact walls",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_resolution(cls, data: Any) -> Any:
+        """Fill in the cell, so that a stored scenario has it; `load` says what is wrong."""
+        if not isinstance(data, Mapping) or data.get("cell") is not None or "path" not in data:
+            return data
+        try:
+            path = TypeAdapter(InputPath).validate_python(data["path"])
+            return {**data, "cell": _settings(path).usual_cell}
+        except (ValidationError, FloorPlanError):
+            return data
 
     def load(self) -> FloorPlan:
         """Read the map."""

@@ -138,23 +138,25 @@ def trace_rings(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.
     starts = np.zeros(64, np.int64)
     count, rings = 0, 0
     for seed in range(rows * columns):
-        y, x = seed // columns, seed % columns
         # The first side of a ring that a scan by rows meets runs east, and starts at a corner.
-        while sides[y, x] & np.uint8(1 << EAST):
+        if sides[seed // columns, seed % columns] & np.uint8(1 << EAST):
+            y, x = seed // columns, seed % columns
             heading, before = EAST, NOWHERE
-            while sides[y, x] & np.uint8(1 << heading):
-                sides[y, x] ^= np.uint8(1 << heading)
+            while before == NOWHERE or y * columns + x != seed or heading != EAST:
                 if heading != before:
                     if count == corners.shape[0]:
                         corners = _longer(corners)
                     corners[count, 0], corners[count, 1] = x, y
                     count += 1
+                if before != NOWHERE:  # the first side stays until the ring has come back to it
+                    sides[y, x] ^= np.uint8(1 << heading)
                 before = heading
                 x += 1 if heading == EAST else (-1 if heading == WEST else 0)
                 y += 1 if heading == NORTH else (-1 if heading == SOUTH else 0)
                 heading = (before + 3) % 4  # right first, then straight on, then left
-                while not sides[y, x] & np.uint8(1 << heading) and heading != (before + 2) % 4:
+                while not sides[y, x] & np.uint8(1 << heading):
                     heading = (heading + 1) % 4
+            sides[y, x] ^= np.uint8(1 << EAST)
             rings += 1
             if rings == starts.shape[0]:
                 starts = np.concatenate((starts, np.zeros(rings, np.int64)))

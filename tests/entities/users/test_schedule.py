@@ -318,3 +318,28 @@ def test_time_is_told_to_the_step_when_the_run_begins_within_a_minute() -> None:
         duration="2 min",
     )
     assert [18] == departures(run(content))
+
+
+def test_nobody_stirs_at_midnight() -> None:
+    content = one(
+        agenda({"at": "06:00", "place": "living_room"}, {"at": "22:00", "place": "bedroom"}),
+        simulation={"start": "2026-01-05T23:50"},
+        duration="20 min",
+    )
+    poses = path(run(content), "ana")
+    assert 1 == len(set(zip(poses.x.tolist(), poses.y.tolist(), strict=True)))
+
+
+def test_all_items_that_were_due_on_the_way_over_midnight_come_in_order() -> None:
+    content = one(
+        agenda(
+            {"at": "00:00:01", "place": "bathroom", "activity": "first"},
+            {"at": "00:00:02", "place": "kitchen", "activity": "second"},
+            {"at": "20:00", "place": "living_room"},
+            {"at": "23:59:58", "place": "bedroom", "activity": "bed"},
+        ),
+        simulation={"start": "2026-01-05T23:50"},
+        duration="30 min",
+        speed=0.2,
+    )
+    assert ["bed", "first", "second"] == table(run(content), "events")["detail"].tolist()

@@ -1,0 +1,25 @@
+"""Any plan can be put under the bundled scenario."""
+
+from pathlib import Path
+
+import pytest
+from tests.homes import needs_jit
+
+import fleet2d
+
+
+@needs_jit
+def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
+    plans = sorted((shared_data / "houseexpo").glob("*.json"))
+    assert 50 == len(plans)
+    for plan in plans:
+        overrides = (
+            "floorplan.type=houseexpo",
+            f"floorplan.path={plan}",
+            "simulation.duration=1 d",
+        )
+        run = fleet2d.run(None, *overrides)
+        shares = run.metrics["room_share"]["ana"]
+        assert sum(shares.values()) == pytest.approx(1)
+        assert shares["away"] == pytest.approx(9.5 / 24, abs=0.01)
+        assert run.metrics["distance"]["ana"] > 1, plan.name
