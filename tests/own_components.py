@@ -1,6 +1,6 @@
 """Behaviors, algorithms and metrics as a user would write them, for the tests of whole runs."""
 
-import time
+import signal
 from collections.abc import Mapping
 from datetime import timedelta
 from typing import Any
@@ -129,8 +129,15 @@ class Spy(Metric):
         return {"handed": self.handed}
 
 
-class Slow(Algorithm):
-    """Takes much longer than anybody waits."""
+class Impatient(Algorithm):
+    """Presses Ctrl-C twice during an update."""
+
+    def start(self, home: Any) -> None:
+        self.lived_to_see: list[str] = []
 
     def update(self, history: History, state: Present) -> None:
-        time.sleep(30)
+        self.lived_to_see.append("first")
+        signal.raise_signal(signal.SIGINT)
+        self.lived_to_see.append("second")
+        signal.raise_signal(signal.SIGINT)
+        self.lived_to_see.append("nothing of this")

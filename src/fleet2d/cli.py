@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Collection
 from dataclasses import asdict
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -273,12 +274,14 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from fleet2d.units import format_duration
+
     console = Console()
     wall = summary["wall_s"]
-    days = summary["simulated_s"] / 86400
+    simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
     seconds = wall["setup"] + wall["simulate"] + wall["save"]
     console.print(
-        f"{days:g} days in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
+        f"{simulated} in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
         f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
         f" save {wall['save']:.2f} s;"
         f" whole process {wall['total']:.2f} s, {summary['peak_rss_mb']:.0f} MB)",

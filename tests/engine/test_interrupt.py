@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-import time
 from pathlib import Path
 from typing import Any
 
@@ -46,23 +45,18 @@ def test_a_paced_run_stops_soon() -> None:
         scenario("1 d", users={"ana": {"type": "meander"}}), speedup=1.0
     )
     timer = interrupt_after(0.3)
-    began = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         simulation.run()
     timer.join()
-    assert time.perf_counter() - began < 1.5
+    assert simulation.step < 3600
 
 
-def test_a_second_interrupt_does_not_wait() -> None:
-    content = scenario("10 min", algorithms={"slow": {"type": f"{OWN}:Slow", "period": "1 min"}})
-    simulation = fleet2d.Simulation(content)
-    timers = [interrupt_after(0.2), interrupt_after(0.5)]
-    began = time.perf_counter()
+def test_a_second_interrupt_does_not_wait_for_the_span_to_end() -> None:
+    impatient = {"type": f"{OWN}:Impatient", "period": "1 min"}
+    simulation = fleet2d.Simulation(scenario("10 min", algorithms={"impatient": impatient}))
     with pytest.raises(KeyboardInterrupt):
         simulation.run()
-    for timer in timers:
-        timer.join()
-    assert time.perf_counter() - began < 5
+    assert ["first", "second"] == simulation._learners.all[0].component.lived_to_see
 
 
 def test_the_handler_of_the_caller_is_put_back() -> None:

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import time
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -64,12 +63,13 @@ def test_a_table_that_was_changed_is_not_reproduced(stored: Path, tmp_path: Path
     assert "changed" in cause
 
 
-def test_a_paced_run_is_reproduced_as_fast_as_possible(tmp_path: Path) -> None:
+def test_a_paced_run_is_reproduced_as_fast_as_possible(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     content = scenario("5 min", users={"ana": {"type": "meander"}})
     fleet2d.run(content, out=tmp_path / "run", speedup=200)
-    began = time.perf_counter()
+    monkeypatch.setattr("fleet2d.engine.simulation.Pace", None)  # which nobody may ask for
     assert fleet2d.reproduce(tmp_path / "run").same
-    assert time.perf_counter() - began < 1
 
 
 def test_an_input_that_changed_is_named(tmp_path: Path) -> None:

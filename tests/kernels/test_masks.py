@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
@@ -55,7 +57,7 @@ def slow_count_steps(start: Mask, mask: Mask) -> NDArray[np.int32]:
 
 def rings_of(mask: Mask) -> list[NDArray[np.int32]]:
     corners, starts = trace_rings(mask)
-    return [corners[a:b] for a, b in zip(starts[:-1], starts[1:], strict=True)]
+    return [corners[a:b] for a, b in pairwise(starts.tolist())]
 
 
 def unit_sides(rings: list[NDArray[np.int32]]) -> list[tuple[int, ...]]:

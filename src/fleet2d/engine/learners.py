@@ -89,11 +89,13 @@ class Learners:
         fresh: dict[str, Any] = {}
         for learner in self.all:
             if learner.due == end:
-                output = self._update(learner, end, log, {**self.outputs, **fresh})
+                reads = getattr(learner.component, "reads", fresh)  # metrics come last, and see all
+                seen = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
+                output = self._update(learner, end, log, seen)
                 learner.since = end
                 if isinstance(learner.component, Algorithm) and output is not None:
                     fresh[learner.name] = output
-        self.outputs.update(fresh)
+        self.outputs = {**self.outputs, **fresh}  # a new one: who kept the old sees the old
 
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
         """Give metrics what is left of a period; return the results of all metrics by name."""

@@ -20,6 +20,10 @@ class Pace:
         self.slice_s = speedup * self.LOOK_S
         self._began = time.perf_counter()
 
+    def resume(self, simulated_s: float) -> None:
+        """Go on after a pause, as if no time had passed since `simulated_s`."""
+        self._began = max(self._began, time.perf_counter() - simulated_s / self.speedup)
+
     def hold(self, simulated_s: float) -> None:
         """Sleep until `simulated_s` of simulated time are due."""
         ahead = self._began + simulated_s / self.speedup - time.perf_counter()

@@ -220,6 +220,8 @@ class Simulation:
         speedup = self.scenario.simulation.speedup
         if speedup and self._pace is None:
             self._pace = Pace(speedup)
+        if self._pace:
+            self._pace.resume(self.step * self.clock.step_us / 1e6)
         told = began
         while self.step < end and not self._stopping:
             self._span(end)

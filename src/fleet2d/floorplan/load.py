@@ -20,7 +20,8 @@ def load_floorplan(plan: str | Path = "family_home", cell: float | None = None) 
     """Read a floor plan.
 
     Args:
-        plan: A file, whose content tells its format, or the name of a bundled home.
+        plan: A file, whose content tells its format (YAML is a ROS map), or the name of a
+            bundled home.
         cell: Side of a grid cell [m]; None for 0.05, or for a ROS map its resolution.
 
     Raises:
@@ -31,9 +32,8 @@ def load_floorplan(plan: str | Path = "family_home", cell: float | None = None) 
         'family_home'
     """
     names = bundled_names()
-    usual = USUAL_CELL_M if cell is None else cell
     if str(plan) in names:
-        return read_native(HOMES / f"{plan}.json", usual)
+        return read_native(HOMES / f"{plan}.json", USUAL_CELL_M if cell is None else cell)
     path = Path(plan)
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
@@ -47,11 +47,15 @@ def load_floorplan(plan: str | Path = "family_home", cell: float | None = None) 
             f"{path} is the image of a map, without its scale: name the YAML file that goes with"
             f" it, such as {path.with_suffix('.yaml').name}"
         )
+    return _load_json(path, USUAL_CELL_M if cell is None else cell)
+
+
+def _load_json(path: Path, cell: float) -> FloorPlan:
     content = read_json(path)
     if content.get("format") == FORMAT:
-        return read_native(path, usual)
+        return read_native(path, cell)
     if "verts" in content:
-        return read_houseexpo(path, usual)
+        return read_houseexpo(path, cell)
     raise FloorPlanError(
         f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
         f' "format": "{FORMAT}"'

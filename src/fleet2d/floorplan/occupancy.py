@@ -51,7 +51,9 @@ class OccupancyMap:
         low = (max(int(columns[0]) - 1, 0), max(int(rows[0]) - 1, 0))
         window = (slice(low[1], int(rows[-1]) + 2), slice(low[0], int(columns[-1]) + 2))
         x, y = self.to_metres(np.array(low, np.float64)).tolist()
-        return replace(self, free=self.free[window], occupied=self.occupied[window], origin=(x, y))
+        # In one memory order, whatever the maker's: the kernels are compiled for that.
+        free, occupied = (np.ascontiguousarray(m[window]) for m in (self.free, self.occupied))
+        return replace(self, free=free, occupied=occupied, origin=(x, y))
 
 
 def free_space(

@@ -59,7 +59,7 @@ def is_taut(mesh: Mesh, corners: Corners, node: int, x: int, y: int) -> bool:
     """Tell whether a string from (x, y) can bend round the corner `node`."""
     if not corners.simple[node]:
         return True
-    v = corners.vertex[node]
+    v = int(corners.vertex[node])
     vx, vy = mesh.vertices[v, 0], mesh.vertices[v, 1]
     before = orient(x, y, vx, vy, corners.before[node, 0], corners.before[node, 1])
     after = orient(x, y, vx, vy, corners.after[node, 0], corners.after[node, 1])
@@ -69,13 +69,13 @@ def is_taut(mesh: Mesh, corners: Corners, node: int, x: int, y: int) -> bool:
 @kernel
 def legs_of_corner(mesh: Mesh, fans: Fans, corners: Corners, node: int, seen: I32) -> int:
     """Write the nodes that one taut leg connects with `node` to `seen`; return their number."""
-    v = corners.vertex[node]
+    v = int(corners.vertex[node])
     legs = 0
     for i in range(vertices_seen_from_vertex(mesh, fans, v, seen)):
-        other = corners.node_of_vertex[seen[i]]
+        other = int(corners.node_of_vertex[seen[i]])
         if other < 0:
             continue
-        w = corners.vertex[other]
+        w = int(corners.vertex[other])
         if not is_taut(mesh, corners, other, mesh.vertices[v, 0], mesh.vertices[v, 1]):
             continue
         if is_taut(mesh, corners, node, mesh.vertices[w, 0], mesh.vertices[w, 1]):
@@ -96,11 +96,11 @@ def build_route_graph(mesh: Mesh, corners: Corners) -> RouteGraph:
     target = np.empty(start[nodes], np.int32)
     length = np.empty(start[nodes], np.float64)
     for node in range(nodes):
-        v = corners.vertex[node]
+        v = int(corners.vertex[node])
         legs = legs_of_corner(mesh, fans, corners, node, seen)
         others = np.sort(seen[:legs])
         for i in range(legs):
-            w = corners.vertex[others[i]]
+            w = int(corners.vertex[others[i]])
             target[start[node] + i] = others[i]
             length[start[node] + i] = distance(
                 mesh.vertices[v, 0], mesh.vertices[v, 1], mesh.vertices[w, 0], mesh.vertices[w, 1]
@@ -113,7 +113,7 @@ def corners_seen(mesh: Mesh, corners: Corners, x: int, y: int, triangle: int, se
     """Write the corners that a taut string from (x, y) can reach to `seen`; return their number."""
     count = 0
     for i in range(vertices_seen_from_point(mesh, x, y, triangle, seen)):
-        node = corners.node_of_vertex[seen[i]]
+        node = int(corners.node_of_vertex[seen[i]])
         if node >= 0 and is_taut(mesh, corners, node, x, y):
             seen[count] = node
             count += 1
@@ -140,13 +140,13 @@ def find_route(mesh: Mesh, graph: RouteGraph, ax: int, ay: int, bx: int, by: int
     seen = np.empty(vertices.shape[0] + 4, np.int32)
     to_goal = np.full(nodes, -1.0)  # length of the last leg, for corners that see the goal
     for i in range(corners_seen(mesh, corners, bx, by, at_b, seen)):
-        v = corners.vertex[seen[i]]
+        v = int(corners.vertex[seen[i]])
         to_goal[seen[i]] = distance(vertices[v, 0], vertices[v, 1], bx, by)
     travelled = np.full(nodes, np.inf)
     bound = np.full(nodes, np.inf)  # travelled + straight line to the goal, inf = not open
     before = np.full(nodes, -1, np.int32)
     for i in range(corners_seen(mesh, corners, ax, ay, at_a, seen)):
-        v = corners.vertex[seen[i]]
+        v = int(corners.vertex[seen[i]])
         travelled[seen[i]] = distance(ax, ay, vertices[v, 0], vertices[v, 1])
         bound[seen[i]] = travelled[seen[i]] + distance(vertices[v, 0], vertices[v, 1], bx, by)
     best, last = search_corners(mesh, graph, to_goal, travelled, bound, before, bx, by)
@@ -183,7 +183,7 @@ def search_corners(
             other = graph.node[k]
             length = travelled[node] + graph.length[k]
             if length < travelled[other]:
-                v = vertex[other]
+                v = int(vertex[other])
                 travelled[other] = length
                 before[other] = node
                 bound[other] = length + distance(vertices[v, 0], vertices[v, 1], bx, by)
@@ -200,7 +200,7 @@ def unwind(mesh: Mesh, corners: Corners, before: I32, last: int, bx: int, by: in
     out[count, 0], out[count, 1] = bx, by
     node = last
     for i in range(count - 1, 0, -1):
-        v = corners.vertex[node]
+        v = int(corners.vertex[node])
         out[i, 0], out[i, 1] = mesh.vertices[v, 0], mesh.vertices[v, 1]
         node = before[node]
     return count + 1

@@ -1,0 +1,224 @@
+"""The content of a Valetudo map file: layers of pixels and entities, checked; JSON, version 2.
+
+Its pixels are numbered from the top and its lengths are in centimetres. Here the place (x, y) [cm]
+of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.source import MAX_COORDINATE_M
+
+MAP_CLASS = "ValetudoMap"
+VERSION = 2
+
+MAX_PIXELS = 2**22
+"""A map of 2048 x 2048 pixels: 102 m a side at 5 cm."""
+
+MIN_PIXEL_CM, MAX_PIXEL_CM = 1, 100
+MAX_PIXEL_NUMBER = 2**20
+CM_PER_M = 100
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Pixels of one kind.
+
+    Attributes:
+        kind: floor, segment or wall.
+        name: Of a segment: what people call it, or segment_… and its id.
+        named: Whether people gave it the name.
+        runs: First column, row and length of rows of pixels, int64 (n, 3); rows count upwards from
+            the map's upper edge, so they are negative.
+    """
+
+    kind: str
+    name: str
+    named: bool
+    runs: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A window of pixels: its lowest column and row, and how many of them it has."""
+
+    column: int
+    row: int
+    columns: int
+    rows: int
+
+    @classmethod
+    def around(cls, runs: NDArray[np.int64]) -> "Box":
+        column, row, end = int(runs[:, 0].min()), int(runs[:, 1].min()), runs[:, 0] + runs[:, 2]
+        box = cls(column, row, int(end.max()) - column, int(runs[:, 1].max()) + 1 - row)
+        if box.columns * box.rows > MAX_PIXELS:
+            raise FloorPlanError(
+                f"its pixels spread over {box.columns} x {box.rows}: at most"
+                f" {MAX_PIXELS // 2**20} million are read; is a layer damaged?"
+            )
+        return box
+
+    def window(self, part: "Box") -> tuple[slice, slice]:
+        """Return where `part` lies in an array over this box."""
+        row, column = part.row - self.row, part.column - self.column
+        return slice(row, row + part.rows), slice(column, column + part.columns)
+
+    def painted(self, runs: NDArray[np.int64]) -> Mask:
+        """Return which pixels the runs cover, bool (rows, columns), the first row at the bottom."""
+        steps = np.zeros((self.rows, self.columns + 1), np.int32)
+        row, column = runs[:, 1] - self.row, runs[:, 0] - self.column
+        np.add.at(steps, (row, column), 1)
+        np.add.at(steps, (row, column + runs[:, 2]), -1)
+        mask: Mask = np.cumsum(steps, axis=1)[:, :-1] > 0
+        return mask
+
+
+def checked_map(content: dict[str, Any]) -> dict[str, Any]:
+    """Return the content if it is a map of the version that we read."""
+    if content.get("__class") != MAP_CLASS:
+        raise FloorPlanError(f'no Valetudo map: "__class" is not "{MAP_CLASS}"')
+    version = _meta(content).get("version")
+    if version != VERSION:
+        raise FloorPlanError(
+            f"version {version!r} of Valetudo's map format is not known: this Fleet2D reads"
+            f" {VERSION}; a newer Valetudo writes it"
+        )
+    return content
+
+
+def _meta(thing: dict[str, Any]) -> dict[str, Any]:
+    meta = thing.get("metaData")
+    return meta if isinstance(meta, dict) else {}
+
+
+def pixel_side(content: dict[str, Any]) -> float:
+    """Return the side of the map's pixels [m]."""
+    size = content.get("pixelSize")
+    if isinstance(size, bool) or not isinstance(size, int | float):
+        raise FloorPlanError(f"pixelSize is {_shown(size)}: a number of centimetres is expected")
+    if not MIN_PIXEL_CM <= size <= MAX_PIXEL_CM:
+        raise FloorPlanError(
+            f"pixelSize is {size:g}: {MIN_PIXEL_CM} to {MAX_PIXEL_CM} cm is expected (5 is usual)"
+        )
+    return size / CM_PER_M
+
+
+def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], str]]:
+    """Return the objects in one of the map's lists, and how to name each in an error."""
+    found = content.get(key, [])
+    if not isinstance(found, list):
+        raise FloorPlanError(f"{key} is {_shown(found)}: a list is expected")
+    for number, item in enumerate(found):
+        if not isinstance(item, dict):
+            raise FloorPlanError(f"{key}[{number}] is {_shown(item)}: an object is expected")
+    return [(item, f"{key}[{number}]") for number, item in enumerate(found)]
+
+
+def read_layers(content: dict[str, Any], notes: list[str]) -> list[Layer]:
+    """Return the layers with pixels, in the file's order; say what is odd about any of them."""
+    layers: list[Layer] = []
+    for layer, where in objects_in(content, "layers"):
+        kind = layer.get("type")
+        if kind not in ("floor", "segment", "wall"):
+            notes.append(f"{where} is of the unknown type {_shown(kind)}: ignored")
+            continue
+        runs = _runs(layer, where)
+        name, named = _segment_name(layer, len(layers))
+        what = f"the segment {name}" if kind == "segment" else f"the layer {where}, {kind},"
+        if not len(runs):
+            notes.append(f"{what} has no pixels: ignored")
+            continue
+        dimensions = layer.get("dimensions")
+        stated = dimensions.get("pixelCount") if isinstance(dimensions, dict) else None
+        pixels = int(np.count_nonzero(Box.around(runs).painted(runs)))
+        if stated is not None and stated != pixels:
+            notes.append(f"{what} has {pixels} pixels, though its pixelCount says {_shown(stated)}")
+        layers.append(Layer(kind, name, named, runs))
+    if all(layer.kind == "wall" for layer in layers):
+        raise FloorPlanError("it has no floor: no layer of type floor or segment has any pixel")
+    return layers
+
+
+def _segment_name(layer: dict[str, Any], number: int) -> tuple[str, bool]:
+    name = _meta(layer).get("name")
+    if isinstance(name, str) and name.strip():
+        return name.strip(), True
+    return f"segment_{_meta(layer).get('segmentId', number)}", False
+
+
+def _runs(layer: dict[str, Any], where: str) -> NDArray[np.int64]:
+    """Return the runs of pixels of a layer, int64 (n, 3), with rows that count upwards."""
+    packed = _whole_numbers(layer, "compressedPixels", 3, "runs x, y, length", where)
+    single = _whole_numbers(layer, "pixels", 2, "pixels x, y", where)
+    if (packed[:, 2] < 0).any():
+        first = int(np.flatnonzero(packed[:, 2] < 0)[0])
+        raise FloorPlanError(
+            f"{where}.compressedPixels has a run of negative length: {packed[first].tolist()}"
+        )
+    runs = np.concatenate([packed, np.insert(single, 2, 1, axis=1)])
+    runs[:, 1] = -1 - runs[:, 1]
+    return runs[runs[:, 2] > 0]
+
+
+def _whole_numbers(
+    layer: dict[str, Any], key: str, group: int, what: str, where: str
+) -> NDArray[np.int64]:
+    """Return a flat list of whole numbers in groups, int64 (n, group)."""
+    values = layer.get(key) or []
+    if not isinstance(values, list):
+        raise FloorPlanError(f"{where}.{key} is {_shown(values)}: a list of {what} is expected")
+    if len(values) % group:
+        raise FloorPlanError(
+            f"{where}.{key} has {len(values)} numbers, which is no multiple of {group} ({what}): it"
+            " is cut off"
+        )
+    for value in values:
+        if type(value) is not int or abs(value) > MAX_PIXEL_NUMBER:
+            raise FloorPlanError(
+                f"{where}.{key} has {_shown(value)}: whole numbers up to {MAX_PIXEL_NUMBER} are"
+                " expected"
+            )
+    return np.array(values, np.int64).reshape(-1, group)
+
+
+# --- Entities: what lies on the floor ----------------------------------------------------------
+
+
+def entities_of(content: dict[str, Any], kind: str) -> Iterator[tuple[dict[str, Any], str]]:
+    return ((e, where) for e, where in objects_in(content, "entities") if e.get("type") == kind)
+
+
+def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
+    """Return an entity's points, float64 (n, 2) [m]."""
+    values = entity.get("points")
+    if not isinstance(values, list) or len(values) % 2:
+        raise FloorPlanError(
+            f"{where}.points is {_shown(values)}: a list x, y, x, y, … is expected"
+        )
+    for value in values:
+        sensible = isinstance(value, int | float) and not isinstance(value, bool)
+        if not sensible or not abs(value) <= MAX_COORDINATE_M * CM_PER_M:
+            raise FloorPlanError(f"{where}.points has {_shown(value)}: no sensible centimetres")
+    places = np.array(values, np.float64).reshape(-1, 2) / CM_PER_M
+    places[:, 1] *= -1
+    return places
+
+
+def read_charger(content: dict[str, Any]) -> tuple[float, float] | None:
+    for entity, where in entities_of(content, "charger_location"):
+        for x, y in read_points(entity, where)[:1].tolist():
+            return x, y
+    return None
+
+
+def _shown(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
