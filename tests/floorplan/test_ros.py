@@ -8,6 +8,7 @@ import shapely
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+import fleet2d
 from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
@@ -420,3 +421,10 @@ def test_load_floorplan_of_the_image_names_the_yaml_file(tmp_path: Path) -> None
 
     with pytest.raises(FloorPlanError, match=r"name the YAML file.*map\.yaml"):
         load_floorplan(tmp_path / "map.pgm")
+
+
+def test_a_run_notes_the_image_as_well_as_the_yaml(shared_data: Path) -> None:
+    path = shared_data / "ros_maps" / "turtlebot3_house" / "map.yaml"
+    overrides = ("floorplan.type=ros", f"floorplan.path={path}", "simulation.duration=1 min")
+    inputs = fleet2d.run(None, *overrides).manifest["inputs"]
+    assert ["map.pgm", "map.yaml"] == [Path(record["path"]).name for record in inputs]

@@ -9,11 +9,8 @@ from fleet2d.scenario.model import Scenario
 
 
 def input_files(scenario: Scenario) -> list[Path]:
-    """Return the floor plan's file and the modules of the user's own components, sorted."""
-    files = set()
-    plan = getattr(scenario.floorplan, "path", None)
-    if plan is not None:
-        files.add(Path(plan))
+    """Return the floor plan's files and the modules of the user's own components, sorted."""
+    files = set(scenario.floorplan.files())
     for component in _components(scenario):
         if not type(component).__module__.startswith("fleet2d."):
             source = inspect.getsourcefile(type(component))

@@ -88,6 +88,10 @@ class Ros(FloorPlanSource):
         except (ValidationError, FloorPlanError):
             return data
 
+    def files(self) -> list[Path]:
+        """Return the YAML file and the image."""
+        return [self.path, _image_file(_settings(self.path).image, self.path)[0]]
+
     def load(self) -> FloorPlan:
         """Read the map."""
         return read_ros(

@@ -38,6 +38,11 @@ class FloorPlanSource(Component):
             FloorPlanError: The file can't be read, or is no home.
         """
 
+    def files(self) -> list[Path]:
+        """Return the files that it reads: a run notes their content, to be reproducible."""
+        path = getattr(self, "path", None)
+        return [] if path is None else [Path(path)]
+
 
 def read_json(path: Path) -> dict[str, Any]:
     """Return the JSON object in a file.
