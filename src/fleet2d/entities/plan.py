@@ -64,14 +64,14 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Meander:
+class Walk:
     """A random walk, drawn step by step."""
 
     walls: Mesh
     space: Mesh
     rule: WalkRule
 
-    def __deepcopy__(self, memo: dict[int, object]) -> "Meander":
+    def __deepcopy__(self, memo: dict[int, object]) -> "Walk":
         """Return itself: it never changes."""
         return self
 
@@ -204,7 +204,7 @@ class Plan:
         self._check_goes_on()
         if len(self._rows) > 2 or self.time_us != self._rows[0][0, 0]:
             raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
-        self._motion = Meander(self._actor.home.plan.mesh, self._actor.space.mesh, rule)
+        self._motion = Walk(self._actor.home.plan.mesh, self._actor.space.mesh, rule)
         self.endless = True
         return self
 

@@ -5,7 +5,6 @@ Their pixels are numbered from the top and their lengths are in centimetres. Her
 plan and the recorded path share this frame.
 """
 
-import unicodedata
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,6 +29,7 @@ from fleet2d.floorplan.valetudo_file import (
     Mask,
     checked_map,
     entities_of,
+    note_size,
     objects_in,
     pixel_side,
     read_charger,
@@ -42,6 +42,8 @@ from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
 NoGo = Literal["keep_out", "ignore"]
+
+MAX_PARTS = 10_000
 
 # What touches a pixel by no more than this [pixels] only shares its side.
 TINY = 1e-6
@@ -129,6 +131,7 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
         notes: list[str] = []
         layers = read_layers(content, notes)
         box = Box.around(np.concatenate([layer.runs for layer in layers]))
+        note_size(content, box, notes)
         free = _free_pixels(layers, box, notes)
         _keep_out(content, free, box, no_go, notes)
         if not free.any():
@@ -151,7 +154,7 @@ def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
 
     Returns:
         The pieces of its path in the file's order, each float64 (n, 2) [m] in the plan's frame, as
-        recorded: at unknown times, points may repeat. None if the map has no path.
+        recorded: at unknown times, and points may repeat. An empty list if the map has no path.
 
     Raises:
         FloorPlanError: The file can't be read, or isn't such a map.
@@ -197,7 +200,7 @@ def segment_type(name: str) -> str:
     >>> segment_type("Yoga Studio")
     'yoga_studio'
     """
-    own = room_type(unicodedata.normalize("NFC", name))
+    own = room_type(name)
     words = own.split("_")
     while len(words) > 1 and words[-1].isdigit():
         words.pop()
@@ -233,6 +236,11 @@ def _free_pixels(layers: list[Layer], box: Box, notes: list[str]) -> Mask:
 def _in_metres(mask: Mask, box: Box, pixel_m: float) -> MultiPolygon:
     """Return the exact outlines of pixels [m]."""
     part = label_parts(mask, False)
+    if part.max(initial=-1) >= MAX_PARTS:
+        raise FloorPlanError(
+            f"its pixels are in {part.max() + 1} separate groups, more than {MAX_PARTS}: that is"
+            " noise, not a home"
+        )
     rows, columns = np.nonzero(mask)
     parts = part[rows, columns]
     low = np.full((int(part.max(initial=-1)) + 1, 2), np.iinfo(np.int64).max)
@@ -304,14 +312,15 @@ def _forbidden(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
 
 
 def _take_out(shape: BaseGeometry, free: Mask, box: Box) -> None:
+    """Take out of the free pixels those that a shape [pixels] reaches into."""
     x0, y0, x1, y1 = shape.bounds
     first, last = (int(np.clip(y - box.row, 0, box.rows - 1)) for y in (y0, y1))
     left, right = (int(np.clip(x - box.column, 0, box.columns - 1)) for x in (x0, x1))
     shapely.prepare(shape)
     for row in range(first, last + 1):  # by rows, to be modest in memory
         columns = left + np.flatnonzero(free[row, left : right + 1])
-        x, y = (columns + box.column).astype(np.float64), np.float64(row + box.row)
-        pixels = shapely.box(*np.broadcast_arrays(x, y, x + 1, y + 1))
+        x, y = columns + float(box.column), np.full(len(columns), float(box.row + row))
+        pixels = shapely.box(*np.stack([x, y, x + 1, y + 1]))
         free[row, columns] = ~shapely.intersects(shape, pixels)
 
 
@@ -325,8 +334,8 @@ def _note_entities(content: dict[str, Any], notes: list[str]) -> None:
     if points:
         metres = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in pieces)
         notes.append(
-            f"the vacuum's recorded path is {metres:.1f} m long, {points} points in {len(pieces)}"
-            " pieces; it is no part of the plan"
+            f"the vacuum's recorded path is {metres:.1f} m long, {points} points, in pieces:"
+            f" {len(pieces)}; it is no part of the plan"
         )
     counts = Counter(str(entity.get("type")) for entity, _ in objects_in(content, "entities"))
     for kind in ("path", "charger_location", "robot_position", "no_go_area", "virtual_wall"):

@@ -5,6 +5,7 @@ of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored
 """
 
 import json
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -57,6 +58,11 @@ class Box:
 
     @classmethod
     def around(cls, runs: NDArray[np.int64]) -> "Box":
+        """Return the smallest box that holds all runs.
+
+        Raises:
+            FloorPlanError: It is too large for a home.
+        """
         column, row, end = int(runs[:, 0].min()), int(runs[:, 1].min()), runs[:, 0] + runs[:, 2]
         box = cls(column, row, int(end.max()) - column, int(runs[:, 1].max()) + 1 - row)
         if box.columns * box.rows > MAX_PIXELS:
@@ -89,7 +95,7 @@ def checked_map(content: dict[str, Any]) -> dict[str, Any]:
     if version != VERSION:
         raise FloorPlanError(
             f"version {version!r} of Valetudo's map format is not known: this Fleet2D reads"
-            f" {VERSION}; a newer Valetudo writes it"
+            f" {VERSION}; save the map with a Valetudo that writes it"
         )
     return content
 
@@ -109,6 +115,23 @@ def pixel_side(content: dict[str, Any]) -> float:
             f"pixelSize is {size:g}: {MIN_PIXEL_CM} to {MAX_PIXEL_CM} cm is expected (5 is usual)"
         )
     return size / CM_PER_M
+
+
+def note_size(content: dict[str, Any], box: Box, notes: list[str]) -> None:
+    """Say if the pixels in `box` go beyond the size that the map states [cm]."""
+    size = content.get("size")
+    if size is None:
+        return
+    sides: list[Any] = [size.get("x"), size.get("y")] if isinstance(size, dict) else []
+    if not sides or any(type(n) not in (int, float) or not 0 < n < float("inf") for n in sides):
+        raise FloorPlanError(f"size is {_shown(size)}: x and y in centimetres are expected")
+    columns, rows = (n / CM_PER_M / pixel_side(content) for n in sides)
+    right, bottom = box.column + box.columns, -box.row
+    if min(box.column, -(box.row + box.rows)) < 0 or right > columns + 1 or bottom > rows + 1:
+        notes.append(
+            f"its pixels reach beyond its size of {sides[0]:g} x {sides[1]:g} cm: is a layer"
+            " damaged?"
+        )
 
 
 def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], str]]:
@@ -150,7 +173,7 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[Layer]:
 def _segment_name(layer: dict[str, Any], number: int) -> tuple[str, bool]:
     name = _meta(layer).get("name")
     if isinstance(name, str) and name.strip():
-        return name.strip(), True
+        return unicodedata.normalize("NFC", " ".join(name.split())), True
     return f"segment_{_meta(layer).get('segmentId', number)}", False
 
 
@@ -193,6 +216,7 @@ def _whole_numbers(
 
 
 def entities_of(content: dict[str, Any], kind: str) -> Iterator[tuple[dict[str, Any], str]]:
+    """Return the entities of a type, and how to name each in an error."""
     return ((e, where) for e, where in objects_in(content, "entities") if e.get("type") == kind)
 
 
@@ -213,6 +237,7 @@ def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
 
 
 def read_charger(content: dict[str, Any]) -> tuple[float, float] | None:
+    """Return where the first charger is (x, y) [m], if the map has one."""
     for entity, where in entities_of(content, "charger_location"):
         for x, y in read_points(entity, where)[:1].tolist():
             return x, y
