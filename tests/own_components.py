@@ -6,6 +6,7 @@ from datetime import timedelta
 from typing import Any
 
 import numpy as np
+from pydantic import PrivateAttr
 
 from fleet2d import (
     Algorithm,
@@ -141,3 +142,48 @@ class Impatient(Algorithm):
         self.lived_to_see.append("second")
         signal.raise_signal(signal.SIGINT)
         self.lived_to_see.append("nothing of this")
+
+
+class Keeper(Algorithm):
+    """Counts in an array and a list of its own, and puts out the array itself."""
+
+    _seen: list[int] = PrivateAttr(default_factory=list)
+
+    def start(self, home: Any) -> None:
+        self.count = np.zeros(1, np.int64)
+
+    def update(self, history: History, state: Present) -> dict[str, Any]:
+        self.count += 1
+        self._seen.append(state.step)
+        return {"n": self.count, "seen": len(self._seen)}
+
+
+class Peek(Algorithm):
+    """Looks at what another put out, without saying that it reads it."""
+
+    of: str = "keeper"
+
+    def update(self, history: History, state: Present) -> dict[str, Any]:
+        return {"seen": int(state.outputs[self.of]["n"][0]) if self.of in state.outputs else -1}
+
+
+class Scribbler(Behavior):
+    """Writes where it may only read."""
+
+    def decide(self, now: Situation) -> Plan:
+        now.outputs["mine"] = 1  # type: ignore[index]
+        return now.plan().stay()
+
+
+class Late(Algorithm):
+    """Has seen nobody in its first period."""
+
+    def update(self, history: History, state: Present) -> dict[str, Any]:
+        return {"user": ["ana"] if state.step > 100 else []}
+
+
+class Bad(Algorithm):
+    """Fails."""
+
+    def update(self, history: History, state: Present) -> None:
+        raise RuntimeError("no model today")

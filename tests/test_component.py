@@ -79,13 +79,35 @@ def errors(model: Any, data: object) -> dict[str, str]:
 
 
 def test_configuration_is_frozen() -> None:
-    with pytest.raises(ValidationError, match="frozen"):
+    with pytest.raises(AttributeError) as caught:
         Lamp().watts = 7
+    assert str(caught.value) == (
+        "watts is configuration of Lamp and can't be changed in a run; keep what changes in "
+        "another attribute"
+    )
 
 
 def test_class_variables_cannot_be_shadowed() -> None:
     with pytest.raises(AttributeError):
         Lamp().type_name = "torch"  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("field", "said"),
+    [
+        ("user = 'mia'", "Guard.user has no type: write `user: str = \"mia\"` for configuration, "
+                         "`user: ClassVar[str] = \"mia\"` for a constant"),
+        ("rest = None", "Guard.rest has no type: write `rest: str | None = None` for"),
+        ("rest = [1] * 99", "Guard.rest has no type: write `rest: list = …` for"),
+        ("watts = 7", "Guard.watts has no type: write `watts: int = 7` for"),
+        ("to: object.__class__.__call__ = 3", "Guard has a field that can't be configuration: "),
+    ],
+)  # fmt: skip
+def test_field_that_is_no_configuration_is_told_in_plain_words(field: str, said: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        exec(f"class Guard(Lamp):\n    {field}", {"Lamp": Lamp})
+    assert str(caught.value).startswith(said)
+    assert "BaseModel" not in str(caught.value)
 
 
 def test_run_state_is_free_copied_and_not_dumped() -> None:
@@ -205,9 +227,19 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
     ("name", "said"),
     [
         ("nowhere:Own", "no module named 'nowhere' in"),
-        ("own:Missing", "has no attribute 'Missing'"),
-        ("broken:Own", "ZeroDivisionError in its module"),
-        ("unparsable:Own", "SyntaxError in its module"),
+        ("own:Missing", "own.py has no class 'Missing'. It has: Own"),
+        ("own:Onw", "own.py has no class 'Onw': did you mean 'Own'? It has: Own"),
+        ("parts.own:Onw", "parts/own.py has no class 'Onw'"),
+        ("helpers:Own", "helpers.py has no class 'Own'. It defines no class"),
+        ("onw:Own", "or installed: did you mean 'own'?"),
+        ("parts.onw:Own", "did you mean 'parts.own'?"),
+        ("broken:Own", "can't import 'broken:Own': broken.py:1: ZeroDivisionError: division by"),
+        ("unparsable:Own", "can't import 'unparsable:Own': unparsable.py:1: SyntaxError: "),
+        ("needs:Own", "needs.py:2: ModuleNotFoundError: No module named 'nowhere'"),
+        ("wrong:Own", "wrong.py:1: ImportError: cannot import name 'X' from 'helpers'"),
+        ("untyped:Own", "untyped.py:2: TypeError: Own.user has no type: write `user: str ="),
+        ("later:Own", "'later:Own' has a field whose type can't be found"),
+        ("own.py:Own:x", "write module:Class"),
         ("pathlib:Path", "'pathlib:Path' is not a gadget"),
         ("fleet2d.component:Component", "is not a gadget"),
         ("fleet2d.floorplan.source:FloorPlanSource", "is not a gadget"),
@@ -219,10 +251,20 @@ def test_own_component_that_cannot_be_had_is_explained(
 ) -> None:
     (folders[0] / "broken.py").write_text("1 / 0")
     (folders[0] / "unparsable.py").write_text("class Own(")
+    (folders[0] / "needs.py").write_text("import sys\nimport nowhere")
+    (folders[0] / "wrong.py").write_text("from .helpers import X")
+    head = "from fleet2d.component import Component\nclass Own(Component):\n    "
+    (folders[0] / "untyped.py").write_text(f"{head}user = 'mia'")
+    (folders[0] / "later.py").write_text(
+        f"from __future__ import annotations\n{head}kind: ClassVar[str] = 'gadget'\n    user: Nowhere".replace(
+            "class Own", "from typing import ClassVar\nclass Own"
+        )
+    )
 
     with pytest.raises(ScenarioError) as caught:
         lookup("gadget", Text(name, folders[0]))
     assert said in str(caught.value)
+    assert "fleet2d_scenario" not in str(caught.value)
     assert str(folders[0]) not in sys.path
 
 

@@ -444,6 +444,16 @@ def test_a_module_that_fails_to_import_is_named(fleet2d: Cli) -> None:
     assert not Path("run").exists()
 
 
+def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
+    Path("mine.py").write_text("x = 1\ny = z\n")
+    users = {"ana": {"type": "mine:Walk"}, "bob": "mine:Sit"}
+    scenario_file = written(small(users=users, algorithms={"a": "mine:Count"}))
+    code, _, err = fleet2d("validate", scenario_file)
+    assert 2 == code
+    assert 1 == err.count("NameError")
+    assert "users.ana.type: can't import 'mine:Walk': mine.py:2: NameError: name 'z'" in err
+
+
 # --- The command line itself -------------------------------------------------------------------
 
 
@@ -457,6 +467,11 @@ def test_a_module_that_fails_to_import_is_named(fleet2d: Cli) -> None:
         (["run", "home.yaml", "simulation..x=1"], ["key is empty"]),
         (["run", "home.yaml", "simulation.durations=1 h"], ["durations", "did you mean 'duration'"]),
         (["run", "home.yaml", "users.ana.speed=fast"], ["users.ana.speed=fast", "a speed is wanted"]),
+        (["validate", "home.yaml", "robots.asto.speed=0.3"], ["there is no robots.asto", "did you mean 'astro'"]),
+        (["validate", "home.yaml", "robots.astro.camera.range=4.5"], ["a list is wanted, like [0"]),
+        (["validate", "floorplan=nope.json"], ["to read a file write {type: houseexpo, path: nope.json}"]),
+        (["validate", "floorplan.path=he.json"], ["unknown key 'path'", "a key of houseexpo", "give floorplan.type, too"]),
+        (["validate", "robots.astro.dwell=5 min"], ["unknown key 'dwell'", "robots.astro.behaviors.0.dwell"]),
         (["run", "home.yaml", "users.bob=null"], ["users.bob", "none of this name", "ana"]),
         (["run", "home.yaml", "robots.astro.behaviors.3.dwell=5"], ["behaviors.3"]),
         (["run", "home.yaml", "other.yaml"], ["'other.yaml'", "no '='"]),

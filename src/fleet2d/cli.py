@@ -2,9 +2,11 @@
 
 import json
 import os
+import re
 import sys
 import time
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
@@ -70,7 +72,15 @@ def run(
     settings = {} if seed is None else {"seed": seed}
     loaded = load_scenario(scenario, *overrides, **settings)
     name = loaded.name or (Path(scenario).stem if scenario else "run")
-    simulation = Simulation(loaded, out=out or _fresh_directory(name))
+    directory = out or _fresh_directory(name)
+    try:
+        simulation = Simulation(loaded, out=directory)
+    except BaseException:
+        if out is None:
+            with suppress(OSError):
+                directory.rmdir()
+                directory.parent.rmdir()  # if it was the first run here
+        raise
     try:
         stored = _run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
     except KeyboardInterrupt:
@@ -220,18 +230,29 @@ def _split(arguments: list[str] | None) -> tuple[str | None, list[str]]:
 
 
 def _fresh_directory(name: str) -> Path:
-    """Return runs/NAME-001, or the first number that is free."""
+    """Make and return runs/NAME-001, or the first number that is free."""
+    plain = re.sub(r"[^\w.-]+", "-", name).strip(".-") or "run"
     number = 1
-    while (directory := Path("runs") / f"{name}-{number:03d}").exists():
-        number += 1
-    return directory
+    while True:
+        directory = Path("runs") / f"{plain}-{number:03d}"
+        try:
+            directory.mkdir(parents=True)  # so that a run started beside this one takes the next
+        except FileExistsError:
+            number += 1
+        except OSError as error:
+            raise RunDirectoryError(
+                f"{directory} can't be made: {error.strerror}; name another directory by --out"
+            ) from error
+        else:
+            return directory
 
 
 def _announce_compilation() -> None:
     from fleet2d.kernels._jit import cache_directory
 
     if not cache_directory().exists():
-        typer.echo("compiling the kernels, once on this machine (about 10 s) …", err=True)
+        text = "compiling the kernels, once on this machine: 10 to 20 s of this first run …"
+        typer.echo(text, err=True)
 
 
 def _run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
@@ -290,9 +311,9 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
     )
     table = Table("metric", "of", "value", "", show_edge=False)
     for metric, result in summary["metrics"].items():
-        unit = _unit_of(stored, metric)
+        of = unit = _unit_of(stored, metric)
         for name, value in _flat(result):
-            shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+            shown = _shown(value, unit or of)
             table.add_row(metric, name, shown, unit)
             metric = unit = ""
     if table.row_count:
@@ -301,6 +322,15 @@ def _print_summary(summary: dict[str, Any], stored: "Run") -> None:
         console.print(f"note: {note}", highlight=False)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
     console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True)
+
+
+def _shown(value: Any, unit: str) -> str:
+    """Return a number as people read it: shares in percent, few digits."""
+    if not isinstance(value, float):
+        return str(value)
+    if unit.startswith("share"):
+        return f"{100 * value:.1f} %" if value >= 0.001 or value == 0 else "< 0.1 %"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
 def _unit_of(stored: "Run", metric: str) -> str:

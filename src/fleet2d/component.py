@@ -18,6 +18,7 @@ import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from pathlib import PurePath
 from typing import Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -33,9 +34,10 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
+from fleet2d.component_class import ComponentClass
 from fleet2d.errors import ScenarioError
-from fleet2d.outside import import_class, written_path
-from fleet2d.problems import did_you_mean, problem, problem_at, rewritten, unknown_key
+from fleet2d.outside import BrokenModule, import_class, written_path
+from fleet2d.problems import did_you_mean, problem, problem_at, rewritten, shown, unknown_key
 
 PACKAGES = {
     "floorplan": "fleet2d.floorplan",
@@ -59,12 +61,22 @@ class Settings(BaseModel):
         try:
             return handler(data)
         except ValidationError as error:
-            raise rewritten(error, cls._explain_unknown_key) from None
+            raise rewritten(error, lambda line: cls._explain(line, data)) from None
 
     @classmethod
-    def _explain_unknown_key(cls, line: InitErrorDetails) -> InitErrorDetails:
-        if line["type"] == "extra_forbidden" and len(line["loc"]) == 1:
-            line["type"] = unknown_key(line["loc"][0], cls.model_fields)
+    def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:
+        """Say which keys are known, and how the list is written that a key wants."""
+        kind, (key, *inner) = line["type"], line["loc"] or ("",)
+        if kind == "extra_forbidden" and not inner:
+            line["type"] = unknown_key(key, cls.model_fields)
+        absent = kind == "missing" and len(inner) == 1 and isinstance(inner[0], int)
+        if absent or (kind in ("tuple_type", "too_short", "too_long") and not inner):
+            example = _example(cls, str(key))
+            if example and isinstance(data, Mapping):
+                line["type"] = problem(
+                    f"found {shown(data.get(key))}; a list is wanted, like {example}"
+                )
+                line["loc"] = (key,)
         return line
 
     def __eq__(self, other: object) -> bool:
@@ -74,7 +86,17 @@ class Settings(BaseModel):
         )
 
 
-class Component(Settings):
+def _example(cls: type[Settings], key: str) -> str:
+    """Write a key's example, else its default, if that is a list of numbers."""
+    field = cls.model_fields.get(key)
+    values = (field.examples or [field.default])[0] if field else None
+    if not isinstance(values, tuple | list) or not values:
+        return ""
+    plain = all(isinstance(value, int | float) for value in values)
+    return f"[{', '.join(f'{value:g}' for value in values)}]" if plain else ""
+
+
+class Component(Settings, metaclass=ComponentClass):
     """A part of a scenario that a ``type`` selects.
 
     Declared fields are configuration and frozen. Anything else that is assigned on an instance is
@@ -99,8 +121,13 @@ class Component(Settings):
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to change configuration; keep everything else as run state."""
         cls = type(self)
-        declared = name in cls.model_fields or name in cls.__private_attributes__
-        if declared or name in cls.__class_vars__:
+        if name in cls.model_fields or name in cls.__class_vars__:
+            what = "configuration" if name in cls.model_fields else "a ClassVar"
+            raise AttributeError(
+                f"{name} is {what} of {cls.__name__} and can't be changed in a run; keep what "
+                "changes in another attribute"
+            )
+        if name in cls.__private_attributes__:
             super().__setattr__(name, value)
         else:
             object.__setattr__(self, name, value)
@@ -159,6 +186,12 @@ def lookup(kind: str, name: str) -> type[Component]:
         cls.type_name = name
         return cls
     known = sorted(components(kind))
+    by_suffix = {".json": "houseexpo", ".yaml": "ros", ".yml": "ros"}
+    reader = by_suffix.get(PurePath(name).suffix.lower())
+    if kind == "floorplan" and reader in known:
+        raise ScenarioError(
+            f"there is no floorplan {name!r}: to read a file write {{type: {reader}, path: {name}}}"
+        )
     raise ScenarioError(
         f"there is no {kind} {name!r}{did_you_mean(name, [*known, *_ALIASES.get(kind, ())])} "
         f"There are: {', '.join(known) or 'none'}; your own is written 'package.module:Class'"
@@ -210,6 +243,11 @@ def _checked(kind: str, name: str, found: object) -> type[Component]:
             f"{name!r} is not a {kind}: it must be a class derived from the "
             f"{kind} base class of fleet2d"
         )
+    if not found.__pydantic_complete__ and found.model_rebuild(raise_errors=False) is not True:
+        raise ScenarioError(
+            f"{name!r} has a field whose type can't be found: import it in its module, not only "
+            "for type checkers"
+        )
     if missing := sorted(getattr(found, "__abstractmethods__", ())):
         raise ScenarioError(f"{name!r} is not a whole {kind}: it lacks {', '.join(missing)}")
     return found
@@ -243,7 +281,8 @@ class OneOf:
                 raise ScenarioError(f"'type' is needed to tell which {self.kind} this is: {known}")
             cls = lookup(self.kind, name)
         except ScenarioError as error:
-            raise problem_at(("type",), str(error), name) from error
+            once = error.why if isinstance(error, BrokenModule) else ""
+            raise problem_at(("type",), str(error), name, once) from error
         return cls.model_validate(fields, context=info.context)
 
     def dump(self, value: Component, info: SerializationInfo) -> dict[str, Any]:

@@ -2,7 +2,9 @@
 
 import hashlib
 import importlib
+import re
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,8 +13,18 @@ from typing import Any
 
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
+from fleet2d.problems import did_you_mean
 
+_PREFIX = "fleet2d_scenario_"
 _FOLDERS: dict[str, Path] = {}  # the package that stands for a scenario's folder -> the folder
+
+
+class BrokenModule(ScenarioError):
+    """A module that fails while it is imported; ``why`` says where, for all that it defines."""
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(f"can't import {name!r}: {why}")
+        self.why = why
 
 
 @contextmanager
@@ -35,25 +47,81 @@ def importable(folder: Path) -> Iterator[None]:
 
 
 def import_class(name: str) -> object:
-    """Import what 'folder/package.module:Class' names."""
+    """Import what 'folder/package.module:Class' names.
+
+    Raises:
+        BrokenModule: the module fails while it is imported.
+        ScenarioError: there is no such module, or no such class in it.
+    """
     path, _, qualname = name.rpartition(":")
     written, slash, module_name = path.rpartition("/")
     folder = (folder_of(name) / (written + slash)).resolve()
+    if not all(part.isidentifier() for part in (*module_name.split("."), *qualname.split("."))):
+        raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
     try:
-        found: Any = _import_module(folder, module_name)
-        for part in qualname.split("."):
-            found = getattr(found, part)
-    except ModuleNotFoundError as error:
-        raise ScenarioError(
-            f"can't import {name!r}: no module named {error.name!r} in {folder} or installed"
-        ) from error
-    except AttributeError as error:
-        raise ScenarioError(f"can't import {name!r}: {error}") from error
+        module = _import_module(folder, module_name)
     except Exception as error:  # whatever the user's module does while it is imported
-        raise ScenarioError(
-            f"can't import {name!r}: {type(error).__name__} in its module: {error}"
-        ) from error
+        missing = _public(error.name or "") if isinstance(error, ModuleNotFoundError) else ""
+        if missing and f"{module_name}.".startswith(f"{missing}."):
+            raise ScenarioError(
+                f"can't import {name!r}: no module named {missing!r} in {folder} or installed"
+                f"{did_you_mean(module_name, _modules(folder, module_name))}"
+            ) from error
+        raise BrokenModule(name, _failure(error, folder)) from error
+    found: Any = module
+    for part in qualname.split("."):
+        if not hasattr(found, part):
+            raise ScenarioError(_no_class(module, qualname, folder))
+        found = getattr(found, part)
     return found
+
+
+def _public(text: str) -> str:
+    """Write the modules in a text as users know them, without the package for their folder."""
+    return re.sub(rf"\b{_PREFIX}[0-9a-f]+\.", "", text)
+
+
+def _modules(folder: Path, name: str) -> list[str]:
+    """Return the names of the modules beside the one that is named."""
+    *packages, _ = name.split(".")
+    files = sorted(folder.joinpath(*packages).glob("*.py"))
+    packed = sorted(folder.joinpath(*packages).glob("*/__init__.py"))
+    names = [*(file.stem for file in files), *(file.parent.name for file in packed)]
+    return [".".join((*packages, found)) for found in names if found != "__init__"]
+
+
+def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
+    """Say that a class isn't in its module, and which are."""
+    file = getattr(module, "__file__", None)
+    shown = _shown(file, folder) if file else f"the module {_public(module.__name__)}"
+    names = [
+        name
+        for name, value in vars(module).items()
+        if isinstance(value, type) and value.__module__ == module.__name__ and name[0] != "_"
+    ]
+    has = f"It has: {', '.join(names)}" if names else "It defines no class"
+    return f"{shown} has no class {qualname!r}{did_you_mean(qualname, names)} {has}"
+
+
+def _failure(error: Exception, folder: Path) -> str:
+    """Say where in the user's files an import failed, and how."""
+    what = f"{type(error).__name__}: {_public(str(error))}"
+    if isinstance(error, SyntaxError) and error.filename:
+        return (
+            f"{_shown(error.filename, folder)}:{error.lineno}: {type(error).__name__}: {error.msg}"
+        )
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not frame.filename.startswith("<") and frame.filename != __file__
+    ]
+    own = [frame for frame in frames if Path(frame.filename).is_relative_to(folder)] or frames
+    return f"{_shown(own[-1].filename, folder)}:{own[-1].lineno}: {what}" if own else what
+
+
+def _shown(file: str, folder: Path) -> str:
+    path = Path(file)
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else file
 
 
 def _import_module(folder: Path, name: str) -> ModuleType:
@@ -71,7 +139,7 @@ def _import_module(folder: Path, name: str) -> ModuleType:
 
 def _folder_package(folder: Path) -> str:
     """Return the name of a package whose modules are those in ``folder``."""
-    name = f"fleet2d_scenario_{hashlib.sha256(str(folder).encode()).hexdigest()[:16]}"
+    name = f"{_PREFIX}{hashlib.sha256(str(folder).encode()).hexdigest()[:16]}"
     if name not in _FOLDERS:
         package = ModuleType(name)
         package.__path__ = [str(folder)]

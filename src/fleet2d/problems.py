@@ -12,15 +12,20 @@ Location = tuple[int | str, ...]
 _PYDANTIC_ERRORS = frozenset(get_args(core_schema.ErrorType))
 
 
-def problem(message: str) -> PydanticCustomError:
-    """Make the error that a validator raises to say ``message`` about its value, word for word."""
-    return PydanticCustomError("problem", "{message}", {"message": message})
+def problem(message: str, once: str = "") -> PydanticCustomError:
+    """Make the error that a validator raises to say ``message`` about its value, word for word.
+
+    Of several with the same ``once``, only the first is told.
+    """
+    return PydanticCustomError("problem", "{message}", {"message": message, "once": once})
 
 
-def problem_at(location: Location, message: str, found: object = None) -> ValidationError:
+def problem_at(
+    location: Location, message: str, found: object = None, once: str = ""
+) -> ValidationError:
     """Make the error that a validator raises about a key below its own value."""
     return ValidationError.from_exception_data(
-        "", [InitErrorDetails(type=problem(message), loc=location, input=found)]
+        "", [InitErrorDetails(type=problem(message, once), loc=location, input=found)]
     )
 
 

@@ -50,8 +50,8 @@ def test_the_factor_is_held_within_two_percent(
     simulation = fleet2d.Simulation(content(f"{duration_s} s", speedup))
     began = wall.now
     simulation.advance(10**9)
-    # The last look may come just before the end.
-    slack = 3 * look_s
+    # Setting up, going on, and the last nap each take a look or two.
+    slack = 6 * look_s
     assert duration_s / speedup == pytest.approx(wall.now - began, rel=0.02, abs=slack)
 
 

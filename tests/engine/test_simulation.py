@@ -9,7 +9,7 @@ import pytest
 from tests.scenes import OWN, digests, everything, run, scenario, table
 
 import fleet2d
-from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
+from fleet2d.errors import ArtifactError, ComponentError, InputError, RunDirectoryError
 
 
 def small(duration: str = "10 min", **sections: Any) -> dict[str, Any]:
@@ -46,12 +46,17 @@ def test_advancing_beyond_the_end_stops_at_the_end() -> None:
     assert "complete" == simulation.finish().status
 
 
-def test_running_until_a_past_time_does_nothing() -> None:
+def test_time_only_goes_forward() -> None:
     simulation = fleet2d.Simulation(small())
     simulation.advance(100)
     for when in (50, timedelta(seconds=3), datetime(2026, 1, 5, 6)):
-        simulation.run_until(when)
-        assert 100 == simulation.step
+        with pytest.raises(InputError, match="it is step 100 already"):
+            simulation.run_until(when)
+    with pytest.raises(InputError, match="only goes forward"):
+        simulation.advance(-3)
+    with pytest.raises(TypeError):
+        simulation.advance(1.5)  # type: ignore[arg-type]
+    assert 100 == simulation.step
 
 
 def test_a_run_finished_early_is_interrupted_and_whole_until_then() -> None:
@@ -68,9 +73,63 @@ def test_a_run_finished_early_is_interrupted_and_whole_until_then() -> None:
 def test_a_finished_run_can_not_go_on() -> None:
     simulation = fleet2d.Simulation(small())
     simulation.advance(1)
-    simulation.finish()
-    with pytest.raises(ArtifactError, match="closed"):
+    stored = simulation.finish()
+    for go_on in (simulation.run, simulation.advance):
+        with pytest.raises(InputError, match="finished"):
+            go_on()
+    assert stored is simulation.finish()
+
+
+def test_a_scenario_run_twice_runs_the_same_twice() -> None:
+    content = small(algorithms={"keeper": {"type": f"{OWN}:Keeper", "period": "1 min"}})
+    loaded = fleet2d.load_scenario(content)
+    first, second = fleet2d.run(loaded), fleet2d.run(loaded)
+    assert first.digest == second.digest
+
+
+def test_what_an_algorithm_put_out_does_not_change_with_its_own_arrays() -> None:
+    both = {
+        "keeper": {"type": f"{OWN}:Keeper", "period": "1 min"},
+        "peek": {"type": f"{OWN}:Peek", "period": "1 min", "of": "keeper"},
+    }
+    found = []
+    for order in (("keeper", "peek"), ("peek", "keeper")):
+        stored = run(small(algorithms={name: both[name] for name in order}))
+        found.append(stored.tables["peek"]["seen"].to_pylist())
+    assert found[0] == found[1]
+    assert [-1, 1, 2] == found[0][:3]
+
+
+def test_nobody_writes_into_the_outputs() -> None:
+    content = {**small(), "users": {"ben": {"type": f"{OWN}:Scribbler"}}}
+    with pytest.raises(ComponentError, match="TypeError"):
+        run(content)
+
+
+def test_nothing_seen_yet_does_not_fix_the_columns() -> None:
+    content = small(algorithms={"late": {"type": f"{OWN}:Late", "period": "1 min"}})
+    table = run(content).tables["late"]
+    assert {"ana"} == set(table["user"].to_pylist())
+
+
+def test_a_failed_run_says_why() -> None:
+    content = small(algorithms={"bad": {"type": f"{OWN}:Bad", "period": "1 min"}})
+    simulation = fleet2d.Simulation(content)
+    with pytest.raises(ComponentError):
         simulation.run()
+    stored = simulation.finish()
+    assert "failed" == stored.status
+    assert any("algorithms.bad" in note and "own_components.py" in note for note in stored.notes)
+
+
+def test_a_span_that_broke_off_is_never_complete() -> None:
+    content = small(algorithms={"bad": {"type": f"{OWN}:Bad", "period": "1 min"}})
+    simulation = fleet2d.Simulation(content)
+    with pytest.raises(ComponentError):
+        simulation.advance(600)
+    with pytest.raises(InputError, match="broke off"):
+        simulation.advance(600)
+    assert "failed" == simulation.finish().status
 
 
 def test_outputs_of_algorithms_can_be_looked_at() -> None:

@@ -1,6 +1,7 @@
 """The engine's main test: how a run is cut into spans, where, and beside what, never shows."""
 
 import copy
+import functools
 import json
 import os
 from datetime import timedelta
@@ -13,6 +14,7 @@ from tests.scenes import OWN, digests, every_step, everything, process, run, tab
 
 import fleet2d
 from fleet2d.artifacts.reader import Run
+from fleet2d.artifacts.store import RunStore
 
 GOLDEN = Path(__file__).parents[1] / "golden.json"
 SPANS = [None, 3600, 7, 1]
@@ -51,6 +53,19 @@ def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> No
     other = run(everything(), max_span=span)
     assert digests(whole) == digests(other)
     assert whole.metrics == other.metrics
+
+
+@pytest.mark.parametrize(("steps", "gathered", "rows"), [(64, 50, 97), (1000, 1, 1), (7, 3000, 8)])
+def test_every_table_is_the_same_however_rows_are_gathered_and_stored(
+    whole: Run, monkeypatch: pytest.MonkeyPatch, steps: int, gathered: int, rows: int
+) -> None:
+    """Blocks of poses, rows on their way to the store and row groups all end somewhere else."""
+    monkeypatch.setattr("fleet2d.engine.buckets.BLOCK_VALUES", 1)
+    monkeypatch.setattr("fleet2d.engine.buckets.LEAST_STEPS", steps)
+    monkeypatch.setattr("fleet2d.engine.recorder.GATHERED", gathered)
+    store = functools.partial(RunStore, flush_rows=rows)
+    monkeypatch.setattr("fleet2d.engine.simulation.RunStore", store)
+    assert digests(whole) == digests(run(everything()))
 
 
 def test_an_algorithm_after_every_step_sees_the_same_for_every_max_span() -> None:

@@ -18,10 +18,10 @@ from fleet2d.kernels.look import (
     USER_LOST,
     USER_SEEN,
     Crowd,
+    Detections,
     Lens,
     Memory,
     SightEvents,
-    Sightings,
     in_wedge,
     look,
 )
@@ -79,7 +79,7 @@ def looked(
     robot = Poses(x, y, heading, away.astype(np.uint8))
     user_x, user_y, user_away = (np.ascontiguousarray(scene.users[..., i]) for i in range(3))
     room = scene.users.shape[0] * len(x)
-    sightings = Sightings(*(np.full(room, -7, dtype) for dtype in _SIGHTINGS))
+    sightings = Detections(*(np.full(room, -7, dtype) for dtype in _SIGHTINGS))
     events = SightEvents(*(np.full(room, -7, dtype) for dtype in _EVENTS))
     done, found, happened = look(
         home.mesh,

@@ -11,11 +11,17 @@ from fleet2d.scenario.document import read_document
 from fleet2d.scenario.model import load_scenario
 from fleet2d.scenario.schema import schema
 
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.yaml"))
 
-@pytest.mark.parametrize("file", sorted(BUNDLED.glob("*.yaml")), ids=lambda file: file.stem)
-def test_bundled_scenario_loads_and_conforms_to_the_schema(file: Path) -> None:
+
+@pytest.mark.parametrize("file", [*sorted(BUNDLED.glob("*.yaml")), *EXAMPLES], ids=lambda f: f.stem)
+def test_file_that_we_ship_conforms_to_the_schema(file: Path) -> None:
     written = json.dumps(read_document(file).data, default=str)  # an editor sees dates as text
     jsonschema.validate(json.loads(written), schema())
+
+
+@pytest.mark.parametrize("file", sorted(BUNDLED.glob("*.yaml")), ids=lambda file: file.stem)
+def test_bundled_scenario_loads(file: Path) -> None:
     scenario = load_scenario(f"bundled:{file.stem}")
 
     assert scenario == load_scenario(scenario.resolved())
@@ -52,6 +58,7 @@ def test_resolved_scenario_conforms_to_the_schema() -> None:
         {"simulatoin": {}},
         {"users": {"ana": {"type": "meander", "stops": []}}},
         {"robots": {"astro": {"behaviors": [{"type": "nowhere"}]}}},
+        {"robots": {"astro": "meandr"}},
     ],
 )
 def test_schema_refuses_what_loading_refuses(wrong: object) -> None:

@@ -137,14 +137,15 @@ def test_text_keeps_the_folder_of_the_file_it_came_from(
 
 
 def test_places_follow_what_was_merged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write(tmp_path, base="simulation:\n  seed: 1\n  step: 1 s\nusers: {}")
+    write(tmp_path, base="simulation:\n  seed: 1\n  step: 1 s\nusers: {ana: drift}")
     write(tmp_path, home="extends: base.yaml\nsimulation:\n  seed: 2")
     monkeypatch.chdir(tmp_path)
     document = compose("home.yaml", ["users.ana.radius=1"], {("simulation", "speedup"): 3})
 
     assert "home.yaml:3" == document.place(("simulation", "seed"))
     assert "base.yaml:3" == document.place(("simulation", "step"))
-    assert "override 'users.ana.radius=1'" == document.place(("users", "ana"))
+    assert "override 'users.ana.radius=1'" == document.place(("users", "ana", "radius"))
+    assert "base.yaml:4" == document.place(("users", "ana"))
     assert "argument speedup=3" == document.place(("simulation", "speedup"))
 
 
@@ -190,9 +191,54 @@ def test_extending_what_is_not_there_is_refused(
 def test_bundled_scenario_is_found_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: Any
 ) -> None:
-    monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path, base="name: x"))
+    monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path, base="artifacts: {a: 1}"))
 
-    assert {"name": "x"} == compose(source).data
+    assert {"artifacts": {"a": 1}} == compose(source).data
+
+
+def test_name_is_not_inherited(tmp_path: Path) -> None:
+    write(tmp_path, base="name: base\nusers: {ana: drift}", home="extends: base.yaml")
+    write(tmp_path, own="extends: base.yaml\nname: mine")
+
+    assert "name" not in compose(tmp_path / "home.yaml").data
+    assert "mine" == compose(tmp_path / "own.yaml").data["name"]
+    assert "base" == compose(tmp_path / "base.yaml", ["users.ana.sigma=1"]).data["name"]
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("robots.asto.speed=0.3", "override 'robots.asto.speed=0.3': there is no robots.asto: did "
+         "you mean 'astro'? There are: astro; to add one give robots.asto.type, too"),
+        ("users.anna.camera.range=[0, 3]", "there is no users.anna: did you mean 'ana'?"),
+        ("algorithms.cuont.margin=1", "did you mean 'count'? There are: count;"),
+        ("metrics.tally.of=x", "there is no metrics.tally. There are: none; to add one"),
+    ],
+)  # fmt: skip
+def test_override_inside_an_entry_that_is_not_there_is_refused(override: str, said: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        compose(BASE, [override])
+    assert said in str(caught.value)
+
+
+def test_setting_inside_an_entry_that_is_not_there_is_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"there is no robots.asto: did you mean 'astro'"):
+        compose(BASE, (), {("robots", "asto", "speed"): 0.3})
+
+
+@pytest.mark.parametrize(
+    ("overrides", "entry"),
+    [
+        (["robots.bolt=drift"], "drift"),
+        (["robots.bolt={radius: 0.1}"], {"radius": 0.1}),
+        (["robots.bolt={radius: 0.1}", "robots.bolt.speed=1"], {"radius": 0.1, "speed": 1}),
+        (["robots.bolt.speed=1", "robots.bolt.type=drift"], {"type": "drift", "speed": 1}),
+        (["robots.bolt.behaviors=[drift]"], {"behaviors": ["drift"]}),
+        (["robots={bolt: {}}", "robots.bolt.speed=1"], {"speed": 1}),
+    ],
+)
+def test_override_adds_an_entry_that_it_declares(overrides: list[str], entry: object) -> None:
+    assert entry == compose(BASE, overrides).data["robots"]["bolt"]
 
 
 @pytest.mark.parametrize(

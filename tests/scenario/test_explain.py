@@ -24,6 +24,8 @@ class Outer(Settings):
     flag: bool = False
     name: str = ""
     either: int | list[int] = 0
+    days: Literal["daily", "weekend"] | tuple[Literal["daily", "weekend"], ...] = "daily"
+    span: tuple[float, float] = (0.0, 4.5)
     entries: dict[str, int] = Field(default={})
 
     @model_validator(mode="after")
@@ -41,13 +43,19 @@ class Outer(Settings):
         ({"inner": {"size": 10}}, "a.yaml:2: inner.size: found 10; 9 or less is wanted"),
         ({"inner": 3}, "a.yaml:2: inner: found 3; a mapping of keys is wanted"),
         ({"inner": None}, "a.yaml:2: inner: found nothing; a mapping of keys is wanted"),
-        ({"mode": "of"}, "a.yaml:1: mode: found 'of'; 'off' or 'on' is wanted"),
+        ({"mode": "of"}, "a.yaml:1: mode: found 'of': did you mean 'off'? 'off' or 'on' is wanted"),
         ({"flag": "maybe"}, "a.yaml:1: flag: found 'maybe'; true or false is wanted"),
         ({"name": {"a": 1}}, "a.yaml:1: name: found a mapping of a; text is wanted"),
         ({"name": ["x" * 90]}, f"a.yaml:1: name: found ['{'x' * 55}...; text is wanted"),
         ({"name": "bad"}, "a.yaml:1: a bad name"),
-        ({"either": "x"}, "a.yaml:1: either: found 'x'; a whole number is wanted; or found 'x'; "
-                          "a list is wanted"),
+        ({"either": "x"}, "a.yaml:1: either: found 'x'; a whole number or a list is wanted"),
+        ({"days": "week-end"}, "a.yaml:1: days: found 'week-end': did you mean 'weekend'? 'daily' "
+                               "or 'weekend' or a list is wanted"),
+        ({"days": 3}, "a.yaml:1: days: found 3; 'daily' or 'weekend' or a list is wanted"),
+        ({"span": 4.5}, "a.yaml:1: span: found 4.5; a list is wanted, like [0, 4.5]"),
+        ({"span": [1, 2, 3]}, "a.yaml:1: span: found [1, 2, 3]; a list is wanted, like [0, 4.5]"),
+        ({"span": [1]}, "a.yaml:1: span: found [1]; a list is wanted, like [0, 4.5]"),
+        ({"span": [1, "x"]}, "a.yaml:1: span.1: found 'x'; a number is wanted"),
         ({"entries": {"a": "x"}}, "a.yaml:1: entries.a: found 'x'; a whole number is wanted"),
         ({"inner": {"sise": 1}}, "a.yaml:2: inner.sise: unknown key 'sise': did you mean 'size'? "
                                  "Allowed here: size"),

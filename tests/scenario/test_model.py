@@ -195,3 +195,22 @@ def test_scenario_is_frozen(home: Path) -> None:
 
     with pytest.raises(ValueError, match="frozen"):
         scenario.name = "x"
+
+
+def test_where_says_where_a_key_was_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("home.yaml").write_text(
+        "simulation: {duration: 1 h}\nfloorplan: empty\nusers:\n  ana:\n    type: tour\n"
+        "    stops:\n      - hall\n      - attic\n  ben:\n    behaviors:\n      - drift\n"
+        "      - type: tour\n        stops: [hall]\n"
+    )
+    scenario = load_scenario("home.yaml", "robots.astro=drift")
+
+    assert "home.yaml:8" == scenario.where("users.ana.stops.1")
+    assert "home.yaml:8" == scenario.where("users.ana.behaviors.0.stops.1")
+    assert "home.yaml:4" == scenario.where("users.ana.radius")
+    assert "home.yaml:13" == scenario.where("users.ben.behaviors.1.stops.0")
+    assert "override 'robots.astro=drift'" == scenario.where("robots.astro.speed")
+    assert "" == load_scenario(scenario.resolved()).where("users.ana")

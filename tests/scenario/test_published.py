@@ -465,7 +465,7 @@ def test_angle_beyond_a_turn_sees_all_round(folder: Path) -> None:
 def test_no_stride_stands_still(folder: Path) -> None:
     remarks, scenario = converted(folder, ("lin_speed: 0.1", "lin_speed: 0"))
     assert (
-        "users.user0.base.pose_config.meander_strategy.lin_speed: missing, 0 or below 0.001 m/s;"
+        "users.user0.base.pose_config.meander_strategy.lin_speed: missing, 0 or below 0.01 m/s;"
         " it stands still"
     ) in remarks
     simulation = fleet2d.Simulation(scenario)

@@ -32,13 +32,14 @@ def test_schema_completes_the_short_form(written: dict[str, Any]) -> None:
 
     assert {"type", "stops", "dwell", "radius", "speed"} <= set(tour["properties"])
     assert ["type"] == tour["required"]
+    assert {"type": "string", "enum": ["drift", "tour"]} in user[0]["anyOf"]
     assert "null" == user[1]["type"]
 
 
 def test_schema_offers_every_type_and_its_bare_name(written: dict[str, Any]) -> None:
     plans = written["$defs"]["floorplan"]["anyOf"]
 
-    assert {"const": "houseexpo"} == written["$defs"]["File"]["properties"]["type"]
+    assert {"enum": ["houseexpo", "he"]} == written["$defs"]["File"]["properties"]["type"]
     assert {"$ref": "#/$defs/File", "required": ["type"]} in plans
     assert {"type": "string", "enum": ["empty", "houseexpo", "he"]} in plans
 

@@ -1,5 +1,7 @@
 """The picture of a run: drawn for every kind of run, deterministic, and true to what was stored."""
 
+import json
+import re
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,15 +16,23 @@ from fleet2d.errors import ArtifactError, InputError
 
 pytest.importorskip("matplotlib")
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
 from fleet2d.sight.region import VisibleRegion
 from fleet2d.view.actogram import (
+    FAINTEST,
+    MARK_PART,
     NOT_SIMULATED,
+    draw_actogram,
     hours_shown,
+    mark_boxes,
     marks_by_day,
     room_color,
     rooms_by_day,
 )
-from fleet2d.view.life import field_of_view, telling_view
+from fleet2d.view.life import field_of_view, opacity, telling_view
 from fleet2d.view.run import draw_run
 from fleet2d.view.traces import Trace, trace_of
 
@@ -178,10 +188,153 @@ def test_actogram_has_the_rooms_of_every_minute() -> None:
     assert (0.0, 24.0) == hours_shown(rooms)
 
 
-def test_marks_are_where_the_user_was_seen() -> None:
-    seen = np.array([0, 299, 300, 86_399, 86_400])
+def test_marks_are_the_share_of_five_minutes_that_the_user_was_seen() -> None:
+    seen = np.array([0, 299, 300, 300, *range(600, 900), 86_399, 86_400])  # 300 by two robots
     marks = marks_by_day(seen, START, 1_000_000, 2)
-    assert [(0, 0), (0, 1), (0, 287), (1, 0)] == [tuple(at) for at in np.argwhere(marks).tolist()]
+    at = np.argwhere(marks > 0).tolist()
+    assert [[0, 0], [0, 1], [0, 2], [0, 287], [1, 0]] == at
+    assert [2, 1, 300, 1, 1] == np.rint(marks[marks > 0] * 300).astype(int).tolist()
+
+
+def test_a_step_longer_than_a_mark_fills_as_many_marks_as_it_lasts() -> None:
+    half_past = START.replace(hour=10, minute=32, second=30)
+    marks = marks_by_day(np.array([0]), half_past, 600_000_000, 1)
+    assert [126, 127, 128] == np.flatnonzero(marks[0]).tolist()
+    assert [0.5, 1.0, 0.5] == marks[0, 126:129].tolist()
+
+
+def test_no_sightings_leave_no_marks() -> None:
+    marks = marks_by_day(np.zeros(0, np.int64), START, 1_000_000, 3)
+    assert (3, 288) == marks.shape
+    assert 0 == len(mark_boxes(marks))
+
+
+def test_ink_of_the_marks_is_in_proportion_to_the_time_seen() -> None:
+    often = np.flatnonzero(np.arange(2 * 86_400) % 3_600 < 1_200)
+    seldom = np.flatnonzero(np.arange(2 * 86_400) % 3_600 < 30)
+    always = np.arange(2 * 86_400)
+    ink = {}
+    for seen in (seldom, often, always):
+        boxes = mark_boxes(marks_by_day(seen, START, 1_000_000, 2))
+        ink[len(seen)] = float(np.ptp(boxes, axis=1).prod(axis=1).sum())
+    full = ink[len(always)]
+    assert full == pytest.approx(48 * MARK_PART)
+    assert ink[len(often)] / full == pytest.approx(1 / 3)
+    assert ink[len(seldom)] / full == pytest.approx(30 / 3_600)
+
+
+def test_a_single_sighting_has_a_mark_of_the_least_height_in_its_row() -> None:
+    (box,) = mark_boxes(marks_by_day(np.array([86_400 + 43_200]), START, 1_000_000, 3), 0.1)
+    assert [12.0, 12.0 + 1 / 12] == pytest.approx([box[:, 0].min(), box[:, 0].max()])
+    assert [1.9 - MARK_PART * FAINTEST, 1.9] == pytest.approx([box[:, 1].min(), box[:, 1].max()])
+
+
+def test_ink_in_the_picture_is_in_proportion_too() -> None:
+    def darkness(share: float) -> float:
+        figure = Figure(figsize=(4, 4), dpi=100)
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0, 0, 1, 1))
+        plan = fleet2d.load_floorplan()
+        rooms = np.full((30, 1440), -1, np.int16)
+        marks = np.zeros((30, 288))
+        marks[:, ::4] = share
+        draw_actogram(plan, rooms, marks, START, axes, dates=False)
+        canvas.draw()
+        return float(255 - np.asarray(canvas.buffer_rgba())[..., :3].mean())
+
+    empty = darkness(0.0)
+    tenth, half, full = (darkness(share) - empty for share in (0.1, 0.5, 1.0))
+    assert full > 5
+    assert [0.1, 0.5] == pytest.approx([tenth / full, half / full], rel=0.1)
+
+
+def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot() -> None:
+    free = np.zeros((40, 40), np.bool_)
+    free[2:38, 2:38] = True
+    uniform = opacity(free * 7.0, free)
+    assert uniform[free].max() == pytest.approx(uniform[free].min())
+    assert 0.05 < uniform[20, 20] < 0.12
+    in_bed = free * 0.01
+    in_bed[5, 5] = 1e6
+    assert 0.3 < opacity(in_bed, free).max() <= 0.4
+    assert 0 == opacity(np.zeros((3, 3)), np.ones((3, 3), np.bool_)).max()
+
+
+def test_each_user_has_a_line_in_the_legend(tmp_path: Path) -> None:
+    scenario = fleet2d.load_scenario(None, "simulation.duration=3 h").resolved()
+    scenario["users"] = dict.fromkeys(("ana", "bo", "cleo"), MEANDER)
+    words = drawn(fleet2d.run(scenario), tmp_path)
+    assert all(f"ways of {name}" in words for name in ("ana", "bo", "cleo"))
+    assert "ways walked" in drawn(base(), tmp_path)
+
+
+def test_too_many_rings_are_left_out_and_that_is_said(tmp_path: Path) -> None:
+    few = drawn(base(), tmp_path)
+    assert "seen here by a robot" in few
+    assert "are not drawn" not in few
+    scenario = fleet2d.load_scenario(None, "simulation.duration=4 d").resolved()
+    scenario["users"] = {"ana": MEANDER}
+    many = drawn(fleet2d.run(scenario), tmp_path)
+    assert "seen here by a robot" not in many
+    assert "places where robots saw users are not drawn" in many
+
+
+def saved_plan(path: Path, width: float, height: float) -> dict[str, str]:
+    """Store a rectangular home as HouseExpo does; return the part of a scenario that names it."""
+    corners = [[0, 0], [width, 0], [width, height], [0, height], [0, 0]]
+    home = {
+        "id": path.stem,
+        "room_num": 0,
+        "bbox": {"min": [0, 0], "max": [width, height]},
+        "verts": corners,
+        "room_category": {},
+    }
+    path.write_text(json.dumps(home))
+    return {"type": "houseexpo", "path": str(path)}
+
+
+@pytest.mark.parametrize("size", [(1.9, 1.6), (6.0, 5.0), (30.0, 25.0), (25.0, 3.0), (3.0, 25.0)])
+def test_words_of_the_scale_are_above_the_legend(tmp_path: Path, size: tuple[float, float]) -> None:
+    run = fleet2d.run(
+        {
+            "simulation": {"duration": "30 min", "seed": 1},
+            "floorplan": saved_plan(tmp_path / "home.json", *size),
+            "users": {"ana": {**MEANDER, "radius": 0.2}},
+        }
+    )
+    draw_run(run, tmp_path / "run.svg")
+    places = re.findall(
+        r'<!-- (.*?) -->\s*<g [^>]*transform="translate\(([\d.]+) ([\d.]+)\)',
+        (tmp_path / "run.svg").read_text(),
+    )
+    (scale,) = (float(y) for words, _, y in places if re.fullmatch(r"\d+ m", words))
+    (legend,) = (float(y) for words, _, y in places if words == "ways walked")
+    assert legend - scale > 12  # points, from line to line
+
+
+def test_picture_of_a_narrow_home_is_narrower(tmp_path: Path) -> None:
+    widths = []
+    for number, size in enumerate([(10.0, 9.0), (5.0, 20.0)]):
+        scenario = {
+            "simulation": {"duration": "30 min", "seed": 1},
+            "floorplan": saved_plan(tmp_path / f"{number}.json", *size),
+            "users": {"ana": MEANDER},
+        }
+        draw_run(fleet2d.run(scenario), tmp_path / "run.png")
+        widths.append(imread(tmp_path / "run.png").shape[1])
+    assert 1600 == widths[0]
+    assert widths[1] < 1400
+
+
+def test_hash_that_names_a_plan_is_shortened(tmp_path: Path) -> None:
+    scenario = {
+        "simulation": {"duration": "30 min", "seed": 1},
+        "floorplan": saved_plan(tmp_path / f"{'2deaa98e' * 4}.json", 5, 4),
+        "users": {"ana": MEANDER},
+    }
+    words = drawn(fleet2d.run(scenario), tmp_path)
+    assert "30 minutes in 2deaa98e…" in words
+    assert "2deaa98e2" not in words
 
 
 def test_rooms_in_the_actogram_are_a_deeper_shade_of_the_plan() -> None:

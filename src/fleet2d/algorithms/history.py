@@ -148,10 +148,14 @@ class Log:
             stop = pieces[i + 1].first if i + 1 < len(pieces) else end
             begin, stop = max(first, piece.first), min(end, stop)
             if begin < stop:
-                skipped = begin - piece.first
+                here = slice(begin - first, stop - first)
+                if begin == piece.first:
+                    part = Poses(out.x[here], out.y[here], out.heading[here], out.away[here])
+                    piece.motion.trace(piece.first, piece.start, part)
+                    continue
                 part = empty_poses(stop - piece.first)
                 piece.motion.trace(piece.first, piece.start, part)
-                paste_poses(out, begin - first, part, slice(skipped, None))
+                paste_poses(out, here.start, part, slice(begin - piece.first, None))
         return out
 
     def seen(self, first: int, end: int) -> Observations:
@@ -187,7 +191,7 @@ class History:
         """Return the number of steps."""
         return self.end - self.first
 
-    @property
+    @cached_property
     def observations(self) -> Observations:
         """What the robots perceived."""
         return self.log.seen(self.first, self.end)

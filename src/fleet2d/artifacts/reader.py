@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
 
-    from fleet2d.engine.rebuild import Path as EntityPath
+    from fleet2d.engine.rebuild import Trajectory
     from fleet2d.floorplan.plan import FloorPlan
 
 
@@ -131,7 +131,7 @@ class Run:
     def plan(self, plan: FloorPlan) -> None:
         self._plan = plan
 
-    def path(self, entity: str, every: timedelta = timedelta(minutes=1)) -> EntityPath:
+    def path(self, entity: str, every: timedelta = timedelta(minutes=1)) -> Trajectory:
         """Return where a user or robot was, every so often, rebuilt exactly from key frames.
 
         Args:
@@ -262,7 +262,7 @@ def _state_notes(root: Path, manifest: Manifest, partial: list[Path]) -> list[st
         )
     if manifest.status == "interrupted":
         notes.append(f"{root} was interrupted: it holds what was stored until then")
-    if manifest.status == "failed" and not manifest.notes:
+    if manifest.status == "failed":
         notes.append(f"{root} failed: it holds what was stored until then")
     if partial:
         notes.append(f"cut off and not readable: {', '.join(path.name for path in partial)}")

@@ -1,5 +1,8 @@
 """Whose fault an error is: a component's, at a step."""
 
+import sys
+import traceback
+from pathlib import Path
 from typing import Any
 
 from fleet2d.errors import ArtifactError, ComponentError, InputError
@@ -39,4 +42,14 @@ class blame:  # noqa: N801  (used as a function)
             return
         what = str(error) if own else f"{type(error).__name__}: {error}"
         when = "when it was started" if self.step is None else f"at step {self.step}"
-        raise ComponentError(f"{self.path} failed {when}: {what}") from error
+        raise ComponentError(f"{self.path} failed {when}: {what}{_place(error)}") from error
+
+
+def _place(error: BaseException) -> str:
+    """Return where in a file outside Fleet2D an error arose: the user's own code."""
+    frames = traceback.extract_tb(error.__traceback__)
+    others = (str(Path(__file__).parents[1]), sys.prefix, sys.base_prefix, "<")
+    own = [f for f in frames if not f.filename.startswith(others)]
+    if not own:
+        return ""
+    return f" ({Path(own[-1].filename).name}:{own[-1].lineno}, in {own[-1].name}: {own[-1].line})"

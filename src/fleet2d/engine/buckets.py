@@ -9,11 +9,13 @@ from fleet2d.engine.streams import stream_key
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.plan import State
-from fleet2d.kernels.look import USER_LOST, USER_SEEN, Crowd, Memory, SightEvents, Sightings, look
+from fleet2d.kernels.look import USER_LOST, USER_SEEN, Crowd, Detections, Memory, SightEvents, look
 from fleet2d.kernels.motion import Poses
 
 # Poses of one block of steps: small enough to stay in a processor's cache.
 BLOCK_VALUES = 1 << 17
+# With many actors the work of a span outweighs the cache.
+LEAST_STEPS = 4096
 EVENT_NAMES = ("user_lost", "user_seen")
 
 I64 = NDArray[np.int64]
@@ -23,7 +25,7 @@ class PoseBlock:
     """The poses of all actors for the steps of a span, and for the step after it."""
 
     def __init__(self, actors: Sequence[Actor]) -> None:
-        self.capacity = max(64, BLOCK_VALUES // max(1, len(actors)))
+        self.capacity = max(LEAST_STEPS, BLOCK_VALUES // max(1, len(actors)))
         shape = (len(actors), self.capacity + 1)
         self.x, self.y, self.heading = (np.zeros(shape, np.int64) for _ in range(3))
         self.away = np.zeros(shape, np.uint8)
@@ -70,7 +72,7 @@ class Eye:
         )
         self.perceived = np.zeros((count, 2), np.int64)
         rows = capacity * max(1, count)
-        self.sightings = Sightings(
+        self.sightings = Detections(
             np.empty(rows, np.int64),
             np.empty(rows, np.int32),
             np.empty(rows, np.int64),

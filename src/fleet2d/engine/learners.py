@@ -1,8 +1,11 @@
 """Algorithms and metrics in a run: their order, when they are due, and what they put out."""
 
+import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -76,6 +79,11 @@ class Learners:
             self._add(name, f"metrics.{name}", metric)
         self._room_names = [room.name for room in home.rooms]
 
+    @property
+    def readable(self) -> Mapping[str, Any]:
+        """The outputs, for others to read."""
+        return MappingProxyType(self.outputs)
+
     def next_due(self) -> int | None:
         """Return the step before which somebody is due; None if there is nobody."""
         return min((learner.due for learner in self.all), default=None)
@@ -89,12 +97,14 @@ class Learners:
         fresh: dict[str, Any] = {}
         for learner in self.all:
             if learner.due == end:
-                reads = getattr(learner.component, "reads", fresh)  # metrics come last, and see all
+                component = learner.component  # metrics come last, and see all
+                reads = component.reads if isinstance(component, Algorithm) else fresh
                 seen = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
                 output = self._update(learner, end, log, seen)
                 learner.since = end
                 if isinstance(learner.component, Algorithm) and output is not None:
-                    fresh[learner.name] = output
+                    # A copy: a component may go on with its own arrays.
+                    fresh[learner.name] = copy.deepcopy(output)
         self.outputs = {**self.outputs, **fresh}  # a new one: who kept the old sees the old
 
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
@@ -106,7 +116,7 @@ class Learners:
                     self._update(learner, end, log, self.outputs)
                     learner.since = end
                 with blame(learner.path, end):
-                    results[learner.name] = learner.component.result()
+                    results[learner.name] = checked_result(learner.component.result())
         return results
 
     def _add(self, name: str, path: str, component: Algorithm | Metric) -> None:
@@ -116,12 +126,14 @@ class Learners:
                 f"{path}.period is {component.period}, which is no multiple of simulation.step"
                 f" ({self.clock.step_us / 1e6:g} s): choose a multiple"
             )
-        component = component.model_copy()
+        component = component.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
-        # Metrics and algorithms may share a name.
-        taken = {*_FIXED, *(learner.table for learner in self.all)}
-        table = path.replace(".", "_") if name in taken else name
+        # Metrics and algorithms may share a name; some file systems take A and a for one.
+        taken = {*_FIXED, *(learner.table.casefold() for learner in self.all)}
+        table = name
+        while table.casefold() in taken:
+            table = f"{path.partition('.')[0]}_{table}"
         self.all.append(Learner(name, path, component, every, table))
 
     def _update(self, learner: Learner, end: int, log: Log, outputs: Mapping[str, Any]) -> Any:
@@ -130,7 +142,7 @@ class Learners:
         history = History(log, learner.since, end, self.clock.step_us / 1e6, visible)
         state = Present(
             learner.path, end - 1, self.clock.time(end - 1), self.home, self.users, self.robots,
-            outputs, self.seed
+            MappingProxyType({**outputs}), self.seed
         )  # fmt: skip
         with blame(learner.path, end - 1):
             output = learner.component.update(history, state)
@@ -143,6 +155,8 @@ class Learners:
         if self.store is None:
             return
         kinds = {name: KINDS[values.dtype.kind] for name, values in columns.items()}
+        if not len(next(iter(columns.values()))):
+            return  # nothing yet, not even the kinds of its columns
         if not learner.kinds:
             learner.kinds = kinds
             added = [Column(name, kind) for name, kind in kinds.items()]
@@ -152,6 +166,27 @@ class Learners:
         _check_kinds(learner, kinds)
         steps = np.full(len(next(iter(columns.values()))), step, np.int64)
         self.store.append(learner.table, step=steps, time=self.clock.times(steps), **columns)
+
+
+def checked_result(result: Any, where: str = "result()") -> Any:
+    """Return what sums up a metric: numbers and texts, in mappings and lists of any depth.
+
+    Raises:
+        ComponentError: It holds something else, or a number that isn't finite.
+    """
+    if isinstance(result, Mapping):
+        return {str(k): checked_result(value, f"{where}[{k!r}]") for k, value in result.items()}
+    if isinstance(result, list | tuple):
+        return [checked_result(value, f"{where}[{i}]") for i, value in enumerate(result)]
+    if isinstance(result, np.generic):
+        result = result.item()
+    if isinstance(result, float) and not math.isfinite(result):
+        raise ComponentError(f"{where} is {result}: leave out what can't be told")
+    if not isinstance(result, bool | int | float | str):
+        raise ComponentError(
+            f"{where} is {result!r}; numbers and texts are wanted"
+        )
+    return result
 
 
 _FIXED = {"trajectories", "key_frames", "observations", "events"}

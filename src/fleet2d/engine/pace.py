@@ -1,6 +1,7 @@
 """Running at a multiple of real time."""
 
 import time
+from collections.abc import Callable
 
 
 class Pace:
@@ -14,6 +15,8 @@ class Pace:
 
     # Wall time between two looks at the clock: short enough to watch, long enough to cost nothing.
     LOOK_S = 0.05
+    # A sleep goes on after Ctrl-C, so no single one is long.
+    NAP_S = 0.1
 
     def __init__(self, speedup: float) -> None:
         self.speedup = speedup
@@ -24,11 +27,11 @@ class Pace:
         """Go on after a pause, as if no time had passed since `simulated_s`."""
         self._began = max(self._began, time.perf_counter() - simulated_s / self.speedup)
 
-    def hold(self, simulated_s: float) -> None:
-        """Sleep until `simulated_s` of simulated time are due."""
-        ahead = self._began + simulated_s / self.speedup - time.perf_counter()
-        if ahead > 0:
-            time.sleep(ahead)
+    def hold(self, simulated_s: float, stop: Callable[[], bool] = lambda: False) -> None:
+        """Sleep until `simulated_s` of simulated time are due, or until `stop` says so."""
+        due = self._began + simulated_s / self.speedup
+        while (ahead := due - time.perf_counter()) > 0 and not stop():
+            time.sleep(min(ahead, self.NAP_S))
 
     def reached(self, simulated_s: float) -> float:
         """Return the factor reached over the whole run so far."""

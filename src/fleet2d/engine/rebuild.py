@@ -35,7 +35,7 @@ I64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Path:
+class Trajectory:
     """Poses of one body, all arrays of one length.
 
     Attributes:
@@ -57,7 +57,7 @@ class Path:
     room: NDArray[np.int16]
 
 
-def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> Path:
+def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> Trajectory:
     """Return where a body of a stored run was, every so often.
 
     Args:
@@ -85,7 +85,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     _trace(run, plan, entity, clock, keys, stride, out)
     xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
     room = np.where(out.away, -1, plan.room_of_place[out.y // SUB, out.x // SUB])
-    return Path(
+    return Trajectory(
         steps,
         clock.times(steps),
         xy[:, 0],

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.history import Observations, join_observations
+from fleet2d.algorithms.history import Observations, join_observations, no_observations
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
@@ -84,11 +84,11 @@ class Recorder:
     ) -> None:
         self.store = store
         self.clock, self.home, self.actors = clock, home, actors
-        self.row_of = {actor.path: row for row, actor in enumerate(actors)}
         names = set(store.names)
         self._keeps_keys = "key_frames" in names
         self._keeps_observations = "observations" in names
         self._keeps_events = "events" in names
+        self._has_users = any(actor.path.startswith("users.") for actor in actors)
         self._every = _steps_between_samples(settings, clock)
         self._walk_every = max(1, WALK_KEY_US // clock.step_us)
         # Breakpoints of the present plan already gathered; the plan before the first has none to
@@ -196,22 +196,18 @@ class Recorder:
 
     def _sample(self, block: PoseBlock, first: int, count: int) -> None:
         steps = np.arange(-(-first // self._every) * self._every, first + count, self._every)
-        for row in range(len(self.actors) if len(steps) else 0):
-            columns = steps - first
-            self._samples.append(
-                np.stack(
-                    [
-                        steps,
-                        np.full_like(steps, row),
-                        block.x[row, columns],
-                        block.y[row, columns],
-                        block.heading[row, columns],
-                        block.away[row, columns].astype(np.int64),
-                    ],
-                    axis=1,
-                )
-            )
-            self._gathered += len(steps)
+        if not len(steps):
+            return
+        rows = np.empty((len(steps), len(self.actors), 6), np.int64)
+        rows[:, :, 0] = steps[:, None]
+        rows[:, :, 1] = np.arange(len(self.actors))
+        columns = steps - first
+        rows[:, :, 2] = block.x[:, columns].T
+        rows[:, :, 3] = block.y[:, columns].T
+        rows[:, :, 4] = block.heading[:, columns].T
+        rows[:, :, 5] = block.away[:, columns].T
+        self._samples.append(rows.reshape(-1, 6))
+        self._gathered += len(steps) * len(self.actors)
 
     def _key_walks(self, block: PoseBlock, first: int, count: int) -> None:
         every = self._walk_every
@@ -225,6 +221,8 @@ class Recorder:
 
     def _observe(self, eyes: Sequence[Eye]) -> Observations:
         """Join the findings of all cameras, in order of step, robot, user."""
+        if not any(eye.found or eye.happened for eye in eyes):
+            return no_observations()
         parts = [eye.sightings for eye in eyes]
         step = np.concatenate([p.step[: e.found] for p, e in zip(parts, eyes, strict=True)])
         user = np.concatenate([p.user[: e.found] for p, e in zip(parts, eyes, strict=True)])
@@ -314,7 +312,7 @@ class Recorder:
         self._events = []
         step, entity, _, event, user, detail = zip(*rows, strict=True)
         columns: dict[str, Any] = self._when(np.array(step, np.int64))
-        if len(self.actors) > 0 and self._has_users:
+        if self._has_users:
             columns["user"] = np.array(user, np.int32)
         self.store.append(
             "events",
@@ -323,10 +321,6 @@ class Recorder:
             event=list(event),
             detail=list(detail),
         )
-
-    @property
-    def _has_users(self) -> bool:
-        return any(actor.path.startswith("users.") for actor in self.actors)
 
     def _when(self, step: NDArray[np.int64]) -> dict[str, Any]:
         return {"step": step, "time": self.clock.times(step)}

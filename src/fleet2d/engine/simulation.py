@@ -6,32 +6,34 @@ them at once. What a span is never shows in a result: every draw is addressed by
 plan by time.
 """
 
-import json
+import operator
 import secrets
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
 
 from fleet2d.algorithms.history import Log, Piece
-from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.manifest import Status, file_record, versions
-from fleet2d.artifacts.reader import FLOORPLAN_NAME, Run
+from fleet2d.artifacts.manifest import Status
+from fleet2d.artifacts.reader import Run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock, look_together
 from fleet2d.engine.clock import Clock
-from fleet2d.engine.inputs import input_files
+from fleet2d.engine.keeping import (
+    deferred_interrupt,
+    describe_end,
+    describe_start,
+    open_store,
+)
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.recorder import Recorder, table_specs
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import InputError, ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
@@ -84,26 +86,19 @@ class Simulation:
         self._all = [*self._users, *self._robots]
         self._block = PoseBlock(self._all)
         self._eyes = self._open_eyes()
-        self._make_tables()
+        self._add_tables()
         settings_ = self.scenario.artifacts
         self._recorder = Recorder(self._store, settings_, self.clock, self.home, self._all)
-        self._learners = Learners(
-            self.scenario.algorithms,
-            self.scenario.metrics,
-            self.home,
-            self.clock,
-            self.seed,
-            (list(self.scenario.users), list(self.scenario.robots)),
-            self._store if settings_.outputs else None,
-        )
+        self._learners = self._start_learners()
         self._log = Log(self.home, self._all) if self._learners.all else None
         self._pending: dict[int, list[SightEvent]] = {}  # events that interrupted a robot's plan
-        self._max_span = simulation.max_span or self._block.capacity
-        self._max_span = min(self._max_span, self._block.capacity)
+        self._max_span = min(simulation.max_span or self._block.capacity, self._block.capacity)
         self._pace: Pace | None = None
         self.step = 0
-        self._stopping = False
-        self._open()
+        self._stopping = self._broken = False
+        self._run: Run | None = None  # once it is finished
+        describe_start(self._store.manifest, self.scenario, self.seed, self.clock, self.home.plan)
+        open_store(self._store, self.home.plan)
         self._setup_s = time.perf_counter() - began
         self._simulate_s = self._save_s = 0.0
 
@@ -142,16 +137,35 @@ class Simulation:
     # Running
 
     def advance(self, steps: int = 1) -> None:
-        """Simulate so many steps, or up to the end of the run."""
+        """Simulate so many steps, or up to the end of the run.
+
+        Raises:
+            InputError: The number is negative, or the run is finished.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
+        """
+        steps = operator.index(steps)
+        if steps < 0:
+            raise InputError(f"advance({steps}): time only goes forward; branch a copy instead")
         self._run_to(min(self.clock.steps, self.step + steps))
 
     def run_until(self, when: int | datetime | timedelta) -> None:
-        """Simulate up to a step, a local time or a time since the start; that step is next then."""
+        """Simulate up to a step, a local time or a time since the start; that step is next then.
+
+        Raises:
+            InputError: It is past, or the run is finished.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
+        """
         if isinstance(when, datetime):
             when = when - self.clock.start
         if isinstance(when, timedelta):
             when = self.clock.step_at_or_after(when // timedelta(microseconds=1))
-        self._run_to(min(self.clock.steps, when))
+        step = operator.index(when)
+        if step < self.step:
+            raise InputError(
+                f"run_until(step {step}): it is step {self.step} already, {self.time}; branch a"
+                " copy before that"
+            )
+        self._run_to(min(self.clock.steps, step))
 
     def replan(self, name: str) -> None:
         """Let a body's behaviors decide anew at the next step, whatever it is doing.
@@ -182,24 +196,25 @@ class Simulation:
         Raises:
             KeyboardInterrupt: Ctrl-C; what was simulated until then is stored and readable.
         """
-        with _deferred_interrupt(self._stop):
-            try:
-                self._run_to(self.clock.steps, on_progress)
-            except BaseException:
-                self._fail()
-                raise
-            if self._stopping:
+        try:
+            self._run_to(self.clock.steps, on_progress)
+        except BaseException as error:
+            if isinstance(error, KeyboardInterrupt) and not self._broken:
                 self.finish("interrupted")
-                raise KeyboardInterrupt
-            return self.finish()
+            else:
+                self._fail(error)
+            raise
+        return self.finish()
 
     def finish(self, status: Status = "complete") -> Run:
         """Close the run at the present step and return it for reading."""
-        if not self.done and status == "complete":
-            status = "interrupted"
+        if self._run is not None:
+            return self._run
+        if status == "complete" and (self._broken or not self.done):
+            status = "failed" if self._broken else "interrupted"
         began = time.perf_counter()
         # Where a component failed, asking the metrics could fail again, and lose what is stored.
-        results = {}
+        results: dict[str, Any] = {}
         if self._log and status != "failed":
             results = self._learners.finish(self.step, self._log)
         self._simulate_s += time.perf_counter() - began
@@ -207,32 +222,51 @@ class Simulation:
         self._recorder.end(self.step)
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
-        self._fill_manifest(results)
+        wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
+        describe_end(self._store.manifest, self.clock, self.step, results, wall_s, self._pace)
         self._store.close(status)
-        run = self._store.run()
-        run.plan = self.home.plan
-        return run
+        self._run = self._store.run()
+        self._run.plan = self.home.plan
+        return self._run
 
     # The loop
 
     def _run_to(self, end: int, on_progress: Callable[[Self], None] | None = None) -> None:
+        if self._run is not None:
+            raise InputError("the run is finished: set up a new Simulation to go on")
+        if self._broken:
+            raise InputError("the run broke off in the middle of a span and can't go on")
         began, stored = time.perf_counter(), self._recorder.wall_s
-        speedup = self.scenario.simulation.speedup
-        if speedup and self._pace is None:
-            self._pace = Pace(speedup)
-        if self._pace:
-            self._pace.resume(self.step * self.clock.step_us / 1e6)
-        told = began
+        self._set_pace()
+        with deferred_interrupt(self._stop):
+            try:
+                self._spans(end, on_progress)
+            except BaseException:
+                self._broken = True
+                raise
+            finally:
+                stored = self._recorder.wall_s - stored
+                self._simulate_s += time.perf_counter() - began - stored
+                self._save_s += stored
+        if self._stopping:
+            self._stopping = False
+            raise KeyboardInterrupt
+
+    def _spans(self, end: int, on_progress: Callable[[Self], None] | None) -> None:
+        told = time.perf_counter()
         while self.step < end and not self._stopping:
             self._span(end)
             if self._pace:
-                self._pace.hold(self.step * self.clock.step_us / 1e6)
+                self._pace.hold(self.step * self.clock.step_us / 1e6, lambda: self._stopping)
             if on_progress and time.perf_counter() - told > 0.1:
                 on_progress(self)
                 told = time.perf_counter()
-        stored = self._recorder.wall_s - stored
-        self._simulate_s += time.perf_counter() - began - stored
-        self._save_s += stored
+
+    def _set_pace(self) -> None:
+        speedup = self.scenario.simulation.speedup
+        if speedup:
+            self._pace = self._pace or Pace(speedup)
+            self._pace.resume(self.step * self.clock.step_us / 1e6)
 
     def _span(self, limit: int) -> None:
         """Simulate one span: up to the next decision, and not beyond step `limit`."""
@@ -251,7 +285,7 @@ class Simulation:
         self._interrupt(first + count - 1)
         self.step = first + count
         if self._log:
-            if observations is not None:
+            if observations is not None and len(observations.step):
                 self._log.observations.append(observations)
             if self._learners.next_due() == self.step:
                 self._learners.update(self.step, self._log)
@@ -262,7 +296,7 @@ class Simulation:
         for row, actor in enumerate(self._all):
             if actor.ask_at is not None and actor.ask_at <= step:
                 self._recorder.before_plan(row, step)
-                actor.decide(step, tuple(self._pending.pop(row, ())), self._learners.outputs)
+                actor.decide(step, tuple(self._pending.pop(row, ())), self._learners.readable)
                 self._recorder.after_plan(row, step)
 
     def _span_end(self, limit: int) -> int:
@@ -310,59 +344,31 @@ class Simulation:
             if isinstance(robot.entity, Robot) and robot.entity.camera is not None
         ]
 
-    def _make_tables(self) -> None:
+    def _add_tables(self) -> None:
         users, robots = list(self.scenario.users), list(self.scenario.robots)
         rooms = [room.name for room in self.home.rooms]
         for spec in table_specs(users, robots, rooms, self.scenario.artifacts):
             self._store.add_table(spec)
-        manifest = self._store.manifest
-        manifest.scenario = self.scenario.resolved()
-        manifest.scenario["simulation"]["seed"] = self.seed
-        manifest.seed = self.seed
-        manifest.step_us = self.clock.step_us
-        manifest.start = self.clock.start.isoformat()
-        manifest.entities = {"users": users, "robots": robots}
-        manifest.versions = versions()
-        manifest.inputs = [file_record(path) for path in input_files(self.scenario)]
-        manifest.notes = list(self.home.plan.notes)
 
-    def _fill_manifest(self, results: Mapping[str, Any]) -> None:
-        manifest = self._store.manifest
-        manifest.steps = self.step
-        manifest.simulated_s = self.step * self.clock.step_us / 1e6
-        manifest.metrics = dict(results)
-        manifest.wall_s = {
-            "setup": self._setup_s,
-            "simulate": self._simulate_s,
-            "save": self._save_s,
-        }
-        if self._pace:
-            reached = self._pace.reached(manifest.simulated_s)
-            if reached < 0.98 * self._pace.speedup:
-                manifest.notes.append(
-                    f"simulation.speedup asked for {self._pace.speedup:g} times real time;"
-                    f" {reached:.0f} was reached, for computing took that long"
-                )
-
-    def _open(self) -> None:
-        """Make the run directory, and put the floor plan in it."""
-        self._store.open()
-        if self.directory is not None:
-            file = self.directory / FLOORPLAN_NAME
-            try:
-                file.write_text(json.dumps(self.home.plan.to_native()), encoding="utf-8")
-            except OSError as error:
-                with suppress(OSError):
-                    file.unlink(missing_ok=True)
-                self._store.discard()
-                raise cannot_write(self.directory, error) from error
+    def _start_learners(self) -> Learners:
+        return Learners(
+            self.scenario.algorithms,
+            self.scenario.metrics,
+            self.home,
+            self.clock,
+            self.seed,
+            (list(self.scenario.users), list(self.scenario.robots)),
+            self._store if self.scenario.artifacts.outputs else None,
+        )
 
     def _stop(self) -> None:
         """Let the run end after the present span, where everything stored fits together."""
         self._stopping = True
 
-    def _fail(self) -> None:
+    def _fail(self, error: BaseException) -> None:
         """Leave what was stored before the failure readable; the first error is reported."""
+        why = str(error) or type(error).__name__
+        self._store.manifest.notes.append(f"failed at step {self.step}: {why}")
         with suppress(Exception):
             self.finish("failed")
 
@@ -377,22 +383,3 @@ class Simulation:
             "room": room.name if room else None,
             "away": bool(state.away),
         }
-
-
-@contextmanager
-def _deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
-    """Call `stop` on the first Ctrl-C, so that no row is half stored; a second one acts at once."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.getsignal(signal.SIGINT)
-
-    def on_interrupt(*_: Any) -> None:
-        stop()
-        signal.signal(signal.SIGINT, before)
-
-    signal.signal(signal.SIGINT, on_interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

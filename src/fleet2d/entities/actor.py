@@ -1,6 +1,6 @@
 """An entity in a run: its body, its place in the home, and the plan that it follows."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
 
@@ -44,7 +44,7 @@ class Actor:
     home: Home
     clock: Clock
     seed: int
-    behaviors: list[Behavior] = field(default_factory=list)
+    behaviors: list[Behavior] = field(init=False)
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
@@ -52,7 +52,7 @@ class Actor:
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
-        self.behaviors = [behavior.model_copy() for behavior in self.entity.behaviors]
+        self.behaviors = [behavior.model_copy(deep=True) for behavior in self.entity.behaviors]
         with blame(self.path, None):
             self.state = self._begin()
             for behavior in self.behaviors:
@@ -150,7 +150,7 @@ class Actor:
         exact: list[float] = lattice.to_metres(point).round(4).tolist()
         return exact
 
-    def decide(self, step: int, events: tuple[object, ...], outputs: dict[str, object]) -> None:
+    def decide(self, step: int, events: tuple[object, ...], outputs: Mapping[str, object]) -> None:
         """Ask the behaviors, in order, for a plan that begins at `step`."""
         now = Situation(self, step, events, outputs)  # type: ignore[arg-type]
         plan = None

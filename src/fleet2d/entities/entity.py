@@ -19,7 +19,7 @@ class Entity(Settings):
     """
 
     radius: Length = Field(default=0.2, gt=0, le=2, description="radius of the body [m]")
-    speed: Speed = Field(default=1.0, ge=0.001, le=20, description="walking speed [m/s]")
+    speed: Speed = Field(default=1.0, ge=0.01, le=20, description="walking speed [m/s]")
     turn_rate_deg: TurnRateDeg = Field(
         default=180.0, ge=0.01, le=36000, description="how fast it turns on the spot [deg/s]"
     )
@@ -45,7 +45,7 @@ class Robot(Entity):
     """A robot, which sees users with its camera."""
 
     radius: Length = Field(default=0.15, gt=0, le=2, description="radius of the body [m]")
-    speed: Speed = Field(default=0.6, ge=0.001, le=20, description="driving speed [m/s]")
+    speed: Speed = Field(default=0.6, ge=0.01, le=20, description="driving speed [m/s]")
     turn_rate_deg: TurnRateDeg = Field(
         default=90.0, ge=0.01, le=36000, description="how fast it turns on the spot [deg/s]"
     )

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -87,7 +88,7 @@ class Lattice:
         """Lattice units to a metre: 1280 for cells of 5 cm."""
         return UNITS_PER_CELL / self.cell
 
-    @property
+    @cached_property
     def _origin_units(self) -> NDArray[np.int64]:
         cells = np.rint(np.asarray(self.origin) / self.cell).astype(np.int64)
         return cells * UNITS_PER_CELL

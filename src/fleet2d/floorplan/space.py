@@ -86,7 +86,7 @@ class Space:
         mask = self.part_of_cell == part
         if room is not None:
             mask &= self.plan.room_of_cell == room
-        return np.argwhere(mask)
+        return _shared(np.argwhere(mask))
 
     def _find_nearest(
         self, x: int, y: int, part: int | None = None, room: int | None = None
@@ -112,7 +112,7 @@ class Space:
         count = find_route(self.mesh, self.graph, *start, *goal, out)
         if count == 0:
             return None
-        return np.concatenate([np.array(prefix, np.int64).reshape(-1, 2), out[:count]])
+        return _shared(np.concatenate([np.array(prefix, np.int64).reshape(-1, 2), out[:count]]))
 
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
         walls = self.plan.mesh
@@ -188,3 +188,9 @@ def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]
 
 def _even_at_least(value: float) -> int:
     return 2 * int(np.ceil(value / 2))
+
+
+def _shared(array: I64) -> I64:
+    """Refuse changes: everybody who asks gets the same array."""
+    array.setflags(write=False)
+    return array

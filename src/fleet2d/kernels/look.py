@@ -44,7 +44,7 @@ class Memory(NamedTuple):
     seen: NDArray[np.uint8]  # 1 while the user counts as seen
 
 
-class Sightings(NamedTuple):
+class Detections(NamedTuple):
     """Detections, in order of (step, user); all arrays of one length."""
 
     step: I64
@@ -84,7 +84,7 @@ def look(
     first: int,
     memory: Memory,
     stops: tuple[bool, bool],
-    sightings: Sightings,
+    sightings: Detections,
     events: SightEvents,
 ) -> tuple[int, int, int]:
     """Look at all users in each step of a span, up to the first step with an event that stops it.

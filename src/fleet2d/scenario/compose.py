@@ -42,12 +42,14 @@ def compose(
         ScenarioError: a file or an override can't be read.
     """
     document = _load("bundled:base" if source is None else source, Path(), ())
-    change = Document()
-    for text in overrides:
-        change = merge(change, _read_override(text))
+    changes = [_read_override(text) for text in overrides]
     for keys, value in (settings or {}).items():
-        change = merge(change, _at(keys, value, f"argument {keys[-1]}={value!r}"))
+        changes.append(_at(keys, value, f"argument {keys[-1]}={value!r}"))
+    change = Document()
+    for single in changes:
+        change = merge(change, single)
     _refuse_unknown_deletions(document, change)
+    _refuse_unknown_entries(document, change, changes)
     document = merge(document, change)
     _delete_nulls(document.data)
     return document
@@ -110,6 +112,9 @@ def _load(
     except ScenarioError as error:
         where = document.place(("extends",))
         raise ScenarioError(f"{where}{': ' * bool(where)}extends: {error}") from error
+    # Another scenario's name isn't this one's: runs are stored and titled by it.
+    result.places.pop(("name",), None)
+    result.data.pop("name", None)
     _refuse_unknown_deletions(result, document)
     return merge(result, document)
 
@@ -243,6 +248,24 @@ def _refuse_unknown_deletions(below: Document, above: Document) -> None:
                     f"there is none of this name{did_you_mean(name, known)} There are: "
                     f"{', '.join(known) or 'none'}"
                 )
+
+
+def _refuse_unknown_entries(below: Document, change: Document, changes: list[Document]) -> None:
+    """Refuse to reach inside an entry that isn't there, unless the change says what it is."""
+    reached = {keys[:2]: single for single in changes for keys in single.places if len(keys) > 2}
+    whole = {max(single.places, key=len) for single in changes}
+    for (section, name), single in reached.items():
+        if section not in ENTRIES or (section, name) in whole or (section,) in whole:
+            continue
+        known = [k for k, v in (below.data.get(section) or {}).items() if v is not None]
+        entry = change.data[section][name]
+        typed = isinstance(entry, Mapping) and entry.keys() & {"type", "behaviors"}
+        if name not in known and not typed:
+            raise ScenarioError(
+                f"{single.place((section, name))}: there is no {section}.{name}"
+                f"{did_you_mean(name, known)} There are: {', '.join(known) or 'none'}; to add one "
+                f"give {section}.{name}.type, too"
+            )
 
 
 def _delete_nulls(data: dict[str, Any]) -> None:

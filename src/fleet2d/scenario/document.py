@@ -71,10 +71,36 @@ def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | No
         line = (
             f":{error.problem_mark.line + 1}" if error.problem_mark and places is not None else ""
         )
-        why = " ".join(part for part in (error.context, error.problem) if part)
-        raise ScenarioError(f"{shown}{line}: not valid YAML: {why}") from error
+        raise ScenarioError(f"{shown}{line}: not valid YAML: {_plainly(error)}") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ScenarioError(f"{shown}: not valid YAML: {error}") from error
+
+
+_YAML_ERRORS = (
+    (r"character '\\t'", "YAML indents with spaces, this line has a tab"),
+    (r"character '(.)' that cannot start", "a text that begins with '{0}' needs quotes"),
+    (r"mapping values", "check the indentation of this line and the one before it, and that each "
+                        "key ends with ':'; a text with ': ' in it needs quotes"),
+    (r"expected <block end>", "check the indentation: this line isn't aligned with the lines "
+                              "around it"),
+    (r"quoted scalar", "a quote is opened in line {line} and not closed"),
+    (r"flow node", "a value is missing, or a bracket is not closed"),
+    (r"flow (?:sequence|mapping)", "a bracket is opened in line {line} and not closed, or a ',' is "
+                                   "missing"),
+    (r"another document", "a scenario is one document: remove the line '---'"),
+    (r"could not find expected ':'", "check the line before: a key ends with ':'"),
+)  # fmt: skip
+"""What PyYAML says, and what it means to who wrote the file; the first that fits."""
+
+
+def _plainly(error: yaml.MarkedYAMLError) -> str:
+    """Say what is wrong with a YAML text as a person would."""
+    said = " ".join(part for part in (error.problem, error.context) if part)
+    mark = error.context_mark or error.problem_mark
+    for pattern, meaning in _YAML_ERRORS:
+        if found := re.search(pattern, said):
+            return meaning.format(*found.groups(), line=mark.line + 1 if mark else 1)
+    return said
 
 
 def _read_text(path: Path, shown: str) -> str:

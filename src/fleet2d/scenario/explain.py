@@ -1,13 +1,16 @@
 """Say in plain words what is wrong with a scenario: where, what was found, what is wanted."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from fleet2d.component import components
 from fleet2d.errors import ScenarioError
-from fleet2d.problems import Location, shown
+from fleet2d.problems import Location, did_you_mean, shown
+from fleet2d.scenario.compose import slot_kind
 from fleet2d.scenario.document import Document
 
 _WANTED = {
@@ -49,33 +52,72 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     ...     print(explain(error, document))
     home.yaml:3: seed: found 'x'; a whole number is wanted
     """
-    problems: dict[tuple[str, str], list[str]] = {}
+    problems: dict[tuple[str, str], list[ErrorDetails]] = {}
+    told: set[str] = set()
     for line in error.errors(include_url=False):
         location = _written_location(line, document.data)
+        once = line.get("ctx", {}).get("once")
+        if once and once in told:
+            continue
+        told.add(once or "")
+        line["msg"] += _whose_key(line, location, document.data)
         key = (document.place(location), ".".join(map(str, location)))
-        text = describe(line)
-        if text not in problems.setdefault(key, []):  # the arms of a union often agree
-            problems[key].append(text)
+        problems.setdefault(key, []).append(line)
     return ScenarioError(
         "\n".join(
-            ": ".join(part for part in (*where, "; or ".join(texts)) if part)
-            for where, texts in problems.items()
+            ": ".join(part for part in (*where, describe(*lines)) if part)
+            for where, lines in problems.items()
         )
     )
 
 
-def describe(line: ErrorDetails) -> str:
-    """Say what is wrong with one value."""
-    kind, context = line["type"], line.get("ctx", {})
-    if kind == "missing":
-        return "missing, and has no default"
-    if kind in ("value_error", "assertion_error"):
-        return str(context["error"])
-    wanted = next((text for name, text in _WANTED.items() if kind.startswith(name)), None)
-    if wanted is None:
-        return line["msg"]
-    limits = {k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()}
-    return f"found {_found(line['input'])}; {wanted.format(**limits)} is wanted"
+def describe(*lines: ErrorDetails) -> str:
+    """Say what is wrong with one value: a line for each arm of its union, which often agree."""
+    texts: list[str] = []
+    wanted: list[str] = []
+    choices: list[str] = []
+    for line in lines:
+        kind, context = line["type"], line.get("ctx", {})
+        text = next((text for name, text in _WANTED.items() if kind.startswith(name)), None)
+        if text is not None:
+            limits = {k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()}
+            wanted.append(text.format(**limits))
+            found = line["input"]
+            if kind == "literal_error" and isinstance(found, str):
+                choices += re.findall(r"'([^']*)'", context["expected"])
+        elif kind == "missing":
+            texts.append("missing, and has no default")
+        elif kind in ("value_error", "assertion_error"):
+            texts.append(str(context["error"]))
+        else:
+            texts.append(line["msg"])
+    if wanted:
+        *first, last = dict.fromkeys(wanted)
+        joint = ", or " if any("," in text for text in first) else " or "
+        hint = did_you_mean(found, choices) if choices else ""
+        hint = hint if hint.endswith("?") else ";"
+        listed = joint.join([*(text.rstrip(",") for text in first), last])
+        texts.insert(0, f"found {_found(found)}{hint} {listed} is wanted")
+    return "; or ".join(dict.fromkeys(texts))
+
+
+def _whose_key(line: ErrorDetails, location: Location, data: Any) -> str:
+    """Say for an unknown key of a component which types know it, and how to get there."""
+    *around, key = map(str, location or ("",))
+    kind = slot_kind(tuple(around))
+    if line["type"] != "unknown_key" or kind is None:
+        return ""
+    for outer in location[:-1]:
+        data = data[outer]
+    types = {name: cls for name, cls in components(kind).items() if key in cls.model_fields}
+    path = ".".join(around)
+    behaviors = data.get("behaviors") if isinstance(data, Mapping) else None
+    for number, behavior in enumerate(behaviors if isinstance(behaviors, list) else ()):
+        if (behavior.get("type") if isinstance(behavior, Mapping) else behavior) in types:
+            return f". {key!r} is a key of its behavior: {path}.behaviors.{number}.{key}"
+    if not types or isinstance(behaviors, list):
+        return ""
+    return f". {key!r} is a key of {', '.join(types)}: give {path}.type, too"
 
 
 def _found(value: Any) -> str:

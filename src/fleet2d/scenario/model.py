@@ -23,6 +23,7 @@ from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean, problem, problem_at
 from fleet2d.scenario.compose import compose
+from fleet2d.scenario.document import Document
 from fleet2d.scenario.explain import explain
 from fleet2d.units import Duration, PositiveDuration, format_duration, micros
 
@@ -147,6 +148,7 @@ class Scenario(Settings):
         default=ArtifactSettings(), description="What a run stores."
     )
     _folder: Path = PrivateAttr(default_factory=Path.cwd)
+    _document: Document = PrivateAttr(default_factory=Document)
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
@@ -158,6 +160,23 @@ class Scenario(Settings):
     def folder(self) -> Path:
         """The folder of the file that the scenario was read from."""
         return self._folder
+
+    def where(self, path: str) -> str:
+        """Return where a key was written, or the nearest key around it: 'home.yaml:15', else ''.
+
+        Args:
+            path: the key's path as messages write it, like 'users.ana.days.0.items.1.place'. In an
+                entry with the short form, 'behaviors.0' may be in it.
+
+        Example:
+            >>> load_scenario("users.ana.speed=0.9").where("users.ana.speed")
+            "override 'users.ana.speed=0.9'"
+        """
+        keys = tuple(path.split("."))
+        entry = keys[:2]
+        if keys[2:4] == ("behaviors", "0") and (*entry, "behaviors") not in self._document.places:
+            keys = (*entry, *keys[4:])
+        return self._document.place(keys)
 
     def resolved(self) -> dict[str, Any]:
         """Return the whole scenario as plain JSON data that :func:`load_scenario` reads back."""
@@ -195,7 +214,7 @@ def load_scenario(
         scenario = Scenario.model_validate(document.data)
     except ValidationError as error:
         raise explain(error, document) from None
-    scenario._folder = folder
+    scenario._folder, scenario._document = folder, document
     return scenario
 
 

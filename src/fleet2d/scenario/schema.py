@@ -1,6 +1,6 @@
 """What a scenario can say: a JSON Schema for editors, a list of components for people."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -69,7 +69,9 @@ def schema() -> dict[str, Any]:
     for kind, types in kinds.items():
         for name, definition in types.items():
             properties = definition.get("properties", {})
-            definition.update(title=name, properties={"type": {"const": name}, **properties})
+            others = aliases(kind, name)
+            selects = {"enum": [name, *others]} if others else {"const": name}
+            definition.update(title=name, properties={"type": selects, **properties})
         definitions[kind] = {"anyOf": _any_of(kind, references, found[kind])}
     definitions = {
         key: _without_required(_expanded(value, kinds)) for key, value in definitions.items()
@@ -91,10 +93,15 @@ def _any_of(
     kind: str, references: Mapping[Any, Any], classes: Mapping[str, type[Component]]
 ) -> list[dict[str, Any]]:
     """List the ways to write a component: each type, a bare name, and a user's own."""
+    typed = ({**references[cls, "validation"], "required": ["type"]} for cls in classes.values())
+    return [*typed, *_untold(kind, classes)]
+
+
+def _untold(kind: str, names: Iterable[str]) -> list[dict[str, Any]]:
+    """List the ways to write a component of which the schema has no fields to tell."""
     own = {"type": "string", "pattern": ":", "description": f"your own {kind}: module:Class"}
     return [
-        *({**references[cls, "validation"], "required": ["type"]} for cls in classes.values()),
-        {"type": "string", "enum": [n for c in classes for n in (c, *aliases(kind, c))]},
+        {"type": "string", "enum": [n for name in names for n in (name, *aliases(kind, name))]},
         {"type": "object", "properties": {"type": own}, "required": ["type"]},
         own,
     ]
@@ -118,7 +125,7 @@ def _expanded(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
             }
             for definition in kinds[mark["kind"]].values()
         ]
-        result["anyOf"] += _any_of(mark["kind"], {}, {})[1:]
+        result["anyOf"] += _untold(mark["kind"], kinds[mark["kind"]])
     return result
 
 

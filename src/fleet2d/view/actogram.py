@@ -1,7 +1,6 @@
 """An actogram: a row per simulated day, coloured by the room that somebody is in."""
 
 from datetime import datetime, timedelta
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,16 +16,18 @@ from fleet2d.view.traces import Trace
 
 DAY_US = 86_400_000_000
 BINS = 1440  # pieces of a day that have a colour each
-MARKS = 288  # pieces of a day that are marked if somebody was seen in them
+MARKS = 288  # pieces of a day that are marked as high as the share of them that somebody was seen
 # The floor plan's colours are pale, for words are written on them; a row is a few pixels high.
 DEEPER = 1.9
 GAPS_UP_TO = 75  # days; with more, there is no space left between the rows
-# The part of a row that marks take, at its bottom.
-MARK_PART = 0.3
+# The part of a row that a mark takes, from its bottom up, where somebody was seen all the time.
+MARK_PART = 0.5
+FAINTEST = 0.06  # the least share that a mark has the height of: a single sighting can be made out
 
 NOT_SIMULATED = -2
 
 Rooms = NDArray[np.int16]
+Shares = NDArray[np.float64]
 
 
 def room_color(plan: FloorPlan, index: int) -> tuple[float, float, float]:
@@ -49,13 +50,36 @@ def rooms_by_day(trace: Trace, start: datetime, step_us: int, steps: int) -> Roo
     return rooms.reshape(days, BINS).astype(np.int16)
 
 
-def marks_by_day(seen: NDArray[np.int64], start: datetime, step_us: int, days: int) -> NDArray[Any]:
-    """Return in which pieces of each day there are steps of `seen`, bool (days, MARKS)."""
+def marks_by_day(seen: NDArray[np.int64], start: datetime, step_us: int, days: int) -> Shares:
+    """Return the share of each piece of each day that steps of `seen` fill, float (days, MARKS)."""
     midnight = start.replace(hour=0, minute=0, second=0, microsecond=0)
-    elapsed = seen * step_us + (start - midnight) // timedelta(microseconds=1)
-    marks = np.zeros(days * MARKS, np.bool_)
-    marks[elapsed * MARKS // DAY_US] = True
-    return marks.reshape(days, MARKS)
+    # Two robots that see somebody in the same step see no more of the day than one.
+    begins = np.unique(seen) * step_us + (start - midnight) // timedelta(microseconds=1)
+    edges = np.arange(days * MARKS + 1) * (DAY_US // MARKS)
+    begun = np.searchsorted(begins, edges)
+    # Of the steps begun by an edge all but the last have ended.
+    last = np.append(begins, -step_us)[begun - 1]
+    before = begun * step_us - np.where(begun > 0, np.maximum(last + step_us - edges, 0), 0)
+    shares: Shares = np.diff(before) / (DAY_US // MARKS)
+    return shares.reshape(days, MARKS)
+
+
+def mark_boxes(marks: Shares, lift: float = 0.0) -> NDArray[np.float64]:
+    """Return the marks of an actogram as boxes, float64 (n, 4, 2): hour of the day, row.
+
+    A mark is as high as the share of its piece of the day in which somebody was seen, so that the
+    ink is in proportion to the time; only the least are as high as `FAINTEST`.
+
+    Args:
+        marks: Of `marks_by_day`.
+        lift: How far the boxes stand above the row's end, in rows.
+    """
+    day, piece = np.nonzero(marks > 0)
+    left, right = piece * (24 / MARKS), (piece + 1) * (24 / MARKS)
+    bottom = day + 1 - lift
+    top = bottom - MARK_PART * np.maximum(marks[day, piece], FAINTEST)
+    corners = np.stack([left, top, right, top, right, bottom, left, bottom], axis=1)
+    return corners.reshape(-1, 4, 2)
 
 
 def hours_shown(rooms: Rooms) -> tuple[float, float]:
@@ -70,7 +94,7 @@ def hours_shown(rooms: Rooms) -> tuple[float, float]:
 
 
 def draw_actogram(
-    plan: FloorPlan, rooms: Rooms, marks: NDArray[Any], start: datetime, axes: Axes, *, dates: bool
+    plan: FloorPlan, rooms: Rooms, marks: Shares, start: datetime, axes: Axes, *, dates: bool
 ) -> None:
     """Draw an actogram.
 
@@ -93,28 +117,19 @@ def draw_actogram(
     axes.imshow(
         table[rooms], extent=(0, 24, days, 0), aspect="auto", interpolation="nearest", zorder=1
     )
-    _draw_marks(marks, axes)
-    if days <= GAPS_UP_TO:
-        axes.hlines(
-            np.arange(1, days), 0, 24, color="white", lw=1.1 if days <= 40 else 0.6, zorder=3
-        )
+    gap = (1.1 if days <= 40 else 0.6) if days <= GAPS_UP_TO else 0.0  # points
+    row = axes.bbox.height / axes.figure.dpi * 72 / max(1, days)
+    _draw_marks(marks, axes, gap / 2 / row)
+    if gap:
+        axes.hlines(np.arange(1, days), 0, 24, color="white", lw=gap, zorder=3)
     axes.set(xlim=hours_shown(rooms), ylim=(days, 0))
     _label(axes, start, days, dates=dates)
 
 
-def _draw_marks(marks: NDArray[Any], axes: Axes) -> None:
-    """Draw a dark strip at the bottom of a row where somebody was seen."""
-    edges = np.diff(np.pad(marks, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    day, first = np.nonzero(edges == 1)
-    _, last = np.nonzero(edges == -1)
-    left, right = first * (24 / MARKS), last * (24 / MARKS)
-    top, bottom = day + 1 - MARK_PART, day + 1.0
-    corners = np.stack([left, top, right, top, right, bottom, left, bottom], axis=1)
-    # The rows of a year are a pixel or two high: dark marks would hide the rooms.
-    alpha = 1.0 if len(marks) <= GAPS_UP_TO else 0.35
-    boxes = PolyCollection(
-        [*corners.reshape(-1, 4, 2)], facecolors=TEXT_COLOR, alpha=alpha, lw=0, zorder=2
-    )
+def _draw_marks(marks: Shares, axes: Axes, lift: float) -> None:
+    """Draw a dark mark at the bottom of a row where somebody was seen."""
+    boxes = PolyCollection([*mark_boxes(marks, lift)], facecolors=TEXT_COLOR, lw=0, zorder=2)
+    boxes.set_snap(False)  # a mark lower than a pixel shall be fainter, not a pixel high
     axes.add_collection(boxes, autolim=False)
 
 

@@ -1,6 +1,7 @@
 """Draw a floor plan: rooms in soft colours with name and area, dark walls, a scale bar."""
 
 import io
+import re
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
@@ -155,14 +156,29 @@ def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bo
         height = 0.65 * _margin(plan)
         left, _, _, top = plan.bounds
         style: dict[str, Any] = {"va": "center", "color": TEXT_COLOR, "zorder": 5}
-        text = f"{plan.name}\n{plan.area_m2:,.1f} m² · {words}"
+        text = f"{short_name(plan.name)}\n{plan.area_m2:,.1f} m² · {words}"
         axes.text(left - WALL_M, top + height, text, fontsize=11, linespacing=1.4, **style)
+
+
+def short_name(name: str) -> str:
+    """Return a plan's name as pictures show it: of a long hash, only the first digits.
+
+    Example:
+        >>> short_name("2deaa98e9acd1293d5224e25715c1393"), short_name("family_home")
+        ('2deaa98e…', 'family_home')
+    """
+    return f"{name[:8]}…" if re.fullmatch("[0-9a-fA-F]{24,}", name) else name
 
 
 def _margin(plan: FloorPlan) -> float:
     """Return the space around the plan [m]: room for a title of two lines at any scale."""
     x0, y0, x1, y1 = plan.bounds
     return 0.35 + 0.085 * max(x1 - x0, y1 - y0)
+
+
+def scale_depth(plan: FloorPlan) -> float:
+    """Return how far below the plan [m] the words under its scale begin."""
+    return 0.58 * _margin(plan)
 
 
 def _limits(plan: FloorPlan) -> tuple[float, float, float, float]:
@@ -247,7 +263,7 @@ def _draw_scale(plan: FloorPlan, axes: Axes) -> None:
         bar = Rectangle(corner, length / 2, height, facecolor=color, edgecolor=TEXT_COLOR, lw=0.8)
         axes.add_patch(bar)
     for metres, text in ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length} m")):
-        y = bottom - 0.08 * margin
+        y = y0 - scale_depth(plan)
         axes.text(
             x0 + metres, y, text, fontsize=8, ha="center", va="top", color=TEXT_COLOR, zorder=5
         )

@@ -21,10 +21,14 @@ from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 from fleet2d.view.traces import Trace
 
 BLUR_M = 0.14  # a body is a soft spot of about its own size
-SOLID = 0.78  # opacity where somebody was longest
-FAINT = 0.02
+REACH = 5  # standard deviations; with fewer, spots would show square edges
+# Opacity where somebody was longest: the plan and all that is drawn on it stay legible.
+SOLID = 0.4
+# Opacity is half of that where somebody was so many times as long as if everywhere equally long.
+HALF = 4.0
+MOST_WAYS = 3_000  # legs drawn of a body
 CANDIDATES = 60  # moments looked at to find one that shows what a robot sees
-SPOTS = 500
+SPOTS = 260  # places of sightings that are drawn; more would cover the plan and tell nothing
 CLEAR_M = 0.5  # twice the space between a name and a robot
 FAR_ENOUGH_M = 2.0
 
@@ -62,31 +66,56 @@ def draw_presence(plan: FloorPlan, trace: Trace, axes: Axes) -> None:
     flat = np.clip(row, 0, shape[0] - 1) * shape[1] + np.clip(column, 0, shape[1] - 1)
     time = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape).astype(np.float64)
     time = _blurred(time, BLUR_M / lattice.cell) * plan.free
-    if time.max() <= 0:
-        return
-    # By the fourth root or so: an hour at the table shows beside a night in bed.
-    share = (time / time.max()) ** 0.4
     image = np.empty((*shape, 4))
     image[..., :3] = to_rgb(trace.color)
-    image[..., 3] = SOLID * np.clip((share - FAINT) / (1 - FAINT), 0, 1)
+    image[..., 3] = opacity(time, plan.free)
     low, high = np.array(lattice.origin), np.array(shape[::-1]) * lattice.cell
     extent = (low[0], low[0] + high[0], low[1], low[1] + high[1])
     axes.imshow(image, extent=extent, origin="lower", interpolation="bilinear", zorder=3)
+
+
+def opacity(time: F64, free: NDArray[np.bool_]) -> F64:
+    """Return how opaque to draw each cell in which a body spent some time.
+
+    It goes by the time per area, compared to a body that is everywhere equally long: that one
+    leaves a faint tint in any home, and an hour at a table still shows beside a night in bed.
+
+    Args:
+        time: Time in each cell, in any unit, float64 (rows, columns).
+        free: Which cells a body can be in.
+
+    Example:
+        >>> everywhere = np.ones((2, 3))
+        >>> opacity(everywhere, everywhere > 0).max().round(3)
+        np.float64(0.08)
+    """
+    mean = time[free].mean() if free.any() else 0.0
+    if mean <= 0:
+        return np.zeros_like(time)
+    ratio = time / mean
+    found: F64 = SOLID * ratio / (ratio + HALF)
+    return found
 
 
 def draw_ways(trace: Trace, axes: Axes) -> None:
     """Draw the ways that a body went as thin lines."""
     # Few ways are drawn dark, many faint: they add up where they meet.
     darkest, faintest, enough = (0.6, 0.09, 60) if trace.robot else (0.3, 0.04, 60)
-    alpha = min(darkest, max(faintest, enough / max(1, len(trace.legs))))
-    lines = LineCollection(list(trace.legs), colors=trace.color, lw=0.9, alpha=alpha, zorder=2.5)
+    legs = trace.legs[:: 1 + len(trace.legs) // (MOST_WAYS + 1)]
+    alpha = min(darkest, max(faintest, enough / max(1, len(legs))))
+    width = 0.9 if len(legs) <= 600 else 0.6
+    lines = LineCollection(list(legs), colors=trace.color, lw=width, alpha=alpha, zorder=2.5)
     axes.add_collection(lines, autolim=False)
 
 
-def draw_sightings(spots: F64, color: str, axes: Axes) -> None:
+def places_of(spots: F64) -> F64:
+    """Return the places [m] of sightings, those within a decimetre once."""
+    places: F64 = np.unique(np.rint(spots * 10), axis=0) / 10
+    return places
+
+
+def draw_sightings(places: F64, color: str, axes: Axes) -> None:
     """Draw where users were when robots saw them, one ring per place."""
-    places = np.unique(np.rint(spots * 10), axis=0) / 10
-    places = places[:: 1 + len(places) // SPOTS]
     axes.scatter(
         places[:, 0],
         places[:, 1],
@@ -204,7 +233,7 @@ def field_of_view(
 
 def _blurred(image: F64, sigma: float) -> F64:
     """Return an image blurred by a bell curve of standard deviation `sigma` [cells]."""
-    reach = max(1, round(3 * sigma))
+    reach = max(1, round(REACH * sigma))
     at = np.arange(-reach, reach + 1)
     bell = np.exp(-0.5 * (at / max(sigma, 1e-6)) ** 2)
     bell /= bell.sum()

@@ -67,11 +67,24 @@ class Page:
         text.remove()
         return words if words == whole else words.rstrip() + "…"
 
+    def wrap(self, parts: Sequence[str], between: str, size: float, width: float) -> list[str]:
+        """Return parts joined to lines of at most `width` inches; a longer part is cut."""
+        lines: list[str] = []
+        for part in parts:
+            longer = f"{lines[-1]}{between}{part}" if lines else part
+            if lines and self.fit(longer, size, width) == longer:
+                lines[-1] = longer
+            else:
+                lines.append(self.fit(part, size, width))
+        return lines
+
     def lines(self, width: float, chips: Sequence[Chip], size: float) -> list[list[Chip]]:
         """Return the chips of each line of a legend of a width [in]."""
         lines: list[list[Chip]] = [[]]
         taken = 0.0
-        for chip in chips:
+        for entry in chips:
+            most = width - _picture_width(entry)
+            chip = entry._replace(words=self.fit(entry.words, size, most))
             needed = self._needed(chip, size)
             if lines[-1] and taken + needed > width:
                 lines.append([])
@@ -104,7 +117,10 @@ class Page:
         if chip.kind in ("room", "seen"):
             draw.add_patch(Rectangle((x, low), side, side, facecolor=chip.color, lw=0))
         if chip.kind == "seen":
-            draw.add_patch(Rectangle((x, low), side, 0.3 * side, facecolor=TEXT_COLOR, lw=0))
+            for bar, share in enumerate((0.2, 0.7, 0.45)):
+                corner = (x + (0.1 + 0.3 * bar) * side, low)
+                box = Rectangle(corner, 0.2 * side, share * side, facecolor=TEXT_COLOR, lw=0)
+                draw.add_patch(box)
         if chip.kind == "away":
             style: dict[str, Any] = {
                 "facecolor": "white",

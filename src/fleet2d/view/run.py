@@ -13,19 +13,30 @@ from numpy.typing import NDArray
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
 from fleet2d.view.actogram import (
+    MARKS,
     draw_actogram,
     marks_by_day,
     room_color,
     rooms_by_day,
 )
-from fleet2d.view.floorplan import ACCENT_COLOR, DPI, drawing_style, floorplan_axes, save_figure
+from fleet2d.view.floorplan import (
+    ACCENT_COLOR,
+    DPI,
+    drawing_style,
+    floorplan_axes,
+    save_figure,
+    scale_depth,
+    short_name,
+)
 from fleet2d.view.life import (
+    SPOTS,
     View,
     clear_names,
     draw_presence,
     draw_sightings,
     draw_view,
     draw_ways,
+    places_of,
     telling_view,
 )
 from fleet2d.view.page import LINE_IN, QUIET_COLOR, Chip, Page
@@ -34,7 +45,7 @@ from fleet2d.view.traces import Trace, categories, trace_of
 SHOWN = 4  # users that have an actogram, and robots that are drawn
 
 # Inches.
-WIDTH = 10.67
+WIDTH = 10.67  # at most: beside a narrow plan the picture is narrower
 EDGE = 0.32
 HEADER = 0.82
 FOOTER = 0.28  # below the last line of the legends
@@ -42,11 +53,16 @@ GAP = 0.3
 DATES = 0.78  # beside the first actogram
 CAPTION = 0.42  # above each actogram
 ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 4.9, 3: 5.1, 4: 5.4}
-BODY = (3.4, 6.6)
+LEFT_LEAST = (7.2, 3.7)  # of the plan, its legend and the header; alone, beside actograms
+BODY_MOST = 6.6
+BODY_LEAST = (2.3, 3.4)
+ROW_LEAST = 0.08
 TICKS = 0.24  # below each actogram
 ROW_MOST = 0.55
+SCALE_WORDS = 0.2  # below the bar of the scale
 
 SMALL = 7.5
+NOTE = 8.5
 SEPARATOR = " · "
 WIDE_SEPARATOR = "   ·   "
 
@@ -103,6 +119,7 @@ class _Picture:
         self.robots = self._traces("robots", robot=True)
         self.notes += _told_together([*self.users, *self.robots])
         self.seen = _observations(run, [user.name for user in self.users])
+        self.rings = self._rings()
         self.views = list(self._views())
         self.panels = self.users or self.robots
         self._lay_out()
@@ -124,6 +141,19 @@ class _Picture:
                 found.append(trace)
         if names and not found:
             self.notes.append(f"where {bucket} were is not stored")
+        return found
+
+    def _rings(self) -> dict[str, NDArray[np.float64]]:
+        """Return the places where each robot saw users; none if there are too many to draw."""
+        found = {
+            robot.name: places_of(self.seen.xy[self.seen.robot == robot.name])
+            for robot in self.robots
+        }
+        found = {name: places for name, places in found.items() if len(places)}
+        count = sum(map(len, found.values()))
+        if count > SPOTS:
+            self.notes.append(f"the {count:,} places where robots saw users are not drawn")
+            return {}
         return found
 
     def _views(self) -> Iterator[View]:
@@ -148,28 +178,41 @@ class _Picture:
 
     def _lay_out(self) -> None:
         """Choose the size of everything, and open the figure."""
-        x0, y0, x1, y1 = self.plan.bounds
-        span = max(x1 - x0, y1 - y0)
-        self.limits = (x0 - 0.03 * span, x1 + 0.03 * span, y0 - 0.085 * span, y1 + 0.03 * span)
-        left, right, low, high = self.limits
-        self.right = ACTOGRAMS[len(self.panels)]
-        self.left = WIDTH - 2 * EDGE - self.right - (GAP if self.right else 0.0)
-        self.body = float(np.clip(self.left * (high - low) / (right - left), *BODY))
-        self.figure = Figure(figsize=(WIDTH, self.body), dpi=DPI, facecolor="white")
-        self.page = Page(self.figure)
         self.days = [
             rooms_by_day(trace, self.start, self.step_us, self.steps) for trace in self.panels
         ]
+        self._lay_out_plan()
+        self.figure = Figure(figsize=(self.width, self.body), dpi=DPI, facecolor="white")
+        self.page = Page(self.figure)
         self.life_lines = self.page.lines(self.left, list(self._life_chips()), SMALL)
         self.room_lines = self.page.lines(self.right - DATES, list(self._room_chips()), SMALL)
         lines = max(len(self.life_lines), len(self.room_lines))
-        self.foot = FOOTER + LINE_IN * (lines + (len(self.notes) > 0))
+        self.note_lines = self.page.wrap(self.notes, SEPARATOR, NOTE, self.width - 2 * EDGE)
+        self.foot = FOOTER + LINE_IN * (lines + len(self.note_lines))
         self.height = HEADER + self.body + self.foot
-        self.page.resize(WIDTH, self.height)
+        self.page.resize(self.width, self.height)
+
+    def _lay_out_plan(self) -> None:
+        """Choose the size of the plan and so of the picture: a narrow or a flat one is smaller."""
+        x0, y0, x1, y1 = self.plan.bounds
+        edge = 0.03 * max(x1 - x0, y1 - y0)
+        left, right, low, high = x0 - edge, x1 + edge, y0 - scale_depth(self.plan), y1 + edge
+        self.right = ACTOGRAMS[len(self.panels)]
+        beside = 2 * EDGE + self.right + (GAP if self.right else 0.0)
+        most, least = WIDTH - beside, LEFT_LEAST[len(self.panels) > 0]
+        # The words under the scale have a size in inches, in a home of any size.
+        scale = min(most / (right - left), (BODY_MOST - SCALE_WORDS) / (high - low))  # in/m
+        low -= SCALE_WORDS / scale
+        self.limits = (left, right, low, high)
+        self.left = min(most, max(least, scale * (right - left)))
+        days = len(self.days[0]) if self.days else 0
+        rows = float(np.clip(CAPTION + TICKS + ROW_LEAST * days, *BODY_LEAST))
+        self.body = min(BODY_MOST, max(rows, scale * (high - low)))
+        self.width = self.left + beside
 
     def _axes(self, x: float, y: float, width: float, height: float) -> Any:
         """Open axes at a place [in]."""
-        box = (x / WIDTH, y / self.height, width / WIDTH, height / self.height)
+        box = (x / self.width, y / self.height, width / self.width, height / self.height)
         return self.figure.add_axes(box)
 
     def _header(self) -> None:
@@ -178,7 +221,9 @@ class _Picture:
         name = scenario.get("name") or "run"
         lasted = _length(self.steps * self.step_us)
         x = self.page.write(EDGE, top - 0.42, self.page.fit(name, 16, 4.0), 16, weight="bold")
-        words = self.page.fit(f"{lasted} in {self.plan.name}", 16, WIDTH - EDGE - x - 0.15)
+        words = self.page.fit(
+            f"{lasted} in {short_name(self.plan.name)}", 16, self.width - EDGE - x - 0.15
+        )
         self.page.write(x + 0.12, top - 0.42, words, 16, color=QUIET_COLOR)
         end = self.start + timedelta(microseconds=self.steps * self.step_us)
         digest = self.run.digest
@@ -206,7 +251,8 @@ class _Picture:
         for trace in self.users:
             draw_presence(self.plan, trace, axes)
         for robot in self.robots:
-            draw_sightings(self.seen.xy[self.seen.robot == robot.name], robot.color, axes)
+            if robot.name in self.rings:
+                draw_sightings(self.rings[robot.name], robot.color, axes)
         for view in self.views:
             draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
         self.page.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
@@ -214,16 +260,14 @@ class _Picture:
     def _life_chips(self) -> Iterator[Chip]:
         for user in self.users:
             yield Chip("spot", user.color, user.name)
-        ways = [user for user in self.users if len(user.legs)]
-        if ways:
-            yield Chip("way", ways[0].color, "ways walked")
+            if len(user.legs):
+                alone = len(self.users) == 1
+                yield Chip("way", user.color, "ways walked" if alone else f"ways of {user.name}")
         for robot in self.robots:
             facts = filter(None, [robot.name, self._covers(robot.name)])
             yield Chip("way", robot.color, SEPARATOR.join(facts))
-        if len(self.seen.step):
-            yield Chip(
-                "ring", self.robots[0].color if self.robots else QUIET_COLOR, "seen here by a robot"
-            )
+        if self.rings:
+            yield Chip("ring", self.robots[0].color, "seen here by a robot")
         for view in self.views:
             when = self.start + timedelta(microseconds=view.step * self.step_us)
             yield Chip("view", None, f"what {view.robot.name} sees, {_date(when)}")
@@ -232,7 +276,7 @@ class _Picture:
         count = len(self.panels)
         if not count:
             return
-        x = WIDTH - EDGE - self.right + DATES
+        x = self.width - EDGE - self.right + DATES
         gap = 0.2
         width = (self.right - DATES - gap * (count - 1)) / count
         height = min(self.body - CAPTION - TICKS, ROW_MOST * len(self.days[0]))
@@ -271,11 +315,12 @@ class _Picture:
         if (here == -1).any():
             yield Chip("away", None, "away")
         if np.isin([user.name for user in self.users], self.seen.user).any():
-            yield Chip("seen", "#dfe1e4", "seen by a robot")
+            words = f"seen by a robot: height is the share of {24 * 60 // MARKS} min"
+            yield Chip("seen", "#dfe1e4", words)
 
     def _footer(self) -> None:
-        words = self.page.fit(SEPARATOR.join(self.notes), SMALL, WIDTH - 2 * EDGE)
-        self.page.write(EDGE, 0.2, words, SMALL, color=QUIET_COLOR, style="italic")
+        for number, words in enumerate(reversed(self.note_lines)):
+            self.page.write(EDGE, 0.2 + number * LINE_IN, words, NOTE)
 
     # Numbers
 

@@ -20,7 +20,7 @@ ROBOT_COLORS = ("#22344f", "#5a4634", "#3d3a63", "#2f5148")
 SAMPLES = 40_000  # a short run is sampled more often than once a minute, up to about so many times
 SAMPLE_US = 60_000_000
 # A random walk has a leg per step: a whole one is a scribble that takes long to draw.
-LEGS = 4_000
+LEGS = 1_500
 WALKED_STEPS = 4_000_000
 # Positions farther apart in time than this are not joined by a line.
 JOINED_US = 5_000_000
@@ -110,7 +110,8 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
         if len(legs) <= LEGS:
             return legs, ""
         moving = np.flatnonzero(np.diff(path.x).astype(bool) | np.diff(path.y).astype(bool))
-        return legs[:LEGS], f"ways of the first {int(moving[LEGS]) * step_us / 3.6e9:.2g} h"
+        minutes = max(1, round(int(moving[LEGS]) * step_us / 6e7))
+        return legs[:LEGS], f"only the ways of the first {minutes} min are drawn"
     # Where a leg was broken off, the next plan begins: the end that was only planned is left out.
     reached = keys["kind"] != "planned"
     xy = np.stack([keys["x"][reached], keys["y"][reached]], axis=1)

@@ -118,7 +118,7 @@ class Schedule(Behavior):
         since = now.time
         if now.actor.plan is self.plan:  # its own, which may be over later than planned
             since = self.until
-        elif now.step and (entry := self._current(self.week, now.time)):
+        elif (now.step or now.actor.entity.start) and (entry := self._current(self.week, now.time)):
             _add(plan, entry)
         self.until = datetime.combine(now.time.date(), datetime.min.time()) + DAY
         for begins, entry in self._between(since, self.until):

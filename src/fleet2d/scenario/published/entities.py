@@ -24,7 +24,7 @@ _FASTEST_TURN_DEG_S = 36_000
 _WIDEST_TURN_DEG = 3600
 _FASTEST_M_S = 20
 _WIDEST_M = 2
-_SLOWEST_M_S = 0.001
+_SLOWEST_M_S = 0.01
 
 
 def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict[str, Keys]]:

@@ -1,0 +1,99 @@
+"""What a run keeps besides its tables: the manifest, the floor plan, a way to be stopped."""
+
+import json
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from fleet2d.artifacts.directory import cannot_write
+from fleet2d.artifacts.manifest import Manifest, file_record, versions
+from fleet2d.artifacts.reader import FLOORPLAN_NAME
+from fleet2d.artifacts.store import RunStore
+from fleet2d.engine.clock import Clock
+from fleet2d.engine.inputs import input_files
+from fleet2d.engine.pace import Pace
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.scenario.model import Scenario
+
+
+def describe_start(
+    manifest: Manifest, scenario: Scenario, seed: int, clock: Clock, plan: FloorPlan
+) -> None:
+    """Fill in what is known before the first step."""
+    manifest.scenario = scenario.resolved()
+    manifest.scenario["simulation"]["seed"] = seed
+    manifest.seed = seed
+    manifest.step_us = clock.step_us
+    manifest.start = clock.start.isoformat()
+    manifest.entities = {"users": list(scenario.users), "robots": list(scenario.robots)}
+    manifest.versions = versions()
+    manifest.inputs = [file_record(path) for path in input_files(scenario)]
+    manifest.notes = list(plan.notes)
+    for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
+        manifest.notes += [
+            f"{bucket}.{name} has no behavior: it stays where it is"
+            for name, entity in entities.items()
+            if not entity.behaviors
+        ]
+
+
+def describe_end(
+    manifest: Manifest,
+    clock: Clock,
+    step: int,
+    results: Mapping[str, Any],
+    wall_s: Mapping[str, float],
+    pace: Pace | None,
+) -> None:
+    """Fill in what is known after the last step."""
+    manifest.steps = step
+    manifest.simulated_s = step * clock.step_us / 1e6
+    manifest.metrics = dict(results)
+    manifest.wall_s = dict(wall_s)
+    reached = pace.reached(manifest.simulated_s) if pace else 0.0
+    if pace and reached < 0.98 * pace.speedup:
+        manifest.notes.append(
+            f"simulation.speedup asked for {pace.speedup:g} times real time;"
+            f" {reached:.0f} was reached, for computing took that long"
+        )
+
+
+def open_store(store: RunStore, plan: FloorPlan) -> None:
+    """Make the run directory, and put the floor plan in it.
+
+    Raises:
+        RunDirectoryError: The directory can't be used; nothing is left behind.
+        ArtifactError: The disk is full; nothing is left behind.
+    """
+    store.open()
+    if store.directory is None:
+        return
+    file = store.directory / FLOORPLAN_NAME
+    try:
+        file.write_text(json.dumps(plan.to_native()), encoding="utf-8")
+    except OSError as error:
+        with suppress(OSError):
+            file.unlink(missing_ok=True)
+        store.discard()
+        raise cannot_write(store.directory, error) from error
+
+
+@contextmanager
+def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
+    """Call `stop` on the first Ctrl-C, so that no row is half stored; a second one acts at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def on_interrupt(*_: Any) -> None:
+        stop()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
