@@ -469,7 +469,7 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
         (["run", "home.yaml", "users.ana.speed=fast"], ["users.ana.speed=fast", "a speed is wanted"]),
         (["validate", "home.yaml", "robots.asto.speed=0.3"], ["there is no robots.asto", "did you mean 'astro'"]),
         (["validate", "home.yaml", "robots.astro.camera.range=4.5"], ["a list is wanted, like [0"]),
-        (["validate", "floorplan=nope.json"], ["to read a file write {type: houseexpo, path: nope.json}"]),
+        (["validate", "floorplan=nope.json"], ["override 'floorplan=nope.json': floorplan.type", "to read a file write {type: houseexpo, path: nope.json}"]),
         (["validate", "floorplan.path=he.json"], ["unknown key 'path'", "a key of houseexpo", "give floorplan.type, too"]),
         (["validate", "robots.astro.dwell=5 min"], ["unknown key 'dwell'", "robots.astro.behaviors.0.dwell"]),
         (["run", "home.yaml", "users.bob=null"], ["users.bob", "none of this name", "ana"]),

@@ -6,8 +6,7 @@ from typing import Any
 
 from pydantic import Field
 
-from fleet2d import Behavior, Duration, Plan, Situation
-from fleet2d.units import Length
+from fleet2d import Behavior, Duration, Length, Plan, Situation
 
 
 class Greeter(Behavior):

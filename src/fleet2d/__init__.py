@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from fleet2d.algorithms.output import RoomDistribution as RoomDistribution
     from fleet2d.artifacts.reader import Run as Run
     from fleet2d.artifacts.reader import open_run as open_run
+    from fleet2d.component import register as register
     from fleet2d.engine.run import reproduce as reproduce
     from fleet2d.engine.run import run as run
     from fleet2d.engine.simulation import Simulation as Simulation
@@ -20,13 +21,17 @@ if TYPE_CHECKING:
     from fleet2d.entities.behavior import Behavior as Behavior
     from fleet2d.entities.behavior import Situation as Situation
     from fleet2d.entities.plan import Plan as Plan
+    from fleet2d.errors import ComponentError as ComponentError
     from fleet2d.errors import Fleet2DError as Fleet2DError
+    from fleet2d.errors import InputError as InputError
     from fleet2d.floorplan.home import Home as Home
     from fleet2d.floorplan.load import load_floorplan as load_floorplan
     from fleet2d.floorplan.plan import FloorPlan as FloorPlan
+    from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion
     from fleet2d.metrics.metric import Metric as Metric
     from fleet2d.scenario.model import Scenario as Scenario
     from fleet2d.scenario.model import load_scenario as load_scenario
+    from fleet2d.sight.region import VisibleRegion as VisibleRegion
     from fleet2d.units import Duration as Duration
     from fleet2d.units import Length as Length
     from fleet2d.units import Share as Share
@@ -37,11 +42,14 @@ _HOME_OF = {
     "Actor": "entities.actor",
     "Algorithm": "algorithms.algorithm",
     "Behavior": "entities.behavior",
+    "ComponentError": "errors",
     "Duration": "units",
     "Fleet2DError": "errors",
     "FloorPlan": "floorplan.plan",
     "History": "algorithms.history",
     "Home": "floorplan.home",
+    "InputError": "errors",
+    "LabelledRegion": "floorplan.plan",
     "Length": "units",
     "Metric": "metrics.metric",
     "Plan": "entities.plan",
@@ -52,9 +60,11 @@ _HOME_OF = {
     "Share": "units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
+    "VisibleRegion": "sight.region",
     "load_floorplan": "floorplan.load",
     "load_scenario": "scenario.model",
     "open_run": "artifacts.reader",
+    "register": "component",
     "reproduce": "engine.run",
     "run": "engine.run",
 }

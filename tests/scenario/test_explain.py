@@ -26,6 +26,7 @@ class Outer(Settings):
     either: int | list[int] = 0
     days: Literal["daily", "weekend"] | tuple[Literal["daily", "weekend"], ...] = "daily"
     span: tuple[float, float] = (0.0, 4.5)
+    filled: tuple[int, ...] = Field(default=(1,), min_length=1)
     entries: dict[str, int] = Field(default={})
 
     @model_validator(mode="after")
@@ -51,6 +52,8 @@ class Outer(Settings):
         ({"either": "x"}, "a.yaml:1: either: found 'x'; a whole number or a list is wanted"),
         ({"days": "week-end"}, "a.yaml:1: days: found 'week-end': did you mean 'weekend'? 'daily' "
                                "or 'weekend' or a list is wanted"),
+        ({"filled": ["x"]}, "a.yaml:1: filled.0: found 'x'; a whole number is wanted"),
+        ({"filled": []}, "a.yaml:1: filled: found []; a list is wanted, like [1]"),
         ({"days": 3}, "a.yaml:1: days: found 3; 'daily' or 'weekend' or a list is wanted"),
         ({"span": 4.5}, "a.yaml:1: span: found 4.5; a list is wanted, like [0, 4.5]"),
         ({"span": [1, 2, 3]}, "a.yaml:1: span: found [1, 2, 3]; a list is wanted, like [0, 4.5]"),

@@ -191,7 +191,9 @@ class _Merger:
     def replace(self, value: Any, keys: Keys) -> Any:
         self.forget(keys)
         depth = len(keys)
-        self.places[keys] = ""  # a value from Python, or a place below
+        # Its own place or the nearest around it; none: a value from Python.
+        around = (self.above.get(keys[:n]) for n in range(depth, -1, -1))
+        self.places[keys] = next((place for place in around if place is not None), "")
         self.places.update({k: place for k, place in self.above.items() if k[:depth] == keys})
         return value
 

@@ -54,7 +54,13 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     """
     problems: dict[tuple[str, str], list[ErrorDetails]] = {}
     told: set[str] = set()
-    for line in error.errors(include_url=False):
+    lines = error.errors(include_url=False)
+    for line in lines:
+        # A list is also called too short when all of its entries are wrong.
+        depth = len(line["loc"])
+        inner = [other for other in lines if other["loc"][:depth] == line["loc"]]
+        if line["type"] == "too_short" and len(inner) > 1:
+            continue
         location = _written_location(line, document.data)
         once = line.get("ctx", {}).get("once")
         if once and once in told:
@@ -65,8 +71,8 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
         problems.setdefault(key, []).append(line)
     return ScenarioError(
         "\n".join(
-            ": ".join(part for part in (*where, describe(*lines)) if part)
-            for where, lines in problems.items()
+            ": ".join(part for part in (*where, describe(*found)) if part)
+            for where, found in problems.items()
         )
     )
 

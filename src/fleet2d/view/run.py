@@ -186,7 +186,11 @@ class _Picture:
         self.page = Page(self.figure)
         self.life_lines = self.page.lines(self.left, list(self._life_chips()), SMALL)
         self.room_lines = self.page.lines(self.right - DATES, list(self._room_chips()), SMALL)
-        lines = max(len(self.life_lines), len(self.room_lines))
+        # Few days leave space in which their legend begins.
+        days = ROW_MOST * len(self.days[0]) if self.days else 0.0
+        self.rows_high = min(self.body - CAPTION - TICKS, days)
+        spare = self.body - CAPTION - TICKS - self.rows_high
+        lines = max(len(self.life_lines), len(self.room_lines) - int(spare / LINE_IN))
         self.note_lines = self.page.wrap(self.notes, SEPARATOR, NOTE, self.width - 2 * EDGE)
         self.foot = FOOTER + LINE_IN * (lines + len(self.note_lines))
         self.height = HEADER + self.body + self.foot
@@ -221,9 +225,8 @@ class _Picture:
         name = scenario.get("name") or "run"
         lasted = _length(self.steps * self.step_us)
         x = self.page.write(EDGE, top - 0.42, self.page.fit(name, 16, 4.0), 16, weight="bold")
-        words = self.page.fit(
-            f"{lasted} in {short_name(self.plan.name)}", 16, self.width - EDGE - x - 0.15
-        )
+        words = f"{lasted} in {short_name(self.plan.name)}"
+        words = self.page.fit(words, 16, self.width - EDGE - x - 0.15)
         self.page.write(x + 0.12, top - 0.42, words, 16, color=QUIET_COLOR)
         end = self.start + timedelta(microseconds=self.steps * self.step_us)
         digest = self.run.digest
@@ -279,7 +282,7 @@ class _Picture:
         x = self.width - EDGE - self.right + DATES
         gap = 0.2
         width = (self.right - DATES - gap * (count - 1)) / count
-        height = min(self.body - CAPTION - TICKS, ROW_MOST * len(self.days[0]))
+        height = self.rows_high
         bottom = self.foot + self.body - CAPTION - height
         for number, (trace, rooms) in enumerate(zip(self.panels, self.days, strict=True)):
             at = x + number * (width + gap)
