@@ -70,7 +70,7 @@ class Settings(BaseModel):
         if kind == "extra_forbidden" and not inner:
             line["type"] = unknown_key(key, cls.model_fields)
         absent = kind == "missing" and len(inner) == 1 and isinstance(inner[0], int)
-        if absent or (kind in ("tuple_type", "too_short", "too_long") and not inner):
+        if absent or (kind in ("tuple_type", "too_long") and not inner):
             example = _example(cls, str(key))
             if example and isinstance(data, Mapping):
                 line["type"] = problem(

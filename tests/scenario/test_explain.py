@@ -53,7 +53,7 @@ class Outer(Settings):
         ({"days": "week-end"}, "a.yaml:1: days: found 'week-end': did you mean 'weekend'? 'daily' "
                                "or 'weekend' or a list is wanted"),
         ({"filled": ["x"]}, "a.yaml:1: filled.0: found 'x'; a whole number is wanted"),
-        ({"filled": []}, "a.yaml:1: filled: found []; a list is wanted, like [1]"),
+        ({"filled": []}, "a.yaml:1: filled: found []; a list of at least 1 is wanted"),
         ({"days": 3}, "a.yaml:1: days: found 3; 'daily' or 'weekend' or a list is wanted"),
         ({"span": 4.5}, "a.yaml:1: span: found 4.5; a list is wanted, like [0, 4.5]"),
         ({"span": [1, 2, 3]}, "a.yaml:1: span: found [1, 2, 3]; a list is wanted, like [0, 4.5]"),

@@ -104,6 +104,13 @@ class SimulationSettings(Settings):
     )
 
     @model_validator(mode="after")
+    def _fits_the_calendar(self) -> Self:
+        # With room for an agenda to look a week back, and a day ahead.
+        if not 1900 <= self.start.year <= 7900:
+            raise problem_at(("start",), f"found {self.start}; a year from 1900 to 7900 is wanted")
+        return self
+
+    @model_validator(mode="after")
     def _lasts_a_step(self) -> Self:
         if self.duration < self.step:
             raise problem_at(
