@@ -183,9 +183,7 @@ def checked_result(result: Any, where: str = "result()") -> Any:
     if isinstance(result, float) and not math.isfinite(result):
         raise ComponentError(f"{where} is {result}: leave out what can't be told")
     if not isinstance(result, bool | int | float | str):
-        raise ComponentError(
-            f"{where} is {result!r}; numbers and texts are wanted"
-        )
+        raise ComponentError(f"{where} is {result!r}; numbers and texts are wanted")
     return result
 
 

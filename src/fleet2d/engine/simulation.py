@@ -33,7 +33,7 @@ from fleet2d.engine.recorder import Recorder, table_specs
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import InputError, PlacementError, ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
@@ -330,10 +330,15 @@ class Simulation:
     # Set-up and closing
 
     def _actors(self, bucket: str, entities: Mapping[str, Any]) -> list[Actor]:
-        return [
-            Actor(name, f"{bucket}.{name}", entity, self.home, self.clock, self.seed)
-            for name, entity in entities.items()
-        ]
+        actors = []
+        for name, entity in entities.items():
+            path = f"{bucket}.{name}"
+            try:
+                actors.append(Actor(name, path, entity, self.home, self.clock, self.seed))
+            except PlacementError as error:
+                where = self.scenario.where(path)
+                raise PlacementError(f"{where}: {error}" if where else str(error)) from error
+        return actors
 
     def _open_eyes(self) -> list[Eye]:
         if not self._users:

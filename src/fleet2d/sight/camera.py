@@ -25,7 +25,9 @@ class Camera(Settings):
     """
 
     range: tuple[Length, Length] = Field(
-        default=(0.0, 4.5), description="nearest and farthest distance it sees at [m]"
+        default=(0.0, 4.5),
+        description="nearest and farthest distance it sees at [m]",
+        examples=[[0.3, 4.5]],
     )
     angle_deg: AngleDeg = Field(
         default=108.0,
