@@ -19,6 +19,7 @@ from tests.strategies import homes, quick, seeds
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.houseexpo import read_houseexpo
+from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import ROUNDING, Space
 
@@ -373,3 +374,19 @@ def test_copy_of_a_space_is_itself() -> None:
     space = Space(built(shapely.box(0, 0, 2, 2)), 0.2)
 
     assert copy.deepcopy(space) is space
+
+
+def test_distance_field_is_a_little_longer_than_the_shortest_way() -> None:
+    plan = load_floorplan()
+    space = Space(plan, 0.2)
+    goal = space.nearest(*plan.lattice.to_lattice(plan.rooms[0].anchor_xy).tolist())
+    assert goal is not None
+    field = space.distance_field(np.array([goal]))
+    cells = space.cells()
+    for row, column in cells[:: len(cells) // 50].tolist():
+        route = space.route(plan.lattice.cell_centre(row, column), goal)
+        assert route is not None
+        legs = np.diff(route / plan.lattice.units_per_m, axis=0)
+        way = np.sqrt((legs**2).sum(axis=1)).sum()
+        assert way - 0.15 <= field[row, column] <= 1.09 * way + 0.3
+    assert np.isinf(field[0, 0])

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 from tests.reference.fields import squared_distance as slow_squared_distance
+from tests.reference.fields import walking_distance as slow_walking_distance
 
-from fleet2d.kernels.fields import squared_distance
+from fleet2d.kernels.fields import squared_distance, walking_distance
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29), (40, 25)])
@@ -48,3 +49,37 @@ def test_squared_distance_compiles_once() -> None:
         squared_distance(np.ones(shape, np.bool_))
 
     assert len(getattr(squared_distance, "signatures", [1])) == 1
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29)])
+@pytest.mark.parametrize("free", [0.0, 0.3, 0.6, 0.9, 1.0])
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_walking_distance_of_random_masks_is_that_of_trying_all_steps(
+    shape: tuple[int, int], free: float, count: int
+) -> None:
+    rng = np.random.default_rng([*shape, int(100 * free), count])
+    for _ in range(4):
+        mask = rng.random(shape) < free
+        goals = rng.integers(-1, np.array(shape) + 1, (count, 2))  # some outside the grid
+
+        expected = slow_walking_distance(mask, goals)
+
+        assert np.array_equal(expected, walking_distance(mask, goals))
+
+
+def test_walking_distance_cuts_no_corner() -> None:
+    mask = np.array([[True, False], [True, True]])
+
+    assert [[10, -1], [5, 0]] == walking_distance(mask, np.array([[1, 1]])).tolist()
+    assert [[0, -1], [-1, -1]] == walking_distance(
+        np.array([[True, False], [False, True]]), np.array([[0, 0]])
+    ).tolist()
+
+
+def test_walking_distance_counts_a_goal_named_twice_once() -> None:
+    mask = np.ones((3, 4), np.bool_)
+
+    assert np.array_equal(
+        walking_distance(mask, np.array([[1, 1]])),
+        walking_distance(mask, np.array([[1, 1], [1, 1], [9, 9]])),
+    )

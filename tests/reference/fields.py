@@ -1,5 +1,7 @@
 """Slow, obvious twins of the kernels in `fleet2d.kernels.fields`."""
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,3 +16,27 @@ def squared_distance(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
             squares = ((outside - (row, column)) ** 2).sum(axis=1)
             out[row, column] = squares.min() if len(squares) else (rows + columns) ** 2
     return out
+
+
+def walking_distance(mask: np.ndarray, goals: np.ndarray) -> np.ndarray:
+    """Return the 5-7 distance of every cell to the nearest goal, by trying all steps until none helps."""
+    rows, columns = mask.shape
+    far = 10**6
+    found = np.full(mask.shape, far)
+    for row, column in goals:
+        if 0 <= row < rows and 0 <= column < columns and mask[row, column]:
+            found[row, column] = 0
+    changed = True
+    while changed:
+        changed = False
+        for row, column in np.argwhere(mask):
+            for dr, dc in product((-1, 0, 1), repeat=2):
+                r, c = row + dr, column + dc
+                if not (0 <= r < rows and 0 <= c < columns) or not (
+                    mask[r, c] and mask[row, c] and mask[r, column]
+                ):
+                    continue
+                way = found[r, c] + (7 if dr and dc else 5 if dr or dc else 0)
+                if way < found[row, column]:
+                    found[row, column], changed = way, True
+    return np.where(found == far, -1, found)

@@ -10,7 +10,8 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.cells import label_triangles
-from fleet2d.kernels.mesh import Mesh, locate, rasterize_cells, strictly_inside
+from fleet2d.kernels.fields import walking_distance
+from fleet2d.kernels.mesh import SUB, Mesh, locate, rasterize_cells, strictly_inside
 from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, find_route
 from fleet2d.kernels.sight import line_of_sight
 
@@ -113,6 +114,20 @@ class Space:
         if count == 0:
             return None
         return _shared(np.concatenate([np.array(prefix, np.int64).reshape(-1, 2), out[:count]]))
+
+    def distance_field(self, places: I64) -> NDArray[np.float64]:
+        """Return how far each cell is on foot from the nearest of some places.
+
+        Args:
+            places: Lattice points (n, 2).
+
+        Returns:
+            float64 (rows, columns) [m], steps to sides and corners of cells, so up to 8 % longer
+            than the straight way; infinite where the body can't be or come from.
+        """
+        cells = np.asarray(places, np.int64).reshape(-1, 2)[:, ::-1] // SUB
+        steps = walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
+        return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
         walls = self.plan.mesh
