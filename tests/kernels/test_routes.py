@@ -40,7 +40,7 @@ def corners_of(home: Home) -> Corners:
     node_of_vertex[vertex] = np.arange(len(vertex))
     return Corners(
         node_of_vertex,
-        np.array(vertex, np.int32),
+        np.array(vertex, np.int64),
         np.array(before, np.int64).reshape(-1, 2),
         np.array(after, np.int64).reshape(-1, 2),
         np.array(simple, np.uint8),

@@ -168,7 +168,7 @@ class Space:
         node_of_vertex[vertex] = np.arange(len(vertex))
         return Corners(
             node_of_vertex=node_of_vertex,
-            vertex=vertex.astype(np.int32),
+            vertex=vertex.astype(np.int64),
             before=np.ascontiguousarray(p[reflex][first]),
             after=np.ascontiguousarray(r[reflex][first]),
             simple=(walls_meeting[vertex] == 1).astype(np.uint8),

@@ -32,7 +32,7 @@ class Corners(NamedTuple):
     """
 
     node_of_vertex: I32  # (vertices,), -1 = no corner
-    vertex: I32  # (nodes,)
+    vertex: I64  # (nodes,) as wide as ids are elsewhere, or kernels compile twice
     before: I64  # (nodes, 2) the border vertex before the corner [lattice]
     after: I64  # (nodes, 2) and the one after it
     simple: NDArray[np.uint8]  # (nodes,)
