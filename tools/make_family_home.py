@@ -1,5 +1,7 @@
 """Draw the bundled family home: rooms are rectangles, doors are gaps in the walls between them.
 
+Doors hang in the gaps as wide as one; furniture is put into the rooms by rule.
+
 Run it from the root of the repository: python tools/make_family_home.py
 """
 
@@ -8,6 +10,9 @@ import re
 from pathlib import Path
 
 import shapely
+
+from fleet2d.floorplan.furnish import furnish
+from fleet2d.floorplan.native import native_document, read_native
 
 HOME = Path("src/fleet2d/floorplan/homes/family_home.json")
 WALL = 0.15
@@ -50,6 +55,7 @@ DOORS = [
 ]
 
 ENTRANCE = (8.9, 2.95)
+FURNITURE_SEED = 4
 
 
 def gap(first: int, second: int, at: float, width: float) -> shapely.Polygon:
@@ -59,6 +65,17 @@ def gap(first: int, second: int, at: float, width: float) -> shapely.Polygon:
     if min(a[3], b[3]) <= max(a[1], b[1]):  # one lies above the other
         return shapely.box(low, min(a[3], b[3]), high, max(a[1], b[1]))
     return shapely.box(min(a[2], b[2]), low, max(a[0], b[0]), high)
+
+
+def doorway(first: int, second: int, at: float, width: float) -> dict[str, object]:
+    """Return the doorway in the middle of a gap; a door hangs in it unless it is wide."""
+    x0, y0, x1, y1 = gap(first, second, at, width).bounds
+    if x1 - x0 > y1 - y0:
+        start, end = (x0, (y0 + y1) / 2), (x1, (y0 + y1) / 2)
+    else:
+        start, end = ((x0 + x1) / 2, y0), ((x0 + x1) / 2, y1)
+    points = [[round(x, 3), round(y, 3)] for x, y in (start, end)]
+    return {"start": points[0], "end": points[1], "leaf": width <= DOOR}
 
 
 def corners(shape: shapely.LinearRing) -> list[list[float]]:
@@ -83,8 +100,16 @@ def main() -> None:
         "name": "family_home",
         "free": [part],
         "rooms": rooms,
+        "doorways": [doorway(*door) for door in DOORS],
         "entrance": ENTRANCE,
     }
+    write(home)
+    furnished = furnish(read_native(HOME), FURNITURE_SEED)
+    write({**home, "objects": native_document(furnished)["objects"]})
+
+
+def write(home: dict[str, object]) -> None:
+    """Write a plan's file."""
     # One point to a line: people read this file.
     text = re.sub(r"\[\s+([-\d.]+),\s+([-\d.]+)\s+\]", r"[\1, \2]", json.dumps(home, indent=1))
     HOME.write_text(text + "\n", encoding="utf-8")

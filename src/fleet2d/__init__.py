@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from fleet2d.errors import ComponentError as ComponentError
     from fleet2d.errors import Fleet2DError as Fleet2DError
     from fleet2d.errors import InputError as InputError
+    from fleet2d.floorplan.change import HomeChange as HomeChange
+    from fleet2d.floorplan.change import HomeChanges as HomeChanges
     from fleet2d.floorplan.home import Home as Home
     from fleet2d.floorplan.load import load_floorplan as load_floorplan
     from fleet2d.floorplan.plan import FloorPlan as FloorPlan
@@ -48,6 +50,8 @@ _HOME_OF = {
     "FloorPlan": "floorplan.plan",
     "History": "algorithms.history",
     "Home": "floorplan.home",
+    "HomeChange": "floorplan.change",
+    "HomeChanges": "floorplan.change",
     "InputError": "errors",
     "LabelledRegion": "floorplan.plan",
     "Length": "units",

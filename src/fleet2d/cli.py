@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from fleet2d.calibrate.command import calibrating
 from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError
+from fleet2d.fit.command import fitting
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
@@ -30,6 +32,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.add_typer(fitting, name="fit")
+app.add_typer(calibrating, name="calibrate")
 
 Arguments = Annotated[
     list[str] | None,
@@ -37,6 +41,11 @@ Arguments = Annotated[
         metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
         help="A scenario (left out: the bundled base scenario), and changes to it.",
     ),
+]
+
+Resolution = Annotated[
+    float | None,
+    typer.Option(help="Metres per pixel, of a floor plan that is a mere picture."),
 ]
 
 
@@ -98,11 +107,33 @@ def run(
 
 
 @app.command()
-def validate(arguments: Arguments = None) -> None:
-    """Check a scenario: its keys, its floor plan, and that everybody can be where they should."""
-    from fleet2d.engine.simulation import Simulation
+def validate(
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENARIO.yaml|FLOORPLAN] [KEY.PATH=VALUE]...",
+            help="A scenario and changes to it, or a floor plan of any format.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Picture of a floor plan's check-up, .png or .svg.")
+    ] = None,
+    radius: Annotated[
+        float, typer.Option(min=0.01, max=5, help="Radius of the robot for a floor plan [m].")
+    ] = 0.15,
+    resolution: Resolution = None,
+) -> None:
+    """Check a scenario, and that everybody can be where they should; or a floor plan."""
+    from fleet2d.floorplan.load import is_floorplan
 
     scenario, overrides = _split(arguments)
+    if scenario is not None and is_floorplan(scenario):
+        if overrides:
+            raise InputError(f"{scenario} is a floor plan: {overrides[0]} changes a scenario")
+        _check_floorplan(scenario, out, radius, resolution)
+        return
+    from fleet2d.engine.simulation import Simulation
+
     simulation = Simulation(scenario, *overrides)
     plan, settings = simulation.home.plan, simulation.scenario.simulation
     typer.echo(
@@ -113,11 +144,24 @@ def validate(arguments: Arguments = None) -> None:
     )
     for note in plan.notes:
         typer.echo(f"note: {note}")
+    for actor in simulation.actors.values():
+        for behavior in actor.behaviors:
+            for note in getattr(behavior, "notes", ()):  # what it made of its input
+                typer.echo(f"note: {actor.path}: {note}")
 
 
 @app.command()
-def schema() -> None:
+def schema(
+    floorplan: Annotated[
+        bool, typer.Option("--floorplan", help="That of a floor plan in Fleet2D's own format.")
+    ] = False,
+) -> None:
     """Print the JSON Schema of a scenario, for completion in an editor."""
+    if floorplan:
+        from fleet2d.floorplan.native_schema import native_schema
+
+        typer.echo(json.dumps(native_schema(), indent=2))
+        return
     from fleet2d.scenario.schema import schema as scenario_schema
 
     typer.echo(json.dumps(scenario_schema(), indent=2))
@@ -152,37 +196,98 @@ def show(
         typer.Argument(metavar="[FLOORPLAN|RUN_DIR]", help="Left out: the bundled home."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Picture to write, .png or .svg.")] = None,
+    resolution: Resolution = None,
+    layer: Annotated[
+        str | None, typer.Option(help="Of a run: draw this layer, such as explored.astro.")
+    ] = None,
+    step: Annotated[
+        int | None, typer.Option(help="With --layer: as it was after this step; else the last.")
+    ] = None,
+    fov: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,HEADING[,RANGE,ANGLE]",
+            help="Of a floor plan: draw what is in view of a pose [m, degrees].",
+        ),
+    ] = None,
 ) -> None:
-    """Draw a floor plan, or a stored run in its home."""
-    if what is not None and (what / "manifest.json").exists():
+    """Draw a floor plan of any format, or a stored run in its home."""
+    is_run = what is not None and (what / "manifest.json").exists()
+    if fov is not None if is_run else layer is not None or step is not None:
+        raise InputError("--layer and --step are for a run's directory, --fov for a floor plan")
+    if what is not None and is_run:
         from fleet2d.artifacts.reader import open_run
-        from fleet2d.view.run import draw_run
 
-        target = out or what / "picture.png"
-        draw_run(open_run(what), target)
+        if layer is not None:
+            from fleet2d.view.layers import draw_layer
+
+            target = out or what / f"{layer}.png"
+            draw_layer(open_run(what), layer, target, step)
+        else:
+            from fleet2d.view.run import draw_run
+
+            target = out or what / "picture.png"
+            draw_run(open_run(what), target)
     elif what is not None and what.is_dir():
         raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
     else:
         from fleet2d.floorplan.load import load_floorplan
         from fleet2d.view.floorplan import draw_floorplan
 
-        plan = load_floorplan(what) if what else load_floorplan()
-        target = out or Path(f"{plan.name}.png")
-        draw_floorplan(plan, target)
+        plan = load_floorplan(what, resolution=resolution) if what else load_floorplan()
+        target = out or Path(f"{_file_name(plan.name) or 'plan'}.png")
+        if fov is not None:
+            from fleet2d.view.fov import draw_fov, parse_pose
+
+            draw_fov(plan, parse_pose(fov), target)
+        else:
+            draw_floorplan(plan, target)
     typer.echo(target)
 
 
 @app.command()
 def convert(
-    old: Annotated[Path, typer.Argument(help="A configuration of the published Fleet2D.")],
-    new: Annotated[Path, typer.Argument(help="The scenario to write.")],
+    old: Annotated[
+        Path,
+        typer.Argument(
+            help="A floor plan of any format, or a configuration of the published Fleet2D."
+        ),
+    ],
+    new: Annotated[
+        Path,
+        typer.Argument(help="The floor plan (.json, .yaml, .geojson) or the scenario to write."),
+    ],
+    resolution: Resolution = None,
 ) -> None:
-    """Turn a configuration of the published Fleet2D into a scenario."""
-    from fleet2d.scenario.published import convert_file
+    """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
+    from fleet2d.floorplan.load import is_floorplan, load_floorplan
 
-    for remark in convert_file(old, new):
+    if is_floorplan(old):
+        from fleet2d.floorplan.save import save_floorplan
+
+        plan = load_floorplan(old, resolution=resolution)
+        save_floorplan(plan, new)
+        remarks = list(plan.notes)
+    else:
+        from fleet2d.scenario.published import convert_file
+
+        remarks = convert_file(old, new)
+    for remark in remarks:
         typer.echo(f"note: {remark}")
     typer.echo(new)
+
+
+@app.command()
+def export(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[Path, typer.Argument(help="The text file to write.")],
+) -> None:
+    """Write what a run's sensors said as smart-home tools read it: in the layout of CASAS."""
+    from fleet2d.artifacts.casas import write_casas
+    from fleet2d.artifacts.reader import open_run
+
+    count = write_casas(open_run(directory), out)
+    typer.echo(f"{count} readings in {out}")
 
 
 @app.command()
@@ -217,6 +322,30 @@ def main() -> NoReturn:
     sys.exit(0)
 
 
+def _check_floorplan(
+    source: str, out: Path | None, radius: float, resolution: float | None
+) -> None:
+    """Print a floor plan's findings and draw them; exit with 2 if nobody can live there."""
+    from fleet2d.floorplan.checkup import checkup
+    from fleet2d.floorplan.load import load_floorplan
+    from fleet2d.view.checkup import draw_checkup
+
+    plan = load_floorplan(source, resolution=resolution)
+    findings = checkup(plan, radius)
+    target = out or Path(f"{_file_name(plan.name) or 'plan'}-checkup.png")
+    draw_checkup(plan, findings, target)
+    typer.echo(f"{plan.name}: {plan.area_m2:.1f} m2, {_count(plan.rooms, 'room')}")
+    for number, finding in enumerate(findings, start=1):
+        typer.echo(f"{number:>3} {finding.severity}: {finding.text}")
+    if not findings:
+        typer.echo("ok: nothing wrong or odd was found")
+    for note in plan.notes:
+        typer.echo(f"note: {note}")
+    typer.echo(target)
+    if any(finding.severity == "unlivable" for finding in findings):
+        raise typer.Exit(2)
+
+
 def _count(things: Collection[Any], noun: str) -> str:
     return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
 
@@ -231,7 +360,7 @@ def _split(arguments: list[str] | None) -> tuple[str | None, list[str]]:
 
 def _fresh_directory(name: str) -> Path:
     """Make and return runs/NAME-001, or the first number that is free."""
-    plain = re.sub(r"[^\w.-]+", "-", name).strip(".-") or "run"
+    plain = _file_name(name) or "run"
     number = 1
     while True:
         directory = Path("runs") / f"{plain}-{number:03d}"
@@ -245,6 +374,11 @@ def _fresh_directory(name: str) -> Path:
             ) from error
         else:
             return directory
+
+
+def _file_name(name: str) -> str:
+    """Return what of a name can be a file's, wherever it comes from."""
+    return re.sub(r"[^\w.-]+", "-", name).strip(".-")
 
 
 def _announce_compilation() -> None:

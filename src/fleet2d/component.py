@@ -42,8 +42,10 @@ from fleet2d.problems import did_you_mean, problem, problem_at, rewritten, shown
 PACKAGES = {
     "floorplan": "fleet2d.floorplan",
     "behavior": "fleet2d.entities",
+    "object": "fleet2d.entities.objects",
     "algorithm": "fleet2d.algorithms",
     "metric": "fleet2d.metrics",
+    "sight": "fleet2d.sight",
 }
 """Where the built-in components of each kind live."""
 

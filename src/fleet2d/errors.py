@@ -25,6 +25,10 @@ class ComponentError(Fleet2DError):
     """A behavior, an algorithm or a metric broke its contract during a run."""
 
 
+class NoWayError(ComponentError):
+    """There is no way to a place at present; a shut door may be why."""
+
+
 class ArtifactError(Fleet2DError):
     """A run could not be stored or read back."""
 

@@ -152,11 +152,11 @@ def test_without_a_seed_one_is_drawn_stored_and_repeats_the_run() -> None:
     assert first.digest == run(content, seed=seed).digest
 
 
-def test_branches_share_the_home_and_nothing_else() -> None:
+def test_branches_share_the_floor_plan_and_nothing_else() -> None:
     simulation = fleet2d.Simulation(everything("20 min"))
     simulation.advance(600)
     branch = copy.deepcopy(simulation)
-    assert branch.home is simulation.home
+    assert branch.home.plan is simulation.home.plan
     assert branch._users[0] is not simulation._users[0]
     assert branch._users[0].behaviors[0] is not simulation._users[0].behaviors[0]
 

@@ -35,10 +35,13 @@ def test_space_is_built_once_for_each_radius() -> None:
     assert (0.2, 0.25) == (home.space(0.2).radius, home.space(0.25).radius)
 
 
-def test_copy_of_a_home_is_itself() -> None:
-    home = home_with()
+def test_copy_of_a_home_changes_on_its_own_and_shares_its_spaces() -> None:
+    home = home_with(("kitchen", 0, 3), ("bedroom", 3, 6))
+    twin = copy.deepcopy(home)
+    twin.use_room_as(twin.rooms[0], "Office")
 
-    assert copy.deepcopy(home) is home
+    assert twin.space(0.2) is home.space(0.2)
+    assert ("office", "kitchen") == (twin.rooms[0].type, home.rooms[0].type)
 
 
 def test_rooms_are_those_of_the_plan() -> None:

@@ -11,6 +11,7 @@ from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.houseexpo import HouseExpo, read_houseexpo
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.masks import label_parts
 
 SQUARE = [[0, 0], [4, 0], [4, 3], [0, 3]]
 
@@ -61,81 +62,142 @@ def test_every_plan_keeps_its_area_and_is_covered_by_disjoint_rooms(
             assert room is plan.room_at(*room.anchor_xy), path.name
 
 
-def test_every_plan_becomes_rooms_as_its_boxes_say(plans: list[Path]) -> None:
-    """Compare each cell's labels with a plain walk through the boxes."""
+def test_every_room_of_every_plan_hangs_together(plans: list[Path]) -> None:
+    """One walks from any cell of a room to any other without leaving it."""
     for path in plans:
-        boxes: dict[tuple[float, ...], list[str]] = {}
+        plan = read_houseexpo(path)
+        for room in plan.rooms:
+            pieces = label_parts(plan.room_of_cell == room.index, False).max() + 1
+            assert 1 == pieces, (path.name, room.name)
+
+
+def test_every_box_of_every_plan_is_a_room_or_a_note(plans: list[Path]) -> None:
+    """Count and place the rooms against the boxes of the files."""
+    for path in plans:
+        boxes: dict[tuple[float, ...], set[str]] = {}
         for category, found in json.loads(path.read_text())["room_category"].items():
             for box in found:
-                boxes.setdefault(tuple(box), []).append(category.lower())
-        plan = read_houseexpo(path, 0.1)
-        rng = np.random.default_rng(5)
-        cells = np.argwhere(plan.free)
-        for row, column in cells[rng.integers(len(cells), size=300)]:
-            x, y = plan.lattice.to_metres(plan.lattice.cell_centre(row, column)).tolist()
-            around = [
-                ((x1 - x0) * (y1 - y0), labels)
-                for (x0, y0, x1, y1), labels in boxes.items()
-                if x0 < x < x1 and y0 < y < y1
-            ]
-            expected = min(around, key=lambda found: found[0])[1] if around else []
-            room = plan.rooms[plan.room_of_cell[row, column]]
-            assert tuple(expected) == room.labels, (path.name, x, y)
+                boxes.setdefault(tuple(box), set()).add(category.lower())
+        plan = read_houseexpo(path)
+        labelled = [room for room in plan.rooms if room.labels]
+        lost = [note for note in plan.notes if "it is no room" in note or "one room" in note]
+        assert len(boxes) == len(labelled) + len(lost), path.name
+        for room in labelled:
+            assert 0.7 < max(
+                share_inside(plan, room.index, box)
+                for box, labels in boxes.items()
+                if labels <= set(room.labels)
+            ), (path.name, room.name)
 
 
-def test_rooms_of_2dea(plans: list[Path]) -> None:
-    plan = read(plans, "2deaa98e")
-
-    cells = {room.name: room.cells for room in plan.rooms}
-    assert {
-        "bedroom_0": 5426,
-        "bedroom_1": 7847,
-        "bedroom_2": 8066,
-        "bathroom_0": 3850,
-        "toilet_0": 1034,
-        "toilet_1": 1050,
-        "toilet_2": 3267,
-        "entryway_0": 7897,
-        "living_room_0": 17900,
-        "kitchen_0": 8987,
-        "unknown_0": 19694,
-    } == cells
-    assert ("dining_room", "kitchen") == plan.room("kitchen_0").labels
+def share_inside(plan: FloorPlan, room: int, box: tuple[float, ...]) -> float:
+    rows, columns = np.nonzero(plan.room_of_cell == room)
+    axis_x, axis_y = plan.lattice.centre_axes()
+    x, y = plan.lattice.to_metres(np.stack([axis_x[columns], axis_y[rows]], axis=1)).T
+    x0, y0, x1, y1 = box
+    return float(np.mean((x0 < x) & (x < x1) & (y0 < y) & (y < y1)))
 
 
-def test_rooms_of_658e(plans: list[Path]) -> None:
+def test_every_doorway_of_every_plan_crosses_free_space_from_wall_to_wall(
+    plans: list[Path],
+) -> None:
+    for path in plans:
+        plan = read_houseexpo(path)
+        free = shapely.MultiPolygon(plan.polygons)
+        for doorway in plan.doorways:
+            line = shapely.LineString(plan.lattice.to_lattice((doorway.start, doorway.end)))
+            assert shapely.relate_pattern(line, free, "1FFF0F***"), (path.name, doorway.name)
+            assert 0.5 <= doorway.width_m <= 1.41, (path.name, doorway.name)
+            assert doorway.rooms[0] != doorway.rooms[1], (path.name, doorway.name)
+
+
+# The cells of each room. Where rooms are what boxes cover, cells beyond a wall count, too, and what
+# no box covers is one room: the bathroom of 2dea has 3850 then. Here rooms end at walls.
+ROOMS = {
+    "2deaa98e": {
+        "bedroom_0": 4538,
+        "bedroom_1": 7861,
+        "bedroom_2": 7920,
+        "bathroom_0": 3360,
+        "toilet_0": 696,
+        "toilet_1": 720,
+        "toilet_2": 3955,
+        "entryway_0": 7872,
+        "living_room_0": 17911,
+        "kitchen_0": 8992,
+        "unknown_0": 21193,
+    },
+    "658e5214": {
+        "living_room_0": 10258,
+        "toilet_0": 1218,
+        "bathroom_0": 3420,
+        "bathroom_1": 4038,
+        "bedroom_0": 8973,
+        "bedroom_1": 5092,
+        "kitchen_0": 7694,
+        "garage_0": 11568,
+        "hallway_0": 9561,
+    },
+    "7e80c5f4": {
+        "office_0": 5762,
+        "lobby_0": 6353,
+        "toilet_0": 6117,
+        "living_room_0": 22383,
+        "kitchen_0": 11868,
+        "bedroom_0": 9862,
+        "unknown_0": 3015,
+    },
+}
+DOORWAYS = {
+    "2deaa98e": {
+        "toilet_2-toilet_1",
+        "toilet_2-toilet_0",
+        "toilet_2-entryway_0",
+        "unknown_0-bathroom_0",
+        "unknown_0-bedroom_0",
+        "unknown_0-bedroom_1",
+        "unknown_0-bedroom_2",
+    },
+    "658e5214": {
+        "bedroom_0-bathroom_0",
+        "bedroom_0-bedroom_1",
+        "bedroom_1-bathroom_1",
+        "hallway_0-toilet_0",
+        "hallway_0-kitchen_0",
+        "hallway_0-bedroom_0",
+        "living_room_0-garage_0",
+    },
+    "7e80c5f4": {
+        "lobby_0-living_room_0",
+        "living_room_0-toilet_0",
+        "living_room_0-kitchen_0",
+        "living_room_0-bedroom_0",
+        "office_0-bedroom_0",
+    },
+}
+
+
+@pytest.mark.parametrize("name", list(ROOMS))
+def test_rooms_end_at_walls_and_doorways_join_them(plans: list[Path], name: str) -> None:
+    plan = read(plans, name)
+
+    assert ROOMS[name] == {room.name: room.cells for room in plan.rooms}
+    assert DOORWAYS[name] == {doorway.name for doorway in plan.doorways}
+
+
+def test_labels_of_658e(plans: list[Path]) -> None:
     plan = read(plans, "658e5214")
 
-    assert {
-        "living_room_0": ("living_room",),
-        "toilet_0": ("toilet",),
-        "bathroom_0": ("toilet", "bathroom"),
-        "bathroom_1": ("toilet", "bathroom"),
-        "bedroom_0": ("bedroom",),
-        "bedroom_1": ("bedroom",),
-        "kitchen_0": ("kitchen",),
-        "garage_0": ("garage",),
-        "unknown_0": (),
-    } == {room.name: room.labels for room in plan.rooms}
+    assert (
+        ("toilet", "bathroom") == plan.room("bathroom_0").labels == plan.room("bathroom_1").labels
+    )
     assert ["toilet_0", "bathroom_0", "bathroom_1"] == [
         room.name for room in plan.rooms_of_type("toilet")
     ]
+    assert ["bathroom_1", "bedroom_0"] == [room.name for room in plan.neighbors("bedroom_1")]
+    assert ("hallway_0 is a guess" in plan.notes[-1], ()) == (True, plan.room("hallway_0").labels)
     assert 154.67 == pytest.approx(plan.area_m2, abs=0.05)
     assert (331, 202) == (plan.lattice.columns, plan.lattice.rows)
-
-
-def test_rooms_of_7e80(plans: list[Path]) -> None:
-    plan = read(plans, "7e80c5f4")
-
-    assert {
-        "office_0": 6138,
-        "lobby_0": 6353,
-        "toilet_0": 7293,
-        "living_room_0": 21257,
-        "kitchen_0": 11868,
-        "bedroom_0": 9526,
-        "unknown_0": 2925,
-    } == {room.name: room.cells for room in plan.rooms}
 
 
 def test_plan_without_categories_is_one_unknown_room(plans: list[Path]) -> None:
@@ -233,7 +295,7 @@ NAN, INFINITY = float("nan"), float("inf")
         ({"walls": []}, "no HouseExpo plan: it has no key `verts`"),
         ({"format": "fleet2d-floorplan"}, "Fleet2D's own format: use type native"),
         ([1, 2], "holds a list: a floor plan is a JSON object"),
-        (7, "holds a number"),
+        (7, "holds a single value"),
         (None, "holds nothing"),
         ({"verts": "outline"}, 'verts is "outline": a list of points'),
         ({"verts": {}}, "verts is {}: a list of points"),
@@ -283,7 +345,7 @@ def test_json_that_is_no_plan_is_refused_with_the_place(
         (b'{"verts": [[0, 0],\n [1', "is not JSON: .* in line 2, column"),
         (b"image: map.pgm", "is not JSON: Expecting value in line 1, column 1"),
         (b"\x89PNG\r\n\xff\xfe\x00", "is not a JSON text file"),
-        (b'{"verts":' + b"[" * 200_000, "is not a JSON text file"),
+        (b'{"verts":' + b"[" * 200_000, "is not a floor plan: it has lists in lists without end"),
     ],
 )
 def test_file_that_is_not_json_is_refused(tmp_path: Path, content: bytes, message: str) -> None:

@@ -4,6 +4,7 @@ from typing import Any, get_args
 
 import pytest
 import shapely
+import yaml
 
 from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
@@ -16,6 +17,9 @@ from fleet2d.floorplan.space import Space
 
 OUTLINE = [[0, 0], [5, 0], [5, 3], [0, 3]]
 PLAN = {"format": "fleet2d-floorplan", "version": 1, "name": "flat", "free": [{"outline": OUTLINE}]}
+
+BED = {"type": "bed", "footprint": [[1, 1], [3, 1], [3, 2], [1, 2]]}
+USE = {"x": 2, "y": 1.5, "heading": 0.5}
 
 
 def written(folder: Path, content: object) -> Path:
@@ -101,6 +105,22 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
         ({"rooms": [{"type": "hall", "name": "", "polygon": OUTLINE}]}, "must be texts"),
         ({"rooms": [{"type": "hall", "labels": "x", "polygon": OUTLINE}]}, "labels is not a list"),
         ({"rooms": [{"type": "hall", "poligon": OUTLINE}]}, "did you mean 'polygon'"),
+        ({"doorways": {}}, "doorways is not a list"),
+        ({"doorways": [{"start": [0, 0]}]}, r"doorways\[0\] has no key 'end'"),
+        ({"doorways": [{"start": [0, 0], "end": 3}]}, r"doorways\[0\]\.end is 3: a list of 2"),
+        ({"doorways": [{"start": [0, 0], "end": [1, 1], "leaf": 1}]}, "leaf is 1: true or false"),
+        ({"doorways": [{"start": [0, 0], "end": [1, 1], "name": ""}]}, 'name is "": a text'),
+        ({"doorways": [{"start": [0, 0], "end": [1, 1], "lef": True}]}, "did you mean 'leaf'"),
+        ({"objects": [{"footprint": OUTLINE}]}, r"objects\[0\] has no key 'type'"),
+        ({"objects": [{"type": "", "footprint": OUTLINE}]}, r'objects\[0\]\.type is "": a text'),
+        ({"objects": [{"type": "bed", "footprint": [[0, 0]]}]}, "footprint has 1 different points"),
+        ({"objects": [{**BED, "blocks": "air"}]}, 'blocks is "air": one of nothing, path, sight'),
+        ({"objects": [{**BED, "heading": "north"}]}, "heading .* is not a number"),
+        ({"objects": [{**BED, "uses": [{"x": 1, "y": 1}]}]}, r"uses\[0\] has no key 'heading'"),
+        ({"objects": [{**BED, "uses": [{**USE, "posture": "hang"}]}]}, "one of stand, sit, lie"),
+        ({"objects": [{**BED, "uses": [{**USE, "approach": 1}]}]}, "approach is 1: a list of 2"),
+        ({"no_go": [[0, 0], [1, 1]]}, r"no_go\[0\]\[0\] is 0: a list of 2 numbers"),
+        ({"no_go": [[[0, 0], [2, 2], [2, 0], [0, 2]]]}, r"no_go\[0\] is no sound outline"),
         ({"entrance": [9, 9]}, r"the entrance of flat at \(9, 9\) m is not in free space"),
         ({"entrance": "door"}, 'entrance is "door": a list of 2 numbers'),
     ],
@@ -112,6 +132,40 @@ def test_what_is_no_plan_is_refused_with_the_place(
         read(tmp_path, **change)
 
     assert str(tmp_path / "plan.json") in str(caught.value)
+
+
+def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
+    content = {
+        **PLAN,
+        "objects": [{**BED, "uses": [{**USE, "posture": "lie"}]}],
+        "no_go": [OUTLINE],
+    }
+    path = tmp_path / "plan.yaml"
+    path.write_text(yaml.safe_dump(content))  # with aliases, as the outline is in it twice
+
+    plan = read_native(path)
+
+    assert plan == read_native(written(tmp_path, content))
+    assert plan == load_floorplan(path)
+    assert [("bed_0", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
+
+
+def test_doorways_that_a_file_leaves_out_are_looked_for(tmp_path: Path) -> None:
+    """And those that it says it hasn't are not."""
+    pinched = [[0, 0], [3, 0], [3, 1], [3.1, 1], [3.1, 0], [6, 0], [6, 3], [3.1, 3], [3.1, 1.9]]
+    pinched += [[3, 1.9], [3, 3], [0, 3]]
+    rooms = [
+        {"type": "kitchen", "polygon": [[0, 0], [3.05, 0], [3.05, 3], [0, 3]]},
+        {"type": "hall", "polygon": [[3.05, 0], [6, 0], [6, 3], [3.05, 3]]},
+    ]
+
+    found = read(tmp_path, free=[{"outline": pinched}], rooms=rooms)
+    none = read(tmp_path, free=[{"outline": pinched}], rooms=rooms, doorways=[])
+
+    assert [0.9] == [pytest.approx(door.width_m) for door in found.doorways]
+    assert () == none.doorways
+    assert found == read_native(written(tmp_path, found.to_native()))
+    assert none == read_native(written(tmp_path, none.to_native()))
 
 
 def test_native_and_bundled_are_found_by_name(tmp_path: Path) -> None:

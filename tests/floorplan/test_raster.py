@@ -159,7 +159,9 @@ def test_truncated_png_is_refused(tmp_path: Path) -> None:
     content = (tmp_path / "map.png").read_bytes()
 
     for length in (10, 40, len(content) // 2):
-        with pytest.raises(FloorPlanError, match="damaged PNG"):
+        with pytest.raises(
+            FloorPlanError, match=r"damaged PNG|holds 29 rows, but its header says 60"
+        ):
             read_grey(written(tmp_path, content[:length], "map.png"))
 
 

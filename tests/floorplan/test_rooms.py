@@ -5,39 +5,10 @@ import shapely
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.rooms import LabelledRegion, Room, assign_rooms
-from fleet2d.floorplan.vocabulary import PRIORITY, leading_type, room_type
 
 LATTICE = Lattice(0.1, (0.0, 0.0), columns=40, rows=30)
 FREE = np.zeros((30, 40), np.bool_)
 FREE[2:28, 2:38] = True
-
-HOUSEEXPO = [
-    "Bedroom",
-    "Bathroom",
-    "Toilet",
-    "Kitchen",
-    "Room",
-    "Living_Room",
-    "Office",
-    "Dining_Room",
-    "Garage",
-    "Hallway",
-    "Hall",
-    "Child_Room",
-    "Gym",
-    "Storage",
-    "Balcony",
-    "Wardrobe",
-    "Guest_Room",
-    "Lobby",
-    "Entryway",
-    "Terrace",
-    "Loggia",
-    "Boiler_room",
-    "Aeration",
-    "Passenger_elevator",
-    "Freight_elevator",
-]
 
 
 def region(label: str, x0: float, y0: float, x1: float, y1: float) -> LabelledRegion:
@@ -175,18 +146,3 @@ def test_one_name_for_two_rooms_is_refused() -> None:
 
     with pytest.raises(FloorPlanError, match="two rooms are named 'den'"):
         assign_rooms(LATTICE, FREE, den)
-
-
-def test_room_type_of_every_houseexpo_category_is_known() -> None:
-    known = {*PRIORITY, "room"}
-
-    assert 25 == len(HOUSEEXPO)
-    assert set() == {room_type(label) for label in HOUSEEXPO} - known
-
-
-def test_leading_type_prefers_living_to_catch_alls() -> None:
-    assert "bathroom" == leading_type(("toilet", "bathroom"))
-    assert "child_room" == leading_type(("bedroom", "child_room"))
-    assert "sauna" == leading_type(("room", "sauna", "attic"))
-    assert "gym" == leading_type(("sauna", "gym"))
-    assert "unknown" == leading_type(())

@@ -76,7 +76,8 @@ def test_real_maps_load_with_every_pixel_accounted_for(
     assert f"specks removed: {specks} groups" in notes or specks == 0
     added = 0.28 if specks else 0.0
     assert free_m2 == pytest.approx(plan.area_m2 - added + left_out, abs=0.015)
-    assert ["unknown_0"] == [room.name for room in plan.rooms]
+    assert np.array_equal(plan.free, plan.room_of_cell >= 0)
+    assert sum(room.area_m2 for room in plan.rooms) == pytest.approx(plan.area_m2)
     assert 1 == len(plan.polygons)
 
 
@@ -219,6 +220,17 @@ def test_scale_mode_takes_what_is_between_for_unknown(tmp_path: Path) -> None:
     assert read_ros(written(tmp_path)) == read_ros(written(tmp_path, mode="scale"))
 
 
+def test_raw_mode_takes_values_for_percent_and_those_above_100_for_unknown(tmp_path: Path) -> None:
+    percent = np.select([ROOM == FREE, ROOM == OCCUPIED], [0, 100], 255).astype(np.uint8)
+    percent[20:30, 20:30] = 19  # just below free_thresh
+    percent[15, 25:29] = 20
+
+    plan = read_ros(written(tmp_path, percent, mode="raw"), speck_area_m2=0)
+
+    assert 2.5 - 4 * 0.05**2 == pytest.approx(plan.area_m2)
+    assert read_ros(written(tmp_path)) == read_ros(written(tmp_path, percent, mode="raw"))
+
+
 def test_transparent_pixels_of_a_png_are_unknown(tmp_path: Path) -> None:
     images = pytest.importorskip("PIL.Image")
     pixels = np.dstack([ROOM, ROOM, ROOM, np.full_like(ROOM, 255)])
@@ -323,8 +335,8 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
         ({"resolution": 50}, "resolution is 50 m per pixel"),
         ({"resolution": ".nan"}, "resolution is nan: a finite number"),
         ({"resolution": ".inf"}, "resolution is inf: a finite number"),
-        ({"resolution": "fine"}, "resolution is 'fine': a number"),
-        ({"resolution": "true"}, "resolution is True: a number"),
+        ({"resolution": "fine"}, 'resolution is "fine": a number'),
+        ({"resolution": "true"}, "resolution is true: a number"),
         ({"resolution": [1]}, "resolution is [1]: a number"),
         ({"free_thresh": 0.7}, "free_thresh, 0.7, is above occupied_thresh, 0.65"),
         ({"free_thresh": -0.1}, "a probability from 0 to 1"),
@@ -334,9 +346,9 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
         ({"origin": "[0, .nan, 0]"}, "origin[1] is nan"),
         ({"origin": [1e9, 0, 0]}, "too far out"),
         ({"negate": 2}, "negate is 2"),
-        ({"negate": "maybe"}, "negate is 'maybe'"),
-        ({"mode": "raw"}, "mode raw is not supported"),
-        ({"mode": "best"}, "mode is 'best': trinary or scale"),
+        ({"negate": "maybe"}, 'negate is "maybe"'),
+        ({"mode": "raw", "negate": 1}, "negate is 1 in mode raw"),
+        ({"mode": "best"}, 'mode is "best": trinary, scale or raw'),
         ({"free_thresh": 0}, "no pixel is free"),
         ({"resolution": 0.005}, "the free space is nowhere 0.3 m wide"),
     ],
@@ -350,10 +362,10 @@ def test_wrong_settings_are_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"", "no ROS map: a mapping"),
-        (b"[1, 2]", "no ROS map: a mapping"),
+        (b"", "holds nothing: a floor plan is a YAML mapping"),
+        (b"[1, 2]", "holds a list: a floor plan is a YAML mapping"),
         (b"image: [", "not YAML"),
-        (b"P5\n4 3\n255\n\xff\xfe\x00", "not YAML"),
+        (b"P5\n4 3\n255\n\xff\xfe\x00", "not a YAML text file"),
         (b"mode: inorder\nposes: []\n", "no ROS map: the key 'image' is missing"),
     ],
 )
@@ -365,7 +377,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, said: str) -> N
 
 
 def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
-    assert "there is no such file" in refusal(tmp_path / "none.yaml")
+    assert "there is no file" in refusal(tmp_path / "none.yaml")
     assert "is a folder" in refusal(tmp_path)
 
 

@@ -1,5 +1,6 @@
 import copy
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,6 @@ from fleet2d.floorplan.valetudo import (
     read_valetudo_charger,
     read_valetudo_path,
     read_valetudo_paths,
-    segment_type,
 )
 
 MAPS = (
@@ -146,9 +146,11 @@ def test_real_segments_are_rooms_of_the_area_that_the_file_states(
 
     names = [s["metaData"].get("name") or f"segment_{s['metaData']['segmentId']}" for s in segments]
     assert names == [room.name for room in plan.rooms][: len(names)]
-    assert ["unknown_0"] * ("floor" in {item["type"] for item in content["layers"]}) == [
-        room.name for room in plan.rooms[len(names) :]
-    ]
+    if segments:
+        rest = ["unknown_0"] * ("floor" in {item["type"] for item in content["layers"]})
+        assert rest == [room.name for room in plan.rooms[len(names) :]]
+    else:  # rooms are found then
+        assert {"room"} == {room.type for room in plan.rooms}
     for segment, room in zip(segments, plan.rooms, strict=False):
         in_wall = len(pixels_of({"layers": [segment]}, "segment") & wall)
         stated = segment["metaData"]["area"] / 100**2
@@ -188,11 +190,22 @@ def test_real_map_with_german_names_has_rooms_of_known_types(shared_data: Path) 
     assert expected == {room.name: room.type for room in plan.rooms}
 
 
-def test_real_no_go_area_is_an_obstacle(shared_data: Path) -> None:
+def test_real_no_go_area_is_kept_out_of_and_no_wall(shared_data: Path) -> None:
+    path = shared_data / "valetudo" / "roborock_s6_segments.json"
+
+    plan, open_plan = read_valetudo(path), read_valetudo(path, no_go="ignore")
+
+    (area,) = plan.no_go
+    assert pytest.approx((25.0, -24.1, 27.2, -23.2), abs=0.1) == area.bounds
+    assert () == open_plan.no_go
+    assert np.array_equal(plan.room_of_cell, open_plan.room_of_cell)
+
+
+def test_real_no_go_area_can_be_a_wall(shared_data: Path) -> None:
     path = shared_data / "valetudo" / "roborock_s6_segments.json"
     area = shapely.box(25.0, -24.1, 27.2, -23.2)
 
-    open_plan, plan = read_valetudo(path, no_go="ignore"), read_valetudo(path)
+    open_plan, plan = read_valetudo(path, no_go="ignore"), read_valetudo(path, no_go="wall")
 
     lost = whole(open_plan).intersection(area).area
     assert lost > 1.5
@@ -301,27 +314,6 @@ def test_pixels_of_two_segments_belong_to_the_smaller(tmp_path: Path) -> None:
     assert any("50 pixels are in several segments" in note for note in plan.notes)
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        ("Kitchen", "kitchen"),
-        ("living room", "living_room"),
-        ("Master Bedroom", "bedroom"),
-        ("Bedroom 2", "bedroom"),
-        ("Guest Room", "guest_room"),
-        ("Entrance", "entryway"),
-        ("Küche", "kitchen"),
-        ("WC", "toilet"),
-        ("Yoga Studio", "yoga_studio"),
-        ("Dressing Room", "dressing_room"),
-        ("Room 5", "room_5"),
-        ("42", "42"),
-    ],
-)
-def test_segment_type_is_found_by_the_last_words_of_its_name(name: str, kind: str) -> None:
-    assert kind == segment_type(name)
-
-
 @pytest.mark.parametrize("name", ["", "   ", None, 7])
 def test_segment_without_a_proper_name_is_called_by_its_id(tmp_path: Path, name: object) -> None:
     plan = home(tmp_path, layer("segment", runs(0, 0, 20, 20), segmentId="5", name=name))
@@ -338,11 +330,31 @@ def test_umlaut_written_as_two_characters_is_the_same_name(tmp_path: Path) -> No
 # --- No-go areas and virtual walls ----------------------------------------------------------------
 
 
-def test_no_go_area_takes_every_pixel_that_it_touches(tmp_path: Path) -> None:
+def walled(folder: Path, *entities: dict[str, Any]) -> FloorPlan:
+    return read_valetudo(
+        written(folder, vacuum_map(KITCHEN, entities=list(entities))), no_go="wall"
+    )
+
+
+def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path: Path) -> None:
+    entities = [
+        entity("no_go_area", 101, 100, 114, 100, 114, 150, 101, 150),
+        entity("virtual_wall", 50, 100, 250, 100),
+    ]
+
+    plan = home(tmp_path, KITCHEN, entities=entities)
+
+    assert_box((0.5, -2.0, 2.5, -0.5), plan)
+    assert [(1.01, -1.5, 1.14, -1.0), (0.5, -1.025, 2.5, -0.975)] == [a.bounds for a in plan.no_go]
+    assert "no-go areas in the map: 1, robots keep out of them" in plan.notes
+    assert plan == read_native(written(tmp_path, plan.to_native()))
+
+
+def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) -> None:
     """From 101 to 114 cm are the pixels 20 to 22, down to 150 cm the row 29."""
     area = entity("no_go_area", 101, 100, 114, 100, 114, 150, 101, 150)
 
-    plan = home(tmp_path, KITCHEN, entities=[area])
+    plan = walled(tmp_path, area)
 
     (hole,) = (shapely.Polygon(hole) for hole in whole(plan).geoms[0].interiors)
     assert pytest.approx((1.0, -1.5, 1.15, -1.0)) == hole.bounds
@@ -353,7 +365,7 @@ def test_no_go_area_takes_every_pixel_that_it_touches(tmp_path: Path) -> None:
 def test_virtual_wall_parts_a_room(tmp_path: Path, y: int) -> None:
     wall = entity("virtual_wall", 50, y, 250, y + 31)
 
-    plan = home(tmp_path, KITCHEN, entities=[wall])
+    plan = walled(tmp_path, wall)
 
     assert 2 == len(plan.polygons)
     assert plan.area_m2 > 1140 * PIXEL_AREA - 0.2
@@ -404,7 +416,11 @@ def test_no_go_area_beyond_the_floor_and_no_mop_area_change_nothing(tmp_path: Pa
 def test_no_go_area_over_everything_leaves_no_floor(tmp_path: Path) -> None:
     area = entity("no_go_area", 0, 0, 900, 0, 900, 900, 0, 900)
 
-    assert "no floor is left" in refusal(tmp_path, vacuum_map(entities=[area]))
+    path = written(tmp_path, vacuum_map(entities=[area]))
+
+    with pytest.raises(FloorPlanError, match="no floor is left"):
+        read_valetudo(path, no_go="wall")
+    assert read_valetudo(path).area_m2 == read_valetudo(path, no_go="ignore").area_m2
 
 
 # --- Path and charger -----------------------------------------------------------------------------
@@ -430,11 +446,41 @@ def test_path_and_charger_are_in_the_frame_of_the_plan(tmp_path: Path) -> None:
     assert "also in the map, without effect on the plan: predicted_path (1)" in plan.notes
 
 
+@pytest.mark.parametrize("name", MAPS)
+def test_real_charger_is_an_object_with_a_place_to_stand_in_front_of_it(
+    shared_data: Path, name: str
+) -> None:
+    plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
+
+    (charger,) = plan.objects
+
+    (place,) = charger.uses
+    at = charger.footprint.centroid
+    assert ("charger", "charger", "nothing") == (charger.name, charger.type, charger.blocks)
+    assert read_valetudo_charger(shared_data / "valetudo" / f"{name}.json") == pytest.approx(
+        (at.x, at.y)
+    )
+    assert whole(plan).contains(shapely.Point(place.x, place.y).buffer(0.17))
+    to_x, to_y = at.x - place.x, at.y - place.y
+    assert math.hypot(to_x, to_y) < 0.6
+    assert (math.cos(place.heading), math.sin(place.heading)) == pytest.approx(
+        (to_x / math.hypot(to_x, to_y), to_y / math.hypot(to_x, to_y)), abs=1e-5
+    )
+
+
+def test_charger_far_from_all_floor_has_no_place_to_stand(tmp_path: Path) -> None:
+    plan = home(tmp_path, entities=[entity("charger_location", 5000, 5000)])
+
+    assert [()] == [thing.uses for thing in plan.objects]
+    assert plan == read_native(written(tmp_path, plan.to_native()))
+
+
 def test_map_without_path_and_charger_says_so(tmp_path: Path) -> None:
     path = written(tmp_path, vacuum_map())
 
     assert (0, 2) == read_valetudo_path(path).shape
     assert [] == read_valetudo_paths(path)
+    assert () == read_valetudo(path).objects
     assert read_valetudo_charger(path) is None
 
 
@@ -490,12 +536,14 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path: Path) -> No
     [
         ({"__class": "Map"}, "no Valetudo map"),
         ({"metaData": {"version": 1}}, "version 1 of Valetudo's map format"),
-        ({"metaData": None}, "version None"),
+        ({"metaData": None}, "version null"),
         ({"pixelSize": None}, "pixelSize is null"),
         ({"pixelSize": 0}, "pixelSize is 0"),
         ({"pixelSize": 0.05}, "1 to 100 cm"),
         ({"pixelSize": -5}, "pixelSize is -5"),
-        ({"pixelSize": float("nan")}, "pixelSize is nan"),
+        ({"pixelSize": float("nan")}, "pixelSize is NaN"),
+        ({"pixelSize": 10**400}, "pixelSize is a whole number of 1329 bits"),
+        ({"size": {"x": 10**400, "y": 5}}, "size is"),
         ({"size": {"x": -1, "y": 5}}, "size is"),
         ({"size": [1, 2]}, "size is"),
         ({"layers": {}}, "layers is {}: a list"),

@@ -1,5 +1,6 @@
 """What a camera sees, against a twin that looks at every wall and at sixty digits of a cosine."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,19 +15,32 @@ from tests.reference import look as slow
 from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.engine.buckets import new_memory
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels.lens import Lenses, in_wedge
 from fleet2d.kernels.look import (
+    CAMERA,
+    IDENTITY,
+    SIGHTING,
+    STEP,
+    TRUE_X,
+    TRUE_Y,
+    USER,
     USER_LOST,
     USER_SEEN,
     Crowd,
-    Detections,
-    Lens,
     Memory,
+    Rule,
     SightEvents,
-    in_wedge,
+    X,
+    Y,
     look,
 )
 from fleet2d.kernels.motion import Poses
-from fleet2d.sight.camera import Camera
+from fleet2d.kernels.perception import DETECT, ErrorTables
+from fleet2d.sight.camera import Camera, Lens
+from fleet2d.sight.tables import Scene as LensScene
+from fleet2d.sight.tables import error_tables, stack_lenses
 
 Int64 = npt.NDArray[np.int64]
 
@@ -44,13 +58,18 @@ class Scene(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What came of a look: steps done, sightings, events, and the memory afterwards."""
+    """What came of a look: steps done, sightings, events, counts, and the memory afterwards."""
 
     done: int
     sightings: list[tuple[int, ...]]
     events: list[tuple[int, ...]]
+    counts: list[list[list[int]]]
     noticed: list[int]
     seen: list[int]
+
+
+RADIUS = 100  # of users, lattice units
+STEP_US = 1_000_000
 
 
 def half_angle(degrees: float) -> int:
@@ -58,68 +77,98 @@ def half_angle(degrees: float) -> int:
     return round(degrees / 360 * 4096)
 
 
-def new_memory(scene: Scene) -> Memory:
+def lattice() -> Lattice:
+    """Return a lattice whose units are those of the homes here."""
+    return Lattice(cell=0.05, origin=(0.0, 0.0), columns=20, rows=20)
+
+
+def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTables, Rule]:
+    """Return cameras that don't err as the kernel wants them."""
+    lenses = [Lens(**eye._asdict()) for eye in eyes]
+    count = len(scene.users)
+    about = LensScene([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
+    errors = error_tables(lenses, [None] * len(eyes), about)
+    for c in range(len(eyes)):
+        errors.keys[c, :, DETECT] = scene.keys + np.uint64(c)
+    patience = max(eye.patience for eye in eyes)
+    rule = Rule(patience, STEP_US, 0, count * len(eyes), False, False)
+    return stack_lenses(lenses, [False] * len(eyes), about), errors, rule
+
+
+def memory_for(eyes: Sequence[slow.Eye], scene: Scene) -> Memory:
     """Return a memory of nobody."""
     count = len(scene.users)
-    return Memory(scene.keys, np.full(count, -1, np.int64), np.zeros(count, np.uint8))
+    rows = max((eye.latency // eye.period + 2) * count for eye in eyes)
+    return new_memory(len(eyes), count, rows)
 
 
 def looked(
     home: Home,
-    eye: slow.Eye,
+    eye: slow.Eye | Sequence[slow.Eye],
     scene: Scene,
     first: int,
     stops: tuple[bool, bool] = (False, False),
     memory: Memory | None = None,
+    rows: int | None = None,
 ) -> Seen:
     """Return what the kernel sees."""
-    memory = memory or new_memory(scene)
-    lens = Lens(eye.near**2, eye.far**2, eye.half_angle, eye.chance, eye.patience)
+    eyes = [eye] if isinstance(eye, slow.Eye) else list(eye)
+    memory = memory or memory_for(eyes, scene)
+    lenses, errors, rule = kernel_args(eyes, scene)
     x, y, heading, away = (np.ascontiguousarray(column) for column in scene.robot.T)
     robot = Poses(x, y, heading, away.astype(np.uint8))
     user_x, user_y, user_away = (np.ascontiguousarray(scene.users[..., i]) for i in range(3))
-    room = scene.users.shape[0] * len(x)
-    sightings = Detections(*(np.full(room, -7, dtype) for dtype in _SIGHTINGS))
-    events = SightEvents(*(np.full(room, -7, dtype) for dtype in _EVENTS))
+    count, steps = user_x.shape
+    headings, postures = np.zeros_like(user_x), np.zeros(user_x.shape, np.int8)
+    crowd = Crowd(user_x, user_y, headings, user_away.astype(np.uint8), postures)
+    room = count * len(eyes) * (steps + 1) if rows is None else rows
+    sightings = np.full((room, SIGHTING), -7, np.int64)
+    events = SightEvents(*(np.full((count + 1) * steps, -7, dtype) for dtype in _EVENTS))
+    rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
+    before = memory.counts.copy()
     done, found, happened = look(
-        home.mesh,
-        lens,
-        robot,
-        Crowd(user_x, user_y, user_away.astype(np.uint8)),
-        first,
-        memory,
-        stops,
-        sightings,
-        events,
+        home.mesh, lenses, errors, rule, robot, crowd, first, memory, sightings, events
     )
+    rows_ = sightings[:found]
+    assert (rows_[:, USER] == rows_[:, IDENTITY]).all()
+    assert (rows_[:, [X, Y]] == rows_[:, [TRUE_X, TRUE_Y]]).all()
     return Seen(
         done,
-        list(zip(*(array[:found].tolist() for array in sightings), strict=True)),
+        [tuple(row) for row in rows_[:, [STEP, CAMERA, USER, X, Y]].tolist()],
         list(zip(*(array[:happened].tolist() for array in events), strict=True)),
+        (memory.counts - before).tolist(),
         memory.noticed.tolist(),
         memory.seen.tolist(),
     )
 
 
-_SIGHTINGS = (np.int64, np.int32, np.int64, np.int64)
 _EVENTS = (np.int64, np.int32, np.int32)
 
 
 def looked_slowly(
-    home: Home, eye: slow.Eye, scene: Scene, first: int, stops: tuple[bool, bool] = (False, False)
+    home: Home,
+    eye: slow.Eye | Sequence[slow.Eye],
+    scene: Scene,
+    first: int,
+    stops: tuple[bool, bool] = (False, False),
 ) -> Seen:
     """Return what the twin sees."""
-    known = [slow.Known(int(key), -1, False) for key in scene.keys]
-    done, sightings, events = slow.look(
+    eyes = [eye] if isinstance(eye, slow.Eye) else list(eye)
+    count = len(scene.users)
+    known = [slow.Known(-1, False) for _ in range(count + 1)]
+    found = slow.look(
         home.walls,
-        eye,
+        eyes,
         [(slow.Body(x, y, bool(away)), heading) for x, y, heading, away in scene.robot.tolist()],
         [[slow.Body(x, y, bool(away)) for x, y, away in user] for user in scene.users.tolist()],
+        [RADIUS] * count,
+        [[(key + c) % 2**64 for key in scene.keys.tolist()] for c in range(len(eyes))],
+        STEP_US,
         first,
         known,
         stops,
     )
-    return Seen(done, sightings, events, [k.noticed for k in known], [int(k.seen) for k in known])
+    return Seen(*found, [k.noticed for k in known], [int(k.seen) for k in known])
 
 
 def scene_in(home: Home, rng: np.random.Generator, count: int, steps: int = STEPS) -> Scene:
@@ -159,6 +208,22 @@ def eyes(draw: st.DrawFn) -> slow.Eye:
     )
 
 
+@st.composite
+def odd_eyes(draw: st.DrawFn) -> slow.Eye:
+    """Cameras mounted anywhere, that pan, wait and lag, and look at whole bodies."""
+    headings = st.sampled_from([*EIGHTHS, 1, 300, 4000])
+    return draw(eyes())._replace(
+        forward=draw(st.sampled_from([0, 0, 60, -130])),
+        left=draw(st.sampled_from([0, 0, 25, -300])),
+        heading=draw(headings),
+        pans=tuple(draw(st.lists(headings, max_size=3))),
+        pan_us=draw(st.sampled_from([1_000_000, 2_500_000])),
+        period=draw(st.sampled_from([1, 1, 2, 5])),
+        latency=draw(st.sampled_from([0, 0, 1, 4])),
+        points=draw(st.sampled_from([0, 0, 1, 4, 7])),
+    )
+
+
 stoppings = st.tuples(st.booleans(), st.booleans())
 
 
@@ -176,6 +241,53 @@ def test_look_is_that_of_the_twin(
     scene = scene_in(home, np.random.default_rng(seed), count)
 
     assert looked_slowly(home, eye, scene, first, stops) == looked(home, eye, scene, first, stops)
+
+
+@quick
+@given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(0, 3), stoppings)
+def test_look_of_several_cameras_is_that_of_the_twin(
+    polygons: list[Polygon],
+    cameras: list[slow.Eye],
+    seed: int,
+    count: int,
+    stops: tuple[bool, bool],
+) -> None:
+    home = home_of(polygons)
+    scene = scene_in(home, np.random.default_rng(seed), count)
+    expected = looked_slowly(home, cameras, scene, 7, stops)
+
+    assert expected == looked(home, cameras, scene, 7, stops)
+
+
+@quick
+@given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(1, STEPS - 1))
+def test_look_of_several_cameras_at_two_spans_is_that_at_one(
+    polygons: list[Polygon], cameras: list[slow.Eye], seed: int, cut: int
+) -> None:
+    home = home_of(polygons)
+    scene = scene_in(home, np.random.default_rng(seed), 3)
+    whole = looked(home, cameras, scene, 50)
+
+    memory = memory_for(cameras, scene)
+    first = looked(home, cameras, part_of(scene, 0, cut), 50, memory=memory)
+    second = looked(home, cameras, part_of(scene, cut, STEPS), 50 + cut, memory=memory)
+
+    assert whole.sightings == first.sightings + second.sightings
+    assert whole.events == first.events + second.events
+    assert (whole.noticed, whole.seen) == (second.noticed, second.seen)
+
+
+def part_of(scene: Scene, begin: int, end: int) -> Scene:
+    """Return some steps of a scene."""
+    return Scene(scene.robot[begin:end], scene.users[:, begin:end], scene.keys)
+
+
+def test_look_stops_where_the_next_sightings_might_not_fit() -> None:
+    scene = line_of([(50, 0), (60, 0)], steps=9)
+
+    seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 0, rows=6)
+
+    assert (3, 6) == (seen.done, len(seen.sightings))
 
 
 @pytest.mark.parametrize("degrees", ANGLES)
@@ -200,7 +312,7 @@ def test_look_at_two_spans_is_that_at_one(
     scene = scene_in(home, np.random.default_rng(seed), 3)
     whole = looked(home, eye, scene, 50)
 
-    memory = new_memory(scene)
+    memory = memory_for([eye], scene)
     before = Scene(scene.robot[:cut], scene.users[:, :cut], scene.keys)
     after = Scene(scene.robot[cut:], scene.users[:, cut:], scene.keys)
     first = looked(home, eye, before, 50, memory=memory)
@@ -210,6 +322,7 @@ def test_look_at_two_spans_is_that_at_one(
         first.done + second.done,
         first.sightings + second.sightings,
         first.events + second.events,
+        (np.array(first.counts) + np.array(second.counts)).tolist(),
         second.noticed,
         second.seen,
     )
@@ -224,7 +337,7 @@ def test_look_that_goes_on_after_each_stop_sees_what_one_that_never_stops_does(
     scene = scene_in(home, np.random.default_rng(seed), 3)
     whole = looked(home, eye, scene, 0)
 
-    memory, at, sightings, events = new_memory(scene), 0, [], []
+    memory, at, sightings, events = memory_for([eye], scene), 0, [], []
     while at < STEPS:
         rest = Scene(scene.robot[at:], scene.users[:, at:], scene.keys)
         seen = looked(home, eye, rest, at, stops, memory)
@@ -246,10 +359,10 @@ def test_look_at_another_user_leaves_the_draws_of_the_first_alone() -> None:
     both = scene_in(home, np.random.default_rng(4), 2, 60)
     second = Scene(both.robot, both.users[1:], both.keys[1:])
 
-    of_both = [(s, x, y) for s, user, x, y in looked(home, eye, both, 0).sightings if user == 1]
+    of_both = [(s, x, y) for s, _, user, x, y in looked(home, eye, both, 0).sightings if user == 1]
 
     assert len(of_both) > 3
-    assert of_both == [(s, x, y) for s, _, x, y in looked(home, eye, second, 0).sightings]
+    assert of_both == [(s, x, y) for s, _, _, x, y in looked(home, eye, second, 0).sightings]
 
 
 def line_of(users: list[tuple[int, int]], steps: int = 1, heading: int = 0) -> Scene:
@@ -363,7 +476,7 @@ def test_look_counts_a_user_as_lost_after_its_patience() -> None:
 
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 100)
 
-    assert [(100, 0, 551, 501), (101, 0, 551, 501)] == seen.sightings
+    assert [(100, 0, 0, 551, 501), (101, 0, 0, 551, 501)] == seen.sightings
     assert [(100, 0, USER_SEEN), (105, 0, USER_LOST)] == seen.events
 
 
@@ -411,4 +524,4 @@ def test_look_without_users_does_all_steps() -> None:
 
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), empty, 0, (True, True))
 
-    assert Seen(6, [], [], [], []) == seen
+    assert Seen(6, [], [], [[]], [-1], [0]) == seen

@@ -58,7 +58,7 @@ def test_a_users_own_style_changes_nothing(home: FloorPlan, tmp_path: Path) -> N
 
 
 def test_colours_show_rooms_walls_and_outside(home: FloorPlan) -> None:
-    kitchen, wall, outside = pixels(home, (15.0, 6.2), (4.075, 3.0), (19.5, 1.0), names=False)
+    kitchen, wall, outside = pixels(home, (16.5, 8.0), (4.075, 3.0), (19.5, 1.0), names=False)
 
     assert np.allclose(to_rgb(ROOM_COLORS["kitchen"]), kitchen, atol=0.01)
     assert np.allclose(to_rgb(WALL_COLOR), wall, atol=0.01)

@@ -1,6 +1,6 @@
 """Algorithms: what learns from the history of a run, and what others may read."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,7 +10,7 @@ from pydantic import Field
 
 from fleet2d.algorithms.history import History
 from fleet2d.component import Component
-from fleet2d.engine.streams import Draws, stream_key
+from fleet2d.streams import Draws, stream_key
 from fleet2d.units import PositiveDuration
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ class Algorithm(Component):
     """
 
     kind: ClassVar[str] = "algorithm"
+    needs: ClassVar[Set[str]] = frozenset()  # of exposure, explored, first_seen, last_seen …
 
     period: PositiveDuration = Field(
         default=timedelta(hours=1), description="how often it is updated"

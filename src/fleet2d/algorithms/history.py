@@ -8,9 +8,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.observations import (
+    NOWHERE,
+    OBSERVATION,
+    Looks,
+    NearestRooms,
+    Observations,
+    Truth,
+    perceived,
+    truth,
+)
 from fleet2d.entities.plan import Motion, State
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.headings import in_radians
+from fleet2d.kernels.look import STEP
 from fleet2d.kernels.measure import count_rooms, sum_moves
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
@@ -20,22 +31,6 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
 
 Array = TypeVar("Array", bound=NDArray[Any])
-
-NOWHERE = -1  # the room of who is away
-
-
-class Observations(NamedTuple):
-    """Detections in order of step, robot, user; all arrays of one length.
-
-    Users, robots and rooms are indices into the scenario's users and robots and the home's rooms.
-    """
-
-    step: NDArray[np.int64]
-    robot: NDArray[np.int32]
-    user: NDArray[np.int32]
-    x: NDArray[np.float64]  # perceived position [m]
-    y: NDArray[np.float64]
-    room: NDArray[np.int16]
 
 
 class BodyPoses:
@@ -115,14 +110,29 @@ class Piece:
     motion: Motion
 
 
+class SensorRow(NamedTuple):
+    """A reading of a sensor, as the table of sensors has it."""
+
+    step: int
+    sensor: int
+    on: bool
+    activity: str
+
+
 class Log:
     """The motions and observations of a run, as far back as somebody may ask."""
 
     def __init__(self, home: "Home", actors: "Sequence[Actor]") -> None:
         self.home = home
         self.index = {actor.name: i for i, actor in enumerate(actors)}
+        self.paths = [actor.path for actor in actors]
         self.pieces: list[list[Piece]] = [[] for _ in actors]
-        self.observations: list[Observations] = []
+        self.observations: list[NDArray[np.int64]] = []  # (n, OBSERVATION) each
+        self.readings: list[SensorRow] = []
+        self.cameras: list[tuple[int, str]] = []  # index of the robot, and name
+        self._looks: dict[int, NDArray[np.int64]] = {}
+        self._exposures: dict[int, NDArray[np.int64]] = {}
+        self._rooms = NearestRooms(home.plan)
         self._traced: dict[tuple[str, int, int], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
@@ -131,7 +141,10 @@ class Log:
         for pieces in self.pieces:
             keep = max((i for i, piece in enumerate(pieces) if piece.first <= before), default=0)
             del pieces[:keep]
-        self.observations = [o for o in self.observations if len(o.step) and o.step[-1] >= before]
+        self.observations = [o for o in self.observations if o[-1, STEP] >= before]
+        self.readings = [row for row in self.readings if row.step >= before]
+        self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
+        self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
 
     def poses(self, name: str, first: int, end: int) -> BodyPoses:
         """Return the poses of a body in the steps from `first` to `end` - 1."""
@@ -158,16 +171,63 @@ class Log:
                 paste_poses(out, here.start, part, slice(begin - piece.first, None))
         return out
 
-    def seen(self, first: int, end: int) -> Observations:
-        """Return the observations of the steps from `first` to `end` - 1."""
-        blocks = [
-            b for b in self.observations if len(b.step) and b.step[-1] >= first and b.step[0] < end
-        ]
+    def seen(self, first: int, end: int) -> NDArray[np.int64]:
+        """Return the rows of the observations of the steps from `first` to `end` - 1."""
+        blocks = [o for o in self.observations if o[-1, STEP] >= first and o[0, STEP] < end]
         if not blocks:
-            blocks = [no_observations()]
-        joined = join_observations(blocks)
-        keep = slice(*np.searchsorted(joined.step, (first, end)).tolist())
-        return Observations._make(column[keep] for column in joined)
+            return np.empty((0, OBSERVATION), np.int64)
+        rows = np.concatenate(blocks)
+        return rows[slice(*np.searchsorted(rows[:, STEP], (first, end)).tolist())]
+
+    def perceived(self, first: int, end: int) -> Observations:
+        """Return what was perceived in the steps from `first` to `end` - 1."""
+        return perceived(self.home.plan, self._rooms, self.seen(first, end))
+
+    def count_looks(self, step: int, counts: Sequence[NDArray[np.int64]]) -> None:
+        """Keep how often each robot's cameras have looked and noticed before `step`."""
+        if counts:
+            self._looks[step] = np.concatenate(counts)
+
+    def looks(self, first: int, end: int, users: int) -> Looks:
+        """Return the looks in the steps from `first` to `end` - 1, both counted before."""
+        none = np.zeros((len(self.cameras), users, 2), np.int64)
+        counts = self._looks.get(end, none) - self._looks.get(first, none)
+        robots = np.array([robot for robot, _ in self.cameras], np.int32)
+        names = tuple(name for _, name in self.cameras)
+        return Looks(robots, names, counts[..., 0], counts[..., 1])
+
+    def expose(self, step: int, exposure: NDArray[np.int64]) -> None:
+        """Keep how much of each room each robot has had in view before `step`."""
+        self._exposures[step] = exposure
+
+    def exposure(self, first: int, end: int) -> NDArray[np.int64]:
+        """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
+
+        Raises:
+            ComponentError: Nobody said before the run that it would be asked for.
+        """
+        if end not in self._exposures:
+            raise ComponentError(
+                "exposure was asked for, but isn't worked out unless somebody says so before: write"
+                " needs = {'exposure'} in the class of the component"
+            )
+        before = self._exposures.get(first)
+        return self._exposures[end] - (0 if before is None else before)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What sensors said, in order of step; all arrays of one length.
+
+    Attributes:
+        step: int64.
+        sensor: Index of the sensor, in the order of the scenario, int32.
+        on: Whether it went on (or open), bool.
+    """
+
+    step: NDArray[np.int64]
+    sensor: NDArray[np.int32]
+    on: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -194,7 +254,54 @@ class History:
     @cached_property
     def observations(self) -> Observations:
         """What the robots perceived."""
-        return self.log.seen(self.first, self.end)
+        return self.log.perceived(self.first, self.end)
+
+    @cached_property
+    def readings(self) -> Readings:
+        """What the sensors said."""
+        rows = [row for row in self.log.readings if self.first <= row.step < self.end]
+        return Readings(
+            np.array([row.step for row in rows], np.int64),
+            np.array([row.sensor for row in rows], np.int32),
+            np.array([row.on for row in rows], np.bool_),
+        )
+
+    @cached_property
+    def truth(self) -> Truth:
+        """What was really there, row by row of the observations; for metrics.
+
+        Raises:
+            ComponentError: The asker is an algorithm.
+        """
+        self._check_metric("truth")
+        return truth(self.log.home.plan, self.log.seen(self.first, self.end))
+
+    @cached_property
+    def looks(self) -> Looks:
+        """How often each camera had a user in view, and how often it noticed; for metrics.
+
+        Raises:
+            ComponentError: The asker is an algorithm.
+        """
+        self._check_metric("looks")
+        users = sum(path.startswith("users.") for path in self.log.paths)
+        return self.log.looks(self.first, self.end, users)
+
+    @cached_property
+    def exposure(self) -> NDArray[np.int64]:
+        """Cells of each room in view of each robot, summed over the steps: (robots, rooms).
+
+        Divided by the room's cells and by the number of steps, it is the mean share of the room
+        that was in view.
+
+        Raises:
+            ComponentError: The asker has no needs = {"exposure"}.
+        """
+        return self.log.exposure(self.first, self.end)
+
+    def _check_metric(self, what: str) -> None:
+        if self.visible != frozenset(self.log.index):
+            raise ComponentError(f"{what} was asked for, but only metrics know what is true")
 
     def poses(self, name: str) -> BodyPoses:
         """Return the poses of a body. Algorithms may ask for robots, metrics for users, too.
@@ -211,16 +318,3 @@ class History:
             )
             raise ComponentError(f"poses of {name!r} were asked for, but {why}; available: {known}")
         return self.log.poses(name, self.first, self.end)
-
-
-def join_observations(blocks: Sequence[Observations]) -> Observations:
-    """Return observations one behind the other."""
-    return Observations._make(np.concatenate(columns) for columns in zip(*blocks, strict=True))
-
-
-def no_observations() -> Observations:
-    """Return observations without a row."""
-    return Observations(
-        np.empty(0, np.int64), np.empty(0, np.int32), np.empty(0, np.int32),
-        np.empty(0, np.float64), np.empty(0, np.float64), np.empty(0, np.int16),
-    )  # fmt: skip

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.change import HomeChanges
 
 # The columns of every table.
 RESERVED = frozenset({"step", "time"})
@@ -50,7 +51,8 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
     """Return an output as columns of equal length: a distribution, one row, or arrays.
 
     Args:
-        output: A RoomDistribution (columns room, share), a mapping of names to numbers or strings
+        output: A RoomDistribution (columns room, share), HomeChanges (change, target), a mapping
+            of names to numbers or strings
             (one row), or a mapping of names to arrays of one length.
         rooms: The names of the rooms.
         where: The component's path, for errors.
@@ -68,6 +70,8 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
                 f"{where} put out {len(output.share)} shares, but the home has {len(rooms)} rooms"
             )
         return {"room": np.array(rooms, dtype=object), "share": output.share}
+    if isinstance(output, HomeChanges):
+        return output.to_columns()
     if not isinstance(output, Mapping) or not output:
         raise ComponentError(
             f"{where} put out {output!r}; a RoomDistribution, or a mapping of names to numbers"

@@ -5,18 +5,37 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.engine.streams import stream_key
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.plan import State
-from fleet2d.kernels.look import USER_LOST, USER_SEEN, Crowd, Detections, Memory, SightEvents, look
+from fleet2d.entities.plan import Plan, State
+from fleet2d.errors import ScenarioError
+from fleet2d.kernels.look import (
+    IDENTITY,
+    SIGHTING,
+    USER_LOST,
+    USER_SEEN,
+    Crowd,
+    Memory,
+    Rule,
+    SightEvents,
+    X,
+    Y,
+    look,
+)
 from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.perception import MOST_GHOSTS
+from fleet2d.sight.tables import Scene, error_tables, is_perfect, stack_lenses
+from fleet2d.streams import stream_key
 
 # Poses of one block of steps: small enough to stay in a processor's cache.
 BLOCK_VALUES = 1 << 17
 # With many actors the work of a span outweighs the cache.
 LEAST_STEPS = 4096
 EVENT_NAMES = ("user_lost", "user_seen")
+DAY_US = 86_400_000_000
+# What draws are for, in the order of fleet2d.kernels.perception.
+ABOUT_USERS = ("detect", "attend", "identify", "whom", "range", "bearing", "heading", "posture")
+ABOUT_GHOSTS = ("how many", "where", "looks like", "faces")
 
 I64 = NDArray[np.int64]
 
@@ -29,6 +48,8 @@ class PoseBlock:
         shape = (len(actors), self.capacity + 1)
         self.x, self.y, self.heading = (np.zeros(shape, np.int64) for _ in range(3))
         self.away = np.zeros(shape, np.uint8)
+        self.posture = np.zeros(shape, np.int8)
+        self._postured = [False] * len(actors)
 
     def row(self, index: int, count: int) -> Poses:
         """Return the first `count` poses of an actor, as a view."""
@@ -48,40 +69,108 @@ class PoseBlock:
             int(self.away[index, column]),
         )
 
+    def take_postures(self, index: int, first: int, count: int, plan: Plan, step_us: int) -> None:
+        """Write the postures of an actor for `count` steps from `first` on."""
+        if plan.postures or plan.posture != "stand":
+            steps = np.arange(first, first + count, dtype=np.int64)
+            self.posture[index, :count] = plan.posture_at(steps * step_us)
+            self._postured[index] = True
+        elif self._postured[index]:
+            self.posture[index] = 0
+            self._postured[index] = False
+
     def crowd(self, users: int, count: int) -> Crowd:
         """Return the first `count` poses of the users, which stand first."""
-        return Crowd(self.x[:users, :count], self.y[:users, :count], self.away[:users, :count])
+        return Crowd(
+            self.x[:users, :count],
+            self.y[:users, :count],
+            self.heading[:users, :count],
+            self.away[:users, :count],
+            self.posture[:users, :count],
+        )
 
 
 class Eye:
-    """A robot's camera in a run: what it carries from span to span, and its latest findings."""
+    """A robot's cameras in a run: what they carry from span to span, and their latest findings.
+
+    Attributes:
+        robot: Whose cameras.
+        row: Its row in a PoseBlock.
+        index: Its index among the robots.
+        users: Who can be seen.
+        cameras: Names of the cameras.
+        errs: Whether what is perceived can differ from the truth.
+        memory: All that is carried along.
+        perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
+    """
 
     def __init__(self, robot: Actor, row: int, users: Sequence[Actor], capacity: int) -> None:
         assert isinstance(robot.entity, Robot)
-        assert robot.entity.camera is not None
-        self.robot = robot
-        self.row = row
+        self.robot, self.row, self.index = robot, row, row - len(users)
         self.users = users
-        units_per_m = robot.home.plan.lattice.units_per_m
-        self.lens = robot.entity.camera.lens(units_per_m, robot.clock.step_us)
-        # A stream per user, named: a user more leaves the draws for the others as they were.
-        keys = [stream_key(robot.seed, robot.path, f"detect {user.name}") for user in users]
+        self._set_up()
         count = len(users)
-        self.memory = Memory(
-            np.array(keys, np.uint64), np.zeros(count, np.int64), np.zeros(count, np.uint8)
-        )
-        self.perceived = np.zeros((count, 2), np.int64)
-        rows = capacity * max(1, count)
-        self.sightings = Detections(
-            np.empty(rows, np.int64),
-            np.empty(rows, np.int32),
-            np.empty(rows, np.int64),
-            np.empty(rows, np.int64),
-        )
+        self.perceived = np.zeros((count + 1, 2), np.int64)
+        rows = capacity * len(self.cameras) * max(1, count) + self.rule.burst
+        self.sightings = np.empty((rows, SIGHTING), np.int64)
+        rows = capacity * (count + 1)
         self.events = SightEvents(
             np.empty(rows, np.int64), np.empty(rows, np.int32), np.empty(rows, np.int32)
         )
         self.found = self.happened = 0
+
+    def _set_up(self) -> None:
+        robot, lattice, clock = self.robot, self.robot.home.plan.lattice, self.robot.clock
+        assert isinstance(robot.entity, Robot)
+        named = robot.entity.eyes
+        self.cameras = tuple(named)
+        try:
+            lenses = [camera.lens(lattice.units_per_m, clock.step_us) for camera in named.values()]
+        except ValueError as error:
+            raise ScenarioError(f"{robot.path}: {error}") from None
+        perceptions = [camera.perception or robot.entity.perception for camera in named.values()]
+        wrong = [not is_perfect(perception) for perception in perceptions]
+        self.errs = any(wrong)
+        scene = Scene(
+            [user.name for user in self.users],
+            [user.entity.radius * lattice.units_per_m for user in self.users],
+            lattice,
+            clock.step_us,
+            robot.path,
+        )
+        self.lenses = stack_lenses(lenses, wrong, scene)
+        self.errors = error_tables(
+            lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], scene
+        )
+        self._draw_streams()
+        count = len(self.users)
+        bursts = count + MOST_GHOSTS * self.errors.sources
+        midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
+        since_midnight = clock.start - midnight
+        self.rule = Rule(
+            patience=max(lens.patience for lens in lenses),
+            step_us=clock.step_us,
+            start_us=since_midnight.seconds * 10**6 + since_midnight.microseconds,
+            burst=int(bursts.sum()),
+            stop_lost=False,
+            stop_seen=False,
+        )
+        looks = self.lenses.latency // self.lenses.period + 2
+        self.memory = new_memory(len(lenses), count, int((looks * bursts).max()))
+
+    def _draw_streams(self) -> None:
+        """Give every draw a stream of its own, by name: a user more leaves the others' alone."""
+        robot, errors = self.robot, self.errors
+        for c, camera in enumerate(self.cameras):
+            of = "" if len(self.cameras) == 1 and camera == "camera" else f"{camera}: "
+            for u, user in enumerate(self.users):
+                for i, purpose in enumerate(ABOUT_USERS if self.errs else ABOUT_USERS[:1]):
+                    key = stream_key(robot.seed, robot.path, f"{of}{purpose} {user.name}")
+                    errors.keys[c, u, i] = key
+            for source in range(int(errors.sources[c])):
+                for i, purpose in enumerate(ABOUT_GHOSTS):
+                    name = f"{of}{purpose}, false positives {source}"
+                    errors.ghost_keys[c, source, i] = stream_key(robot.seed, robot.path, name)
 
     @property
     def stops(self) -> tuple[bool, bool]:
@@ -89,26 +178,48 @@ class Eye:
         wanted = self.robot.plan.interrupts
         return EVENT_NAMES[USER_LOST] in wanted, EVENT_NAMES[USER_SEEN] in wanted
 
+    def name_of(self, identity: int) -> str:
+        """Return the name of an identity; that of somebody unknown is empty."""
+        return self.users[identity].name if identity < len(self.users) else ""
+
     def look(self, block: PoseBlock, first: int, count: int) -> int:
         """Look at all users for `count` steps; return the steps done."""
+        lost, seen = self.stops
         done, self.found, self.happened = look(
-            self.robot.home.plan.mesh,
-            self.lens,
+            self.robot.home.walls,
+            self.lenses,
+            self.errors,
+            self.rule._replace(stop_lost=lost, stop_seen=seen),
             block.row(self.row, count),
             block.crowd(len(self.users), count),
             first,
             self.memory,
-            self.stops,
             self.sightings,
             self.events,
         )
         return int(done)
 
     def remember(self) -> None:
-        """Keep where each user was perceived last."""
-        users = self.sightings.user[: self.found]
-        self.perceived[users, 0] = self.sightings.x[: self.found]
-        self.perceived[users, 1] = self.sightings.y[: self.found]
+        """Keep where each identity was perceived last."""
+        identity = self.sightings[: self.found, IDENTITY]  # -1, somebody unknown, is the last row
+        self.perceived[identity, 0] = self.sightings[: self.found, X]
+        self.perceived[identity, 1] = self.sightings[: self.found, Y]
+
+
+def new_memory(cameras: int, users: int, backlog: int) -> Memory:
+    """Return the memory of a robot that has seen nobody."""
+    never = -1
+    return Memory(
+        noticed=np.full(users + 1, never, np.int64),
+        seen=np.zeros(users + 1, np.int64),
+        drawn=np.zeros((cameras, users), np.int64),
+        drawn_at=np.full((cameras, users), never, np.int64),
+        taken_for=np.zeros((cameras, users), np.int64),
+        tracked=np.full((cameras, users), never, np.int64),
+        counts=np.zeros((cameras, users, 2), np.int64),
+        backlog=np.zeros((cameras, backlog, SIGHTING), np.int64),
+        waiting=np.zeros((cameras, 2), np.int64),
+    )
 
 
 def look_together(eyes: Sequence[Eye], block: PoseBlock, first: int, count: int) -> int:
@@ -116,13 +227,16 @@ def look_together(eyes: Sequence[Eye], block: PoseBlock, first: int, count: int)
 
     A camera that had looked further before another one stopped the span looks again at less of it.
     """
-    before = [(eye.memory.noticed.copy(), eye.memory.seen.copy()) for eye in eyes]
+    if len(eyes) == 1:
+        return eyes[0].look(block, first, count)
+    before = [[array.copy() for array in eye.memory] for eye in eyes]
     done = [0] * len(eyes)
     limit = count
     pending = list(range(len(eyes)))
     while pending:
         i = pending.pop(0)
-        eyes[i].memory.noticed[:], eyes[i].memory.seen[:] = before[i]
+        for array, saved in zip(eyes[i].memory, before[i], strict=True):
+            array[:] = saved
         done[i] = eyes[i].look(block, first, limit)
         if done[i] < limit:
             limit = done[i]

@@ -57,6 +57,7 @@ class Learners:
 
     Attributes:
         outputs: The newest output of each algorithm.
+        fresh: Those of the last update.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Learners:
         self.home, self.clock, self.seed, self.store = home, clock, seed, store
         self.users, self.robots = tuple(names[0]), tuple(names[1])
         self.outputs: dict[str, Any] = {}
+        self.fresh: dict[str, Any] = {}
         self.all: list[Learner] = []
         for name in update_order(algorithms):
             self._add(name, f"algorithms.{name}", algorithms[name])
@@ -105,6 +107,7 @@ class Learners:
                 if isinstance(learner.component, Algorithm) and output is not None:
                     # A copy: a component may go on with its own arrays.
                     fresh[learner.name] = copy.deepcopy(output)
+        self.fresh = fresh
         self.outputs = {**self.outputs, **fresh}  # a new one: who kept the old sees the old
 
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
@@ -187,7 +190,7 @@ def checked_result(result: Any, where: str = "result()") -> Any:
     return result
 
 
-_FIXED = {"trajectories", "key_frames", "observations", "events"}
+_FIXED = {"trajectories", "key_frames", "observations", "events", "sensors"}
 
 
 def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:

@@ -176,7 +176,7 @@ def _follow_walk(
     step = int(keys["step"][begin])
     state = State(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
     row = empty_poses(stop - step + 1)
-    trace_meander(home.plan.mesh, actor.space.mesh, behavior.rule, step, np.array(state[:3]), row)
+    trace_meander(home.walls, actor.space.mesh, behavior.rule, step, np.array(state[:3]), row)
     if begin + 1 < len(keys["x"]):  # where the walk came to, as it was stored
         found = (row.x[-1], row.y[-1], row.heading[-1])
         if found != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):

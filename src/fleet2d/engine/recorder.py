@@ -6,24 +6,37 @@ the same however the run was cut into spans.
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.history import Observations, join_observations, no_observations
+from fleet2d.algorithms.history import SensorRow
+from fleet2d.algorithms.observations import (
+    OBSERVATION,
+    ROBOT,
+    NearestRooms,
+    perceived,
+    truth,
+)
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock
+from fleet2d.engine.changes import Happened
 from fleet2d.engine.clock import Clock
+from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Track
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import in_radians
+from fleet2d.kernels.look import SIGHTING
+from fleet2d.kernels.look import STEP as STEP_COLUMN
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Breakpoints
+from fleet2d.sight.perception import POSTURES
 from fleet2d.units import micros
 
 # How a row of key_frames is to be read: a breakpoint that was reached, the end of a segment that
@@ -43,9 +56,16 @@ HEADING = Column("heading", "float64", "rad", description="counter-clockwise fro
 
 
 def table_specs(
-    users: Sequence[str], robots: Sequence[str], rooms: Sequence[str], settings: ArtifactSettings
+    users: Sequence[str],
+    robots: Sequence[str],
+    rooms: Sequence[str],
+    settings: ArtifactSettings,
+    objects: Sequence[str] = (),
+    *,
+    changes: bool = False,
+    cameras: Sequence[str] = (),
 ) -> list[TableSpec]:
-    """Return the tables that a run with these settings stores."""
+    """Return the tables that a run with these settings stores; `cameras` are told_cameras()."""
     entity = Column("entity", "category", categories=(*users, *robots))
     room = Column("room", "category", nullable=True, categories=tuple(rooms))
     away = Column("away", "bool", description="not at home; x and y are where it left")
@@ -56,15 +76,54 @@ def table_specs(
         kind = Column("kind", "category", categories=KEY_KINDS)
         specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
     if settings.observations and users and robots:
-        robot = Column("robot", "category", categories=tuple(robots))
-        user = Column("user", "category", categories=tuple(users))
-        specs.append(TableSpec("observations", (STEP, TIME, robot, user, X, Y, room)))
+        specs.append(_observation_table(users, robots, room, cameras))
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=tuple(users))
         whom = (user,) if users else ()
-        specs.append(TableSpec("events", (STEP, TIME, entity, event, *whom, detail)))
+        who = entity
+        if changes:
+            what = "what did it, or what it happened to; none: the home itself"
+            names = (*users, *robots, *objects)
+            who = Column("entity", "category", categories=names, nullable=True, description=what)
+        specs.append(TableSpec("events", (STEP, TIME, who, event, *whom, detail)))
     return specs
+
+
+def told_cameras(eyes: Sequence[Eye]) -> tuple[str, ...]:
+    """Return the names of all cameras if a run has to tell them apart, or from the truth.
+
+    It does where a robot has several, or errs.
+    """
+    if not any(eye.errs or len(eye.cameras) > 1 for eye in eyes):
+        return ()
+    return tuple(dict.fromkeys(name for eye in eyes for name in eye.cameras))
+
+
+def _observation_table(
+    users: Sequence[str], robots: Sequence[str], room: Column, cameras: Sequence[str]
+) -> TableSpec:
+    """Return the table of what was perceived; where that can be wrong, with the truth beside it."""
+    robot = Column("robot", "category", categories=tuple(robots))
+    user = Column("user", "category", nullable=bool(cameras), categories=tuple(users))
+    columns = [STEP, TIME, robot, user, X, Y, room]
+    if cameras:
+        posture = Column("posture", "category", categories=POSTURES)
+        true = {
+            column.name: replace(column, name=f"true_{column.name}", nullable=True)
+            for column in (user, X, Y, HEADING, posture)
+        }
+        camera = Column("camera", "category", categories=tuple(cameras))
+        columns += [HEADING, posture, camera, *true.values()]
+    return TableSpec("observations", tuple(columns))
+
+
+def sensor_table(sensors: Sensors) -> TableSpec:
+    """Return the table of what sensors say, in the layout of the CASAS smart homes."""
+    sensor = Column("sensor", "category", categories=tuple(sensors.names))
+    room, state = Column("room", "category"), Column("state", "category")
+    activity = Column("activity", "string", description="what the person does, as far as told")
+    return TableSpec("sensors", (STEP, TIME, room, sensor, state, activity))
 
 
 class Recorder:
@@ -81,16 +140,40 @@ class Recorder:
         clock: Clock,
         home: Home,
         actors: Sequence[Actor],
+        objects: Sequence[str] = (),
+        *,
+        changes: bool = False,
+        eyes: Sequence[Eye] = (),
+        sensors: Sensors | None = None,
     ) -> None:
+        """Prepare to record.
+
+        Args:
+            store: Takes the rows.
+            settings: What is stored.
+            clock: Of the run.
+            home: Of the run.
+            actors: Users, then robots.
+            objects: The names of the home's objects.
+            changes: Whether walls may change during the run.
+            eyes: The cameras.
+            sensors: The sensors of the home.
+        """
+        self._sensors = sensors
+        self._readings: list[SensorRow] = []
         self.store = store
         self.clock, self.home, self.actors = clock, home, actors
-        names = set(store.names)
-        self._keeps_keys = "key_frames" in names
-        self._keeps_observations = "observations" in names
-        self._keeps_events = "events" in names
+        tables = set(store.names)
+        self._keeps_keys = "key_frames" in tables
+        self._keeps_observations = "observations" in tables
+        self._keeps_events = "events" in tables
         self._has_users = any(actor.path.startswith("users.") for actor in actors)
         self._every = _steps_between_samples(settings, clock)
-        self._walk_every = max(1, WALK_KEY_US // clock.step_us)
+        self._object_rows = {name: len(actors) + i for i, name in enumerate(objects)}
+        # A random walk is rebuilt by walking it again between walls that haven't changed since;
+        # where they may have, it is kept step by step.
+        self._walk_kind = TRACK if changes else WALK
+        self._walk_every = 1 if changes else max(1, WALK_KEY_US // clock.step_us)
         # Breakpoints of the present plan already gathered; the plan before the first has none to
         # tell.
         self._emitted = [2] * len(actors)
@@ -99,7 +182,15 @@ class Recorder:
         self._samples: list[NDArray[np.int64]] = []
         self._keys: list[NDArray[np.int64]] = []
         self._events: list[tuple[int, int, int, str, int, str]] = []
-        self._observations: list[Observations] = []
+        self._observations: list[NDArray[np.int64]] = []
+        self._rooms = NearestRooms(home.plan)
+        names = told_cameras(eyes)
+        # The code of each camera of each robot.
+        self._camera_codes = (
+            {eye.index: [names.index(name) for name in eye.cameras] for eye in eyes}
+            if names
+            else {}
+        )
         self._gathered = 0
         self.wall_s = 0.0
 
@@ -122,13 +213,26 @@ class Recorder:
         self._notes_told[row] = 0
         actor = self.actors[row]
         if self._keeps_keys and not isinstance(actor.motion, Track):
-            self._keys.append(_key(step, row, WALK, step * self.clock.step_us, actor.state))
+            moment = step * self.clock.step_us
+            self._keys.append(_key(step, row, self._walk_kind, moment, actor.state))
         self._tell_plan(row, step)
+
+    def changed(self, happened: Sequence[Happened]) -> None:
+        """Gather what changed in the home."""
+        if self._keeps_events:
+            for what in happened:
+                row = -1 if what.target is None else self._object_rows[what.target]
+                self._events.append((what.step, row, 2, what.event, -1, what.detail))
+
+    def sensed(self, rows: Sequence[SensorRow]) -> None:
+        """Gather what the sensors said in a span."""
+        self._readings += rows
+        self._gathered += len(rows)
 
     def span(
         self, block: PoseBlock, first: int, count: int, eyes: Sequence[Eye]
-    ) -> Observations | None:
-        """Gather a span; return its observations."""
+    ) -> NDArray[np.int64] | None:
+        """Gather a span; return its observations, (n, OBSERVATION)."""
         for row in range(len(self.actors)):
             self._tell_plan(row, first + count - 1)
         if self._every:
@@ -154,6 +258,7 @@ class Recorder:
         self._store_keys()
         self._store_observations()
         self._store_events()
+        self._store_readings()
         self._gathered = 0
         self.wall_s += time.perf_counter() - began
 
@@ -217,36 +322,33 @@ class Recorder:
             for step in range(-(-first // every) * every, first + count, every):
                 if step != actor.planned_at:
                     state = block.state(row, step - first)
-                    self._keys.append(_key(step, row, WALK, step * self.clock.step_us, state))
+                    moment = step * self.clock.step_us
+                    self._keys.append(_key(step, row, self._walk_kind, moment, state))
 
-    def _observe(self, eyes: Sequence[Eye]) -> Observations:
-        """Join the findings of all cameras, in order of step, robot, user."""
+    def _observe(self, eyes: Sequence[Eye]) -> NDArray[np.int64]:
+        """Join the findings of all cameras, in order of step and robot."""
         if not any(eye.found or eye.happened for eye in eyes):
-            return no_observations()
-        parts = [eye.sightings for eye in eyes]
-        step = np.concatenate([p.step[: e.found] for p, e in zip(parts, eyes, strict=True)])
-        user = np.concatenate([p.user[: e.found] for p, e in zip(parts, eyes, strict=True)])
-        x = np.concatenate([p.x[: e.found] for p, e in zip(parts, eyes, strict=True)])
-        y = np.concatenate([p.y[: e.found] for p, e in zip(parts, eyes, strict=True)])
-        robots = [eye.row - len(eye.users) for eye in eyes]
-        robot = np.repeat(np.array(robots, np.int32), [eye.found for eye in eyes])
+            return np.empty((0, OBSERVATION), np.int64)
+        rows = np.empty((sum(eye.found for eye in eyes), OBSERVATION), np.int64)
+        end = 0
+        for eye in eyes:
+            begin, end = end, end + eye.found
+            rows[begin:end, :SIGHTING] = eye.sightings[: eye.found]
+            rows[begin:end, ROBOT] = eye.index
         if len(eyes) > 1:
-            order = np.argsort(step, kind="stable")
-            step, user, robot, x, y = (column[order] for column in (step, user, robot, x, y))
-        plan = self.home.plan
-        xy = plan.lattice.to_metres(np.stack([x, y], axis=-1))
-        room = plan.room_of_place[y // SUB, x // SUB]
-        observations = Observations(step, robot, user, xy[:, 0], xy[:, 1], room)
-        if self._keeps_observations and len(step):
-            self._observations.append(observations)
-            self._gathered += len(step)
+            rows = rows[np.argsort(rows[:, STEP_COLUMN], kind="stable")]
+        if self._keeps_observations and len(rows):
+            self._observations.append(rows)
+            self._gathered += len(rows)
         if self._keeps_events:
             for eye in eyes:
                 for i in range(eye.happened):
                     event = EVENT_NAMES[eye.events.kind[i]]
                     who = int(eye.events.user[i])
+                    if who == len(eye.users):
+                        who = -1  # somebody unknown
                     self._events.append((int(eye.events.step[i]), eye.row, 1, event, who, ""))
-        return observations
+        return rows
 
     # Storing
 
@@ -293,17 +395,41 @@ class Recorder:
     def _store_observations(self) -> None:
         if not self._observations:
             return
-        o = join_observations(self._observations)
+        rows = np.concatenate(self._observations)
         self._observations = []
-        self.store.append(
-            "observations",
+        o = perceived(self.home.plan, self._rooms, rows)
+        columns: dict[str, Any] = {
             **self._when(o.step),
-            robot=o.robot,
-            user=o.user,
-            x=o.x,
-            y=o.y,
-            room=o.room.astype(np.int32),
+            "robot": o.robot,
+            "user": o.user,
+            "x": o.x,
+            "y": o.y,
+            "room": o.room.astype(np.int32),
+        }
+        if self._camera_codes:
+            t = truth(self.home.plan, rows)
+            real = t.user >= 0
+            columns |= {
+                "heading": o.heading,
+                "posture": o.posture.astype(np.int32),
+                "camera": self._cameras(o.robot, o.camera),
+                "true_user": t.user,
+                "true_x": np.where(real, t.x, np.nan),
+                "true_y": np.where(real, t.y, np.nan),
+                "true_heading": np.where(real, t.heading, np.nan),
+                "true_posture": np.where(real, t.posture, -1).astype(np.int32),
+            }
+        self.store.append("observations", **columns)
+
+    def _cameras(self, robot: NDArray[np.int32], camera: NDArray[np.int8]) -> NDArray[np.int32]:
+        """Return the codes of cameras that are given by their index among their robot's."""
+        codes = np.zeros(
+            (len(self.actors), 1 + max(map(len, self._camera_codes.values()))), np.int32
         )
+        for index, names in self._camera_codes.items():
+            codes[index, : len(names)] = names
+        found: NDArray[np.int32] = codes[robot, camera]
+        return found
 
     def _store_events(self) -> None:
         if not self._events:
@@ -320,6 +446,21 @@ class Recorder:
             entity=np.array(entity, np.int32),
             event=list(event),
             detail=list(detail),
+        )
+
+    def _store_readings(self) -> None:
+        if not self._readings or self._sensors is None:
+            return
+        step, sensor, on, activity = zip(*self._readings, strict=True)
+        self._readings = []
+        rooms, words = self._sensors.rooms, self._sensors.words
+        self.store.append(
+            "sensors",
+            **self._when(np.array(step, np.int64)),
+            room=[rooms[number] for number in sensor],
+            sensor=np.array(sensor, np.int32),
+            state=[words[number][not is_on] for number, is_on in zip(sensor, on, strict=True)],
+            activity=list(activity),
         )
 
     def _when(self, step: NDArray[np.int64]) -> dict[str, Any]:

@@ -9,17 +9,21 @@ plan by time.
 import operator
 import secrets
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
+
+from pydantic import ValidationError
 
 from fleet2d.algorithms.history import Log, Piece
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.reader import Run
 from fleet2d.artifacts.store import RunStore
+from fleet2d.engine.blame import blame
 from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock, look_together
+from fleet2d.engine.changes import Changes
 from fleet2d.engine.clock import Clock
 from fleet2d.engine.keeping import (
     deferred_interrupt,
@@ -27,13 +31,17 @@ from fleet2d.engine.keeping import (
     describe_start,
     open_store,
 )
+from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.pace import Pace
-from fleet2d.engine.recorder import Recorder, table_specs
+from fleet2d.engine.recorder import Recorder, sensor_table, table_specs, told_cameras
+from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
+from fleet2d.entities.objects.door import Door
 from fleet2d.errors import InputError, PlacementError, ScenarioError
+from fleet2d.floorplan.change import HomeChange, HomeChanges
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
@@ -80,17 +88,35 @@ class Simulation:
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
         self._store = RunStore(out)
         self._store.check()
-        self.home = Home(self.scenario.floorplan.load())
+        self.home = self._furnish_home()
         self._users = self._actors("users", self.scenario.users)
         self._robots = self._actors("robots", self.scenario.robots)
         self._all = [*self._users, *self._robots]
         self._block = PoseBlock(self._all)
         self._eyes = self._open_eyes()
+        changes = self.scenario.changes
+        self._changes = Changes(self.scenario.objects, changes, self.home, self.clock)
+        with self._placing("objects"):
+            doors, users = self._changes.names, len(self._users)
+            self._sensors = Sensors(self.scenario.objects, doors, self.home, self.clock, users)
         self._add_tables()
         settings_ = self.scenario.artifacts
-        self._recorder = Recorder(self._store, settings_, self.clock, self.home, self._all)
+        self._recorder = Recorder(
+            self._store,
+            settings_,
+            self.clock,
+            self.home,
+            self._all,
+            list(self.scenario.objects),
+            changes=self._may_change,
+            eyes=self._eyes,
+            sensors=self._sensors,
+        )
+        self._layers = LayerBook(self.scenario, self.home, self._all, self._store, self.clock)
         self._learners = self._start_learners()
         self._log = Log(self.home, self._all) if self._learners.all else None
+        if self._log:
+            self._log.cameras = [(eye.index, name) for eye in self._eyes for name in eye.cameras]
         self._pending: dict[int, list[SightEvent]] = {}  # events that interrupted a robot's plan
         self._max_span = min(simulation.max_span or self._block.capacity, self._block.capacity)
         self._pace: Pace | None = None
@@ -116,8 +142,16 @@ class Simulation:
 
     @property
     def state(self) -> dict[str, dict[str, Any]]:
-        """Where everybody is at the next step: x, y [m], heading [rad], room, away."""
-        return {actor.name: self._state_of(actor) for actor in self._all}
+        """Where everybody is at the next step: x, y [m], heading [rad], room, away.
+
+        And of doors whether they are open and locked, of sensors whether they are on.
+        """
+        bodies = {actor.name: self._state_of(actor) for actor in self._all}
+        doors = {
+            name: {"open": i not in self.home.shut, "locked": i in self.home.locked}
+            for i, name in enumerate(self._changes.names)
+        }
+        return bodies | doors | {name: {"on": on} for name, on in self._sensors.on.items()}
 
     @property
     def actors(self) -> dict[str, Actor]:
@@ -183,9 +217,27 @@ class Simulation:
                 f"there is nobody named {name!r}{hint} There are: {', '.join(actors)}"
             )
         actors[name].ask_at = self.step
-        notes, text = self._store.manifest.notes, "steered by a script: reproduce it by that script"
-        if text not in notes:
-            notes.append(text)
+        self._steered()
+
+    def change(self, change: HomeChange | None = None, /, **what: Any) -> None:
+        """Change the home at the next step: ``simulation.change(shut="bath_door")``.
+
+        The run can't be reproduced from its manifest then, which says so.
+
+        Args:
+            change: The change; or
+            what: its keys, as in the scenario's `changes`.
+
+        Raises:
+            ScenarioError: The keys are no change.
+            ComponentError: There is nothing of that name.
+        """
+        try:
+            asked = HomeChange(**what) if change is None else change
+        except ValidationError as error:
+            raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
+        self._changes.ask(asked, self.step, "a script")
+        self._steered()
 
     def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
         """Simulate to the end, store, and return the run.
@@ -216,10 +268,13 @@ class Simulation:
         # Where a component failed, asking the metrics could fail again, and lose what is stored.
         results: dict[str, Any] = {}
         if self._log and status != "failed":
+            self._count_looks(self._log)
             results = self._learners.finish(self.step, self._log)
         self._simulate_s += time.perf_counter() - began
         began = time.perf_counter()
         self._recorder.end(self.step)
+        if status != "failed":
+            self._layers.finish(self.step)
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
         wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
@@ -228,6 +283,11 @@ class Simulation:
         self._run = self._store.run()
         self._run.plan = self.home.plan
         return self._run
+
+    def _steered(self) -> None:
+        notes, text = self._store.manifest.notes, "steered by a script: reproduce it by that script"
+        if text not in notes:
+            notes.append(text)
 
     # The loop
 
@@ -271,25 +331,48 @@ class Simulation:
     def _span(self, limit: int) -> None:
         """Simulate one span: up to the next decision, and not beyond step `limit`."""
         first = self.step
+        self._change(first)
         self._decide(first)
         count = self._span_end(limit) - first
         for row, actor in enumerate(self._all):
             if self._log:
                 self._log.pieces[row].append(Piece(first, actor.state, actor.motion))
             actor.motion.trace(first, actor.state, self._block.row(row, count + 1))
+            self._block.take_postures(row, first, count, actor.plan, self.clock.step_us)
         if self._eyes:
             count = look_together(self._eyes, self._block, first, count)
         observations = self._recorder.span(self._block, first, count, self._eyes)
+        self._sense(first, count)
+        self._layers.span(self._block, first, count)
         for row, actor in enumerate(self._all):
             actor.state = self._block.state(row, count)
         self._interrupt(first + count - 1)
         self.step = first + count
         if self._log:
-            if observations is not None and len(observations.step):
+            if observations is not None and len(observations):
                 self._log.observations.append(observations)
             if self._learners.next_due() == self.step:
+                self._count_looks(self._log)
                 self._learners.update(self.step, self._log)
+                self._take_up_changes()
                 self._log.forget(self._learners.earliest_needed())
+        self._layers.keep(self.step)
+
+    def _sense(self, first: int, count: int) -> None:
+        """Let the sensors read the span."""
+        if self._sensors.names:
+            with blame("objects", first):
+                rows = self._sensors.span(self._block, first, count, self.home, self._all)
+            self._recorder.sensed(rows)
+            if self._log:
+                self._log.readings += rows
+
+    def _change(self, step: int) -> None:
+        """Let the home change as it is due: the floor plan comes first in a step."""
+        due = self._changes.next_due()
+        if due is not None and due <= step:
+            with blame("changes", step):
+                self._recorder.changed(self._changes.make(step, self._all))
 
     def _decide(self, step: int) -> None:
         """Ask everybody whose plan is over: users, then robots."""
@@ -297,7 +380,15 @@ class Simulation:
             if actor.ask_at is not None and actor.ask_at <= step:
                 self._recorder.before_plan(row, step)
                 actor.decide(step, tuple(self._pending.pop(row, ())), self._learners.readable)
+                self._changes.expect(row, actor)
                 self._recorder.after_plan(row, step)
+
+    def _take_up_changes(self) -> None:
+        """Let what algorithms just put out to change the home happen at the next step."""
+        for name, output in self._learners.fresh.items():
+            if isinstance(output, HomeChanges):
+                for change in output.changes:
+                    self._changes.ask(change, self.step, f"algorithms.{name}")
 
     def _span_end(self, limit: int) -> int:
         """Return the step before which the present span ends at the latest."""
@@ -305,12 +396,22 @@ class Simulation:
         for actor in self._all:
             if actor.ask_at is not None and actor.ask_at < end:
                 end = actor.ask_at
-        due = self._learners.next_due()
-        if due is not None:
-            end = min(end, due)
+        dues = (
+            self._learners.next_due(),
+            self._changes.next_due(),
+            self._layers.next_due(self.step),
+        )
+        for due in dues:
+            if due is not None:
+                end = min(end, max(due, self.step + 1))
         if self._pace:
             end = min(end, self.step + max(1, int(self._pace.slice_s * 1e6 / self.clock.step_us)))
         return end
+
+    def _count_looks(self, log: Log) -> None:
+        """Keep for metrics what the cameras have counted up to the present step."""
+        log.count_looks(self.step, [eye.memory.counts.copy() for eye in self._eyes])
+        self._layers.expose(self.step, log)
 
     def _interrupt(self, step: int) -> None:
         """End the plans of robots that an event of the span's last step interrupts."""
@@ -323,21 +424,46 @@ class Simulation:
                 if events.step[i] == step and stops[events.kind[i]]:
                     user = int(events.user[i])
                     x, y = lattice.to_metres(eye.perceived[user]).tolist()
-                    event = SightEvent(EVENT_NAMES[events.kind[i]], self._users[user].name, x, y)
+                    event = SightEvent(EVENT_NAMES[events.kind[i]], eye.name_of(user), x, y)
                     self._pending.setdefault(eye.row, []).append(event)
                     eye.robot.ask_at = step + 1
 
     # Set-up and closing
 
+    def _furnish_home(self) -> Home:
+        """Return the home, with a door in every doorway that the scenario names."""
+        plan = self.scenario.floorplan.plan()
+        doors, taken = [], dict[int, str]()
+        for name, door in self.scenario.objects.items():
+            if isinstance(door, Door):
+                with self._placing(f"objects.{name}"):
+                    doorway = door.find(plan)
+                    if doorway.index in taken:
+                        raise PlacementError(
+                            f"objects.{name}: {taken[doorway.index]} hangs in the doorway"
+                            f" {doorway.name} already"
+                        )
+                taken[doorway.index] = name
+                doors.append(doorway)
+        home = Home(plan, doors)
+        lay_layers(home, self.scenario.floorplan)
+        return home
+
+    @contextmanager
+    def _placing(self, path: str) -> Iterator[None]:
+        """Say where in the scenario somebody was put that can't be there."""
+        try:
+            yield
+        except PlacementError as error:
+            where = self.scenario.where(path)
+            raise PlacementError(f"{where}: {error}" if where else str(error)) from error
+
     def _actors(self, bucket: str, entities: Mapping[str, Any]) -> list[Actor]:
         actors = []
         for name, entity in entities.items():
             path = f"{bucket}.{name}"
-            try:
+            with self._placing(path):
                 actors.append(Actor(name, path, entity, self.home, self.clock, self.seed))
-            except PlacementError as error:
-                where = self.scenario.where(path)
-                raise PlacementError(f"{where}: {error}" if where else str(error)) from error
         return actors
 
     def _open_eyes(self) -> list[Eye]:
@@ -346,13 +472,29 @@ class Simulation:
         return [
             Eye(robot, len(self._users) + i, self._users, self._block.capacity)
             for i, robot in enumerate(self._robots)
-            if isinstance(robot.entity, Robot) and robot.entity.camera is not None
+            if isinstance(robot.entity, Robot) and robot.entity.eyes
         ]
+
+    @property
+    def _may_change(self) -> bool:
+        """Whether the home may change during the run."""
+        return bool(self.scenario.objects or self.scenario.changes)
 
     def _add_tables(self) -> None:
         users, robots = list(self.scenario.users), list(self.scenario.robots)
         rooms = [room.name for room in self.home.rooms]
-        for spec in table_specs(users, robots, rooms, self.scenario.artifacts):
+        specs = table_specs(
+            users,
+            robots,
+            rooms,
+            self.scenario.artifacts,
+            list(self.scenario.objects),
+            changes=self._may_change,
+            cameras=told_cameras(self._eyes),
+        )
+        if self._sensors.names:
+            specs.append(sensor_table(self._sensors))
+        for spec in specs:
             self._store.add_table(spec)
 
     def _start_learners(self) -> Learners:

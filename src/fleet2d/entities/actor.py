@@ -8,19 +8,21 @@ import numpy as np
 
 from fleet2d.engine.blame import blame
 from fleet2d.engine.clock import Clock
-from fleet2d.engine.streams import Draws, stream_key
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.entity import Entity
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, State
-from fleet2d.errors import ComponentError, PlacementError
+from fleet2d.errors import ComponentError, NoWayError, PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels.headings import TURN
+from fleet2d.streams import Draws, stream_key
 
 # Nobody has a plan: stand still this long, then ask again.
 PAUSE = timedelta(minutes=1)
+# A shut door is in the way: wait this long, then ask again.
+AT_A_DOOR = timedelta(seconds=10)
 
 
 @dataclass(eq=False)
@@ -48,7 +50,7 @@ class Actor:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self.space: Space = self.home.space(self.entity.radius)
+        self._space: tuple[int, Space] = self.home.version, self._present_space()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
@@ -63,9 +65,37 @@ class Actor:
         self.ask_at: int | None = 0
 
     @property
+    def space(self) -> Space:
+        """Where its body can be at present."""
+        if self._space[0] != self.home.version:
+            self._space = self.home.version, self._present_space()
+            self.part = self._present_part()
+        return self._space[1]
+
+    def _present_space(self) -> Space:
+        entity = self.entity
+        return self.home.space(entity.radius, opens_doors=entity.opens_doors)
+
+    def _present_part(self) -> int:
+        """Return the part of a changed space that it is in, or nearest to."""
+        space, x, y = self._space[1], self.state.x, self.state.y
+        part = space.part_at(x, y)
+        if part < 0:
+            near = space.nearest(x, y)
+            part = 0 if near is None else space.part_at(*near)
+        return part
+
+    @property
     def way_out(self) -> tuple[int, int]:
         """The lattice point where it leaves the home."""
         return self.home.way_out(self.space, self.part)
+
+    def posture_code(self, time_us: int) -> int:
+        """Return the posture at a moment, by its number in POSTURES."""
+        plan: Plan | None = getattr(self, "plan", None)  # none yet when the first is made
+        if plan is None or not (plan.postures or plan.posture != "stand"):
+            return 0
+        return int(plan.posture_at(np.array([time_us]))[0])
 
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
@@ -156,7 +186,7 @@ class Actor:
         plan = None
         with blame(self.path, step):
             for behavior in self.behaviors:
-                plan = behavior.decide(now)
+                plan = self._asked(behavior, now)
                 if plan is not None:
                     break
         if plan is None:
@@ -175,6 +205,15 @@ class Actor:
         # A plan that takes no time would be asked for again and again at the same step.
         over = max(self.clock.step_at_or_after(plan.time_us), step + 1)
         self.ask_at = None if plan.endless else over
+
+    def _asked(self, behavior: Behavior, now: Situation) -> Plan | None:
+        """Return a behavior's plan; where a shut door is in its way, wait a little instead."""
+        try:
+            return behavior.decide(now)
+        except (PlacementError, NoWayError) as error:
+            if not self.home.shut:
+                raise
+            return now.plan().note("way_blocked", str(error)).stay(AT_A_DOOR)
 
     def _begin(self) -> State:
         """Return the state at step 0."""

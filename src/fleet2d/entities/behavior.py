@@ -6,8 +6,8 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from fleet2d.component import Component
-from fleet2d.engine.streams import Draws
 from fleet2d.entities.plan import Plan
+from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -20,7 +20,7 @@ class SightEvent(NamedTuple):
     """Somebody came into view of a camera, or was lost from it."""
 
     event: str  # user_seen | user_lost
-    user: str
+    user: str  # for whom somebody was taken; empty for somebody not recognized
     x: float  # where the user was perceived last [m]
     y: float
 

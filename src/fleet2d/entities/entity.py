@@ -1,13 +1,16 @@
 """Entities as a scenario declares them: a body, its behaviors, and a robot's camera."""
 
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from fleet2d.component import OneOf, Settings
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.place import Place
+from fleet2d.problems import problem_at
 from fleet2d.sight.camera import Camera
+from fleet2d.sight.perception import Perception
 from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
 
 
@@ -31,6 +34,9 @@ class Entity(Settings):
         default=None, description="heading at first, counter-clockwise from +x; left out: drawn"
     )
     color: str | None = Field(default=None, min_length=1, description="color in pictures")
+    opens_doors: bool = Field(
+        default=False, description="opens doors in its way; else a shut door is a wall to it"
+    )
     behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = Field(
         default=(),
         description="what decides where it goes: the first that has a plan; none: it stays still",
@@ -40,9 +46,13 @@ class Entity(Settings):
 class User(Entity):
     """A person who lives in the home."""
 
+    opens_doors: bool = Field(
+        default=True, description="opens doors in the way; else a shut door is a wall to it"
+    )
+
 
 class Robot(Entity):
-    """A robot, which sees users with its camera."""
+    """A robot, which sees users with its camera, or with several."""
 
     radius: Length = Field(default=0.15, gt=0, le=2, description="radius of the body [m]")
     speed: Speed = Field(default=0.6, ge=0.01, le=20, description="driving speed [m/s]")
@@ -50,5 +60,33 @@ class Robot(Entity):
         default=90.0, ge=0.01, le=36000, description="how fast it turns on the spot [deg/s]"
     )
     camera: Camera | None = Field(
-        default=Camera(), description="what it sees with; null: it is blind"
+        default=Camera(), description="what it sees with; null: it is blind, or has `cameras`"
     )
+    cameras: dict[str, Camera] = Field(
+        default={},
+        description="several cameras, by name, in place of `camera`; their order doesn't matter",
+    )
+    perception: Perception | None = Field(
+        default=None,
+        description="how all its cameras err that don't say so themselves; null: they don't",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_or_several(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or not data.get("cameras"):
+            return data
+        if data.get("camera") is not None:
+            raise problem_at(
+                ("cameras",), "give 'camera' or 'cameras', not both (camera: null takes it away)"
+            )
+        cameras = data["cameras"]
+        if isinstance(cameras, Sequence) and not isinstance(cameras, str):
+            cameras = {f"camera_{i:02}": camera for i, camera in enumerate(cameras)}
+        return {**data, "camera": None, "cameras": cameras}
+
+    @property
+    def eyes(self) -> dict[str, Camera]:
+        """Its cameras in the order of their names; the only one is named "camera"."""
+        only = {} if self.camera is None else {"camera": self.camera}
+        return dict(sorted(self.cameras.items())) or only

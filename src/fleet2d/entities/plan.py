@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.errors import ComponentError
-from fleet2d.kernels.headings import TURN
+from fleet2d.errors import ComponentError, NoWayError, PlacementError
+from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
+from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.motion import (
     Breakpoints,
@@ -98,6 +99,8 @@ class Plan:
         time_us: The moment up to which it is planned [us since the start].
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
+        posture: How the body stands at the moment up to which it is planned.
+        postures: When it takes another posture [us since the start], and which.
     """
 
     def __init__(self, actor: "Actor", step: int) -> None:
@@ -111,6 +114,9 @@ class Plan:
         self.notes: list[Note] = []
         self.interrupts: frozenset[str] = frozenset()
         self.endless = False
+        self._posture_before = actor.posture_code(self.time_us)
+        self.posture: Posture = POSTURES[self._posture_before]
+        self.postures: list[tuple[int, int]] = []
         self._mark()
 
     @property
@@ -132,21 +138,109 @@ class Plan:
         """Walk to a lattice point by the shortest path.
 
         Raises:
-            ComponentError: There is no way to it.
+            NoWayError: There is no way to it, or none at present.
         """
         self.come_home()
         self._check_goes_on()
         actor = self._actor
+        self._get_up()
         route = actor.space.route((self.x, self.y), (x, y))
         if route is None:
             at = actor.home.plan.lattice.to_metres([x, y]).round(2).tolist()
-            raise ComponentError(f"{actor.path}: there is no way to {at} for a body of its radius")
+            raise NoWayError(f"{actor.path}: there is no way to {at} for a body of its radius")
         rows = np.empty((2 * len(route), 4), np.int64)
         count = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate, rows)
         block = np.zeros((count - 1, 5), np.int64)
         block[:, :4] = rows[1:count]
         self._rows.append(block)
         self.time_us, self.x, self.y, self.heading = rows[count - 1].tolist()
+        return self
+
+    def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
+        """Walk to an object and use it: step to one of its places, face and sit as one does there.
+
+        The last step may lead onto the object, into a bed or onto a chair; whoever goes on from
+        there gets up first. The events table has a row `uses` with the object's name.
+
+        Args:
+            thing: An object of the home, or its name.
+            place: Which of its places, by number; counted round where it has fewer.
+
+        Raises:
+            PlacementError: There is no such object, or no place to use it from.
+            NoWayError: There is no way to it, or none at present.
+        """
+        home, lattice = self._actor.home, self._actor.home.plan.lattice
+        thing = home.object(thing) if isinstance(thing, str) else thing
+        if not thing.uses:
+            raise PlacementError(f"{self._actor.path}: {thing.name} has no place to use it from")
+        use = thing.uses[place % len(thing.uses)]
+        x, y = lattice.to_lattice((use.x, use.y)).tolist()
+        if self.away or (self.x, self.y) != (x, y):
+            self.go_to_point(*home.approach(use, self._actor.space, self._actor.part))
+            self._step_to(x, y)
+        turn = turn_between(self.heading, round(use.heading / (2 * np.pi) * TURN) % TURN)
+        self.turn_by(turn / TURN)
+        self.take(use.posture)
+        return self.note("uses", thing.name)
+
+    def take(self, posture: Posture) -> Self:
+        """Stand, sit or lie from the moment up to which it is planned; walking makes one stand."""
+        if posture != self.posture:
+            self.postures.append((self.time_us, POSTURES.index(posture)))
+            self.posture = posture
+        return self
+
+    def posture_at(self, times_us: I64) -> NDArray[np.int8]:
+        """Return the posture at moments within the plan, by its number in POSTURES, int8."""
+        begins = np.array([time for time, _ in self.postures], np.int64)
+        codes = np.array([self._posture_before, *(code for _, code in self.postures)], np.int8)
+        taken: NDArray[np.int8] = codes[np.searchsorted(begins, times_us, side="right")]
+        return taken
+
+    def _get_up(self) -> None:
+        """Stand, and step off the object that one sits or lies on."""
+        self.take("stand")
+        approach = self._actor.home.approach_of((self.x, self.y))
+        if approach is not None and self._actor.space.part_at(self.x, self.y) < 0:
+            self._step_to(*approach)
+
+    def _step_to(self, x: int, y: int) -> None:
+        """Go straight to a point, whatever is in the way."""
+        if (x, y) == (self.x, self.y):
+            return
+        actor, rows = self._actor, np.empty((4, 4), np.int64)
+        route = np.array([(self.x, self.y), (x, y)], np.int64)
+        count = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate, rows)
+        block = np.zeros((count - 1, 5), np.int64)
+        block[:, :4] = rows[1:count]
+        self._rows.append(block)
+        self.time_us, self.x, self.y, self.heading = rows[count - 1].tolist()
+
+    def reaches(self, x: int, y: int) -> bool:
+        """Tell whether there is a way to a lattice point from where the plan ends at present."""
+        return self._actor.space.route((self.x, self.y), (x, y)) is not None
+
+    def follow(self, breakpoints: I64) -> Self:
+        """Follow breakpoints known beforehand, from where it is; two of one time are a jump.
+
+        Args:
+            breakpoints: Time [us since the start], x, y [lattice], heading [1/4096 turn], away;
+                int64 (n, 5).
+
+        Raises:
+            ComponentError: Their times run backwards, or begin before what is planned.
+        """
+        self._check_goes_on()
+        if len(breakpoints):
+            times = breakpoints[:, 0]
+            if times[0] < self.time_us or bool((times[1:] < times[:-1]).any()):
+                raise ComponentError(
+                    f"{self._actor.path}: breakpoints must be in order of time, from"
+                    f" {self.time_us} us on"
+                )
+            self._rows.append(breakpoints)
+            self.time_us, self.x, self.y, self.heading, self.away = breakpoints[-1].tolist()
         return self
 
     def turn_by(self, turns: float) -> Self:
@@ -204,7 +298,9 @@ class Plan:
         self._check_goes_on()
         if len(self._rows) > 2 or self.time_us != self._rows[0][0, 0]:
             raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
-        self._motion = Walk(self._actor.home.plan.mesh, self._actor.space.mesh, rule)
+        home, actor = self._actor.home, self._actor
+        # Who wanders about takes a shut door for a wall.
+        self._motion = Walk(home.walls, home.space(actor.entity.radius).mesh, rule)
         self.endless = True
         return self
 
@@ -219,7 +315,7 @@ class Plan:
         Raises:
             ComponentError: There is no such event, or the body has no camera to notice it.
         """
-        if getattr(self._actor.entity, "camera", None) is None:
+        if not getattr(self._actor.entity, "eyes", None):
             raise ComponentError(
                 f"{self._actor.path}: a camera interrupts plans by what it sees, but there is none"
             )

@@ -1,19 +1,47 @@
-"""The home of a run: its floor plan, and the space that bodies of each size have in it."""
+"""The home of a run: its floor plan, what stands in it now, and the space that bodies have."""
 
-from fleet2d.errors import PlacementError
+from collections.abc import Collection, Sequence
+from copy import deepcopy
+from dataclasses import replace
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.doorways import Doorway
+from fleet2d.floorplan.gates import Gates, Segment
+from fleet2d.floorplan.layers import Layers
+from fleet2d.floorplan.mesh import build_mesh, snap_polygon
+from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
+from fleet2d.floorplan.vocabulary import room_type
+from fleet2d.kernels.mesh import Mesh
+from fleet2d.problems import did_you_mean
 
 # Where one leaves a home whose plan names no entrance: the first of these that it has.
 WAYS_OUT = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")
+# Arrangements of doors and furniture whose walls and spaces are kept for when they come again.
+ARRANGEMENTS_KEPT = 128
+
+NOTHING: frozenset[int] = frozenset()
 
 
 class Home:
-    """A floor plan as the entities of a run use it.
+    """A floor plan as the entities of a run use it, and what of it changes during the run.
 
     Attributes:
-        plan: The floor plan.
-        rooms: Its rooms, in index order.
+        plan: The floor plan, which never changes.
+        doors: The doorways that have a door, by the number of the door.
+        rooms: The rooms by index, as they are used at present.
+        objects: What stands in the home at present.
+        shut: The doors that are shut.
+        locked: The doors that nobody opens by hand.
+        version: Counts the changes.
+        layers: Named arrays with a value for each cell.
 
     Example:
         >>> import fleet2d
@@ -22,20 +50,119 @@ class Home:
         1
     """
 
-    def __init__(self, plan: FloorPlan) -> None:
+    def __init__(self, plan: FloorPlan, doors: Sequence[Doorway] = ()) -> None:
         self.plan = plan
+        self.doors = tuple(doors)
         self.rooms: tuple[Room, ...] = plan.rooms
-        self._spaces: dict[float, Space] = {}
+        self.objects: tuple[PlacedObject, ...] = plan.objects
+        self.shut: frozenset[int] = NOTHING
+        self.locked: frozenset[int] = NOTHING
+        self.version = 0
+        self.layers = Layers(plan)
+        self._shapes = _Shapes(plan, [self.door_line(door) for door in range(len(self.doors))])
+        self._walls: tuple[int, Mesh] = (-1, plan.mesh)
+        self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
 
-    def __deepcopy__(self, memo: dict[int, object]) -> "Home":
-        """Return itself: a home has no state, so that branches of a run share it."""
-        return self
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return a home that changes on its own; what it worked out so far is shared."""
+        twin = self.__class__.__new__(self.__class__)
+        twin.__dict__.update(self.__dict__)
+        memo[id(self)] = twin
+        twin.layers = deepcopy(self.layers, memo)
+        return twin
 
-    def space(self, radius: float) -> Space:
-        """Return the space of bodies of `radius` [m], built when first asked for."""
-        if radius not in self._spaces:
-            self._spaces[radius] = Space(self.plan, radius)
-        return self._spaces[radius]
+    @property
+    def walls(self) -> Mesh:
+        """What ends sight at present: the walls, shut doors and tall furniture [lattice]."""
+        if self._walls[0] != self.version:
+            self._walls = self.version, self._shapes.walls(self.shut, _tall(self.objects))
+        return self._walls[1]
+
+    def space(self, radius: float, *, opens_doors: bool = False) -> Space:
+        """Return the space of bodies of a radius [m] at present, built when first asked for.
+
+        Args:
+            radius: Of the body [m].
+            opens_doors: Whether shut doors that aren't locked are no hindrance.
+        """
+        shut = self.shut & self.locked if opens_doors else self.shut
+        return self._shapes.space(radius, shut, self.objects)
+
+    def door_line(self, door: int) -> Segment:
+        """Return where a door is when shut [lattice]."""
+        doorway = self.doors[door]
+        (x0, y0), (x1, y1) = self.plan.lattice.to_lattice((doorway.start, doorway.end)).tolist()
+        return (x0, y0), (x1, y1)
+
+    def set_door(self, door: int, *, is_open: bool) -> None:
+        """Open or shut a door."""
+        self.shut = self.shut - {door} if is_open else self.shut | {door}
+        self.version += 1
+
+    def set_lock(self, door: int, *, locked: bool) -> None:
+        """Lock or unlock a door."""
+        self.locked = self.locked | {door} if locked else self.locked - {door}
+        self.version += 1
+
+    def put(self, thing: PlacedObject) -> None:
+        """Let an object stand as given, in place of the one of its name."""
+        self.objects = tuple(thing if o.name == thing.name else o for o in self.objects)
+        self.version += 1
+
+    def use_room_as(self, room: Room, kind: str) -> None:
+        """Change what a room is used for."""
+        wanted = room_type(kind)
+        changed = replace(room, type=wanted, labels=(wanted,))
+        self.rooms = tuple(changed if r.index == room.index else r for r in self.rooms)
+        self.version += 1
+
+    def object(self, name: str) -> PlacedObject:
+        """Return an object by its name.
+
+        Raises:
+            PlacementError: There is no such object.
+        """
+        names = [thing.name for thing in self.objects]
+        if name in names:
+            return self.objects[names.index(name)]
+        raise PlacementError(
+            f"{self.plan.name} has no object {name!r}{did_you_mean(name, names)}"
+            f" Its objects are: {', '.join(names) or 'none'}"
+        )
+
+    def approach(self, use: UsePlace, space: Space, part: int) -> tuple[int, int]:
+        """Return the lattice point from which a body steps to the place where an object is used.
+
+        Raises:
+            PlacementError: The space has no such part.
+        """
+        at = (use.x, use.y) if use.approach is None else use.approach
+        x, y = self.plan.lattice.to_lattice(at).tolist()
+        if space.part_at(x, y) == part:
+            return x, y
+        near = space.nearest(x, y, part)
+        if near is None:
+            raise PlacementError(f"a body of radius {space.radius:g} m fits nowhere here")
+        return near
+
+    def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
+        """Return where one steps from to a place on an object [lattice], if it is such a place."""
+        if not self.objects:
+            return None
+        if self._places[0] != self.version:
+            lattice = self.plan.lattice
+            self._places = (
+                self.version,
+                {
+                    tuple(lattice.to_lattice((use.x, use.y)).tolist()): tuple(
+                        lattice.to_lattice(use.approach).tolist()
+                    )
+                    for thing in self.objects
+                    for use in thing.uses
+                    if use.approach is not None
+                },
+            )
+        return self._places[1].get(place)
 
     def way_out(self, space: Space, part: int) -> tuple[int, int]:
         """Return the lattice point where a body in a part of the space leaves the home.
@@ -60,3 +187,65 @@ class Home:
             at = next(reachable, self.rooms[0]).anchor_xy
         x, y = self.plan.lattice.to_lattice(at).tolist()
         return x, y
+
+
+class _Shapes:
+    """Walls and spaces of a home, by what is shut and what stands where."""
+
+    def __init__(self, plan: FloorPlan, door_lines: Sequence[Segment]) -> None:
+        self.plan = plan
+        self.door_lines = door_lines
+        self.walls = lru_cache(ARRANGEMENTS_KEPT)(self._find_walls)
+        self._gates = lru_cache(ARRANGEMENTS_KEPT)(self._find_gates)
+        self._spaces = lru_cache(ARRANGEMENTS_KEPT)(self._find_space)
+
+    def space(
+        self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]
+    ) -> Space:
+        return self._spaces(radius, frozenset(shut), _solid(objects))
+
+    def _find_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
+        if not self.door_lines:
+            return self._built(tall)
+        return self._gates(tall).shut(shut)
+
+    def _find_gates(self, tall: tuple[PlacedObject, ...]) -> Gates:
+        return Gates(self._built(tall), self.door_lines)
+
+    def _built(self, tall: tuple[PlacedObject, ...]) -> Mesh:
+        plan = self.plan
+        if not tall and not self.door_lines:
+            return plan.mesh
+        polygons = plan.polygons
+        if tall:
+            blocks = shapely.union_all([lattice_footprint(plan, thing) for thing in tall])
+            rest = shapely.get_parts(shapely.difference(shapely.MultiPolygon(polygons), blocks))
+            polygons = [part for shape in rest.tolist() for part in snap_polygon(shape).polygons]
+        if not polygons:
+            raise FloorPlanError(f"the objects of {plan.name} leave no free space")
+        corners = [end for line in self.door_lines for end in line]
+        return build_mesh(polygons, plan.lattice.columns, plan.lattice.rows, corners)
+
+    def _find_space(
+        self, radius: float, shut: frozenset[int], solid: tuple[PlacedObject, ...]
+    ) -> Space:
+        return Space(
+            self.plan,
+            radius,
+            walls=self.walls(shut, _tall(solid)),
+            obstacles=[lattice_footprint(self.plan, thing) for thing in solid],
+            shut=[self.door_lines[door] for door in sorted(shut)],
+        )
+
+
+def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:
+    """Return the floor that an object covers [lattice], on even units as walls are."""
+    return Polygon(plan.lattice.to_walls(np.asarray(thing.footprint.exterior.coords)[:-1]))
+
+
+def _tall(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
+    return tuple(thing for thing in objects if thing.blocks == "sight")
+
+
+def _solid(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
+    return tuple(thing for thing in objects if thing.blocks != "nothing")

@@ -57,6 +57,8 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
             regions,
             cell,
             source=f"HouseExpo, {path.name}",
+            doorways=None,
+            regions_are="boxes",
             notes=[*notes, *box_notes],
         )
     except FloorPlanError as error:

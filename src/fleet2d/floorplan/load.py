@@ -1,30 +1,36 @@
 """Read a floor plan from whatever names one: a file of a known format, or a bundled home."""
 
 from pathlib import Path
+from typing import Any
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.bundled import HOMES, bundled_names
+from fleet2d.floorplan.drawing import read_image
+from fleet2d.floorplan.geojson import read_geojson
+from fleet2d.floorplan.geojson_file import COLLECTION
 from fleet2d.floorplan.houseexpo import read_houseexpo
-from fleet2d.floorplan.native import FORMAT, read_native
+from fleet2d.floorplan.native import FORMAT, native_plan, read_native
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.ros import read_ros
-from fleet2d.floorplan.source import read_json
+from fleet2d.floorplan.source import YAML, read_document, read_yaml
 from fleet2d.floorplan.valetudo import read_valetudo
 from fleet2d.floorplan.valetudo_file import MAP_CLASS
 from fleet2d.problems import did_you_mean
 
 USUAL_CELL_M = 0.05
-YAML = (".yaml", ".yml")
 IMAGES = (".pgm", ".png")
+JSON = (".json", ".geojson")
 
 
-def load_floorplan(plan: str | Path = "family_home", cell: float | None = None) -> FloorPlan:
+def load_floorplan(
+    plan: str | Path = "family_home", cell: float | None = None, *, resolution: float | None = None
+) -> FloorPlan:
     """Read a floor plan.
 
     Args:
-        plan: A file, whose content tells its format (YAML is a ROS map), or the name of a
-            bundled home.
-        cell: Side of a grid cell [m]; None for 0.05, or for a robot's map its resolution.
+        plan: A file, whose content tells its format, or the name of a bundled home.
+        cell: Side of a grid cell [m]; None for 0.05, or for what is made of pixels their side.
+        resolution: Side of a pixel [m], of a picture that no YAML file goes with.
 
     Raises:
         FloorPlanError: There is no such plan, or it can't be read.
@@ -34,34 +40,67 @@ def load_floorplan(plan: str | Path = "family_home", cell: float | None = None) 
         'family_home'
     """
     names = bundled_names()
+    path, usual = Path(plan), USUAL_CELL_M if cell is None else cell
+    if path.suffix.lower() in IMAGES and path.is_file():
+        return _load_image(path, resolution, cell)
+    if resolution is not None:
+        raise FloorPlanError(f"{plan} is no picture: its file says how large things are in it")
     if str(plan) in names:
-        return read_native(HOMES / f"{plan}.json", USUAL_CELL_M if cell is None else cell)
-    path = Path(plan)
+        return read_native(HOMES / f"{plan}.json", usual)
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
             f"there is no floor plan file {plan!r}, and no bundled home of that name"
             f"{did_you_mean(plan, names)} Bundled homes: {', '.join(names)}"
         )
+    content = read_document(path)
+    kind = _format_of(content)
+    if kind == "native":
+        return native_plan(content, path, usual)
+    if kind == "houseexpo":
+        return read_houseexpo(path, usual)
+    if kind == "geojson":
+        return read_geojson(path, usual)
+    if kind == "valetudo":
+        return read_valetudo(path, cell)
     if path.suffix.lower() in YAML:
         return read_ros(path, cell)
-    if path.suffix.lower() in IMAGES and path.is_file():
-        raise FloorPlanError(
-            f"{path} is the image of a map, without its scale: name the YAML file that goes with"
-            f" it, such as {path.with_suffix('.yaml').name}"
-        )
-    return _load_json(path, cell)
-
-
-def _load_json(path: Path, cell: float | None) -> FloorPlan:
-    usual = USUAL_CELL_M if cell is None else cell
-    content = read_json(path)
-    if content.get("format") == FORMAT:
-        return read_native(path, usual)
-    if "verts" in content:
-        return read_houseexpo(path, usual)
-    if content.get("__class") == MAP_CLASS:
-        return read_valetudo(path, cell)
     raise FloorPlanError(
         f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
-        f' "format": "{FORMAT}", nor "__class": "{MAP_CLASS}"'
+        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
     )
+
+
+def is_floorplan(plan: str | Path) -> bool:
+    """Whether a name or a file is meant for a floor plan, readable or not; a scenario is not.
+
+    >>> is_floorplan("family_home"), is_floorplan("plan.json"), is_floorplan("scenario.yaml")
+    (True, True, False)
+    """
+    path = Path(plan)
+    if path.suffix.lower() not in YAML:
+        return str(plan) in bundled_names() or path.suffix.lower() in (*JSON, *IMAGES)
+    try:
+        content = read_yaml(path)
+    except FloorPlanError:
+        return False
+    return _format_of(content) is not None or "image" in content
+
+
+def _format_of(content: dict[str, Any]) -> str | None:
+    if content.get("format") == FORMAT:
+        return "native"
+    if "verts" in content:
+        return "houseexpo"
+    if content.get("type") == COLLECTION:
+        return "geojson"
+    return "valetudo" if content.get("__class") == MAP_CLASS else None
+
+
+def _load_image(path: Path, resolution: float | None, cell: float | None) -> FloorPlan:
+    if resolution is None:
+        raise FloorPlanError(
+            f"{path} is an image, without its scale: name the YAML file that goes with the map of a"
+            f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
+            " pixel as resolution"
+        )
+    return read_image(path, resolution, cell)

@@ -56,7 +56,12 @@ def snap_polygon(polygon: Polygon | MultiPolygon) -> Snapped:
     return Snapped(parts, area_change, GRID * polygon.length)
 
 
-def build_mesh(polygons: Sequence[Polygon], columns: int, rows: int) -> Mesh:
+def build_mesh(
+    polygons: Sequence[Polygon],
+    columns: int,
+    rows: int,
+    corners: Sequence[tuple[int, int]] = (),
+) -> Mesh:
     """Triangulate free space.
 
     Args:
@@ -64,6 +69,7 @@ def build_mesh(polygons: Sequence[Polygon], columns: int, rows: int) -> Mesh:
             other in points.
         columns: Width of the plan, cells.
         rows: Height of the plan, cells.
+        corners: Points on walls that are to be vertices, too, even where the wall is straight.
 
     Raises:
         FloorPlanError: If the polygons are not such a free space, or don't fit the plan.
@@ -73,6 +79,8 @@ def build_mesh(polygons: Sequence[Polygon], columns: int, rows: int) -> Mesh:
     ([[0, 0], [0, 320], [640, 0], [640, 320]], 2)
     """
     rings = _rings(polygons, columns * SUB, rows * SUB)
+    if corners:
+        rings = _split_at(rings, np.array(corners, np.int64).reshape(-1, 2))
     mesh = _meshed(rings, columns, rows)
     if mesh is None:
         # A corner that touches the middle of another wall: make it a vertex of that wall, too.
@@ -144,7 +152,13 @@ def _without_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
 
 def _split_at_touching_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
     """Insert every vertex that lies in the middle of a wall into that wall."""
-    vertices = np.unique(np.concatenate([ring for rings in polygons for ring in rings]), axis=0)
+    return _split_at(
+        polygons, np.unique(np.concatenate([r for rings in polygons for r in rings]), axis=0)
+    )
+
+
+def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]:
+    """Insert every one of some points that lies in the middle of a wall into that wall."""
 
     def split(ring: Int64) -> Int64:
         points = []

@@ -1,4 +1,4 @@
-"""This project's own floor plan format: outlines with holes, and rooms, in metres, as JSON.
+"""This project's own floor plan format: outlines, rooms, doors and objects, as JSON or YAML.
 
 A plan written by `FloorPlan.to_native` and read again at the same cell size is equal to the first::
 
@@ -6,11 +6,13 @@ A plan written by `FloorPlan.to_native` and read again at the same cell size is 
      "free": [{"outline": [[0, 0], [5, 0], [5, 3], [0, 3]], "holes": []}],
      "rooms": [{"type": "kitchen", "polygon": [[0, 0], [2, 0], [2, 3], [0, 3]]}],
      "entrance": [4.5, 0.5]}
+
+`native_schema` has all of it.
 """
 
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 import shapely
@@ -20,9 +22,17 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.doorways import DoorLine
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.source import FloorPlanSource, read_json, read_numbers, read_ring
+from fleet2d.floorplan.source import (
+    FloorPlanSource,
+    read_document,
+    read_numbers,
+    read_ring,
+    shown_value,
+)
 from fleet2d.floorplan.vocabulary import UNKNOWN, room_type
 from fleet2d.paths import InputPath
 from fleet2d.problems import did_you_mean
@@ -30,9 +40,15 @@ from fleet2d.problems import did_you_mean
 FORMAT = "fleet2d-floorplan"
 VERSION = 1
 
-_KEYS = ("format", "version", "name", "free", "rooms", "entrance")
+_KEYS = (
+    *("format", "version", "name", "free", "rooms"),
+    *("doorways", "objects", "no_go", "entrance"),
+)
 _ROOM_KEYS = ("name", "type", "labels", "polygon", "region")
 _PART_KEYS = ("outline", "holes")
+_DOORWAY_KEYS = ("name", "start", "end", "leaf")
+_OBJECT_KEYS = ("name", "type", "footprint", "blocks", "heading", "uses")
+_USE_KEYS = ("x", "y", "heading", "posture", "approach")
 
 T = TypeVar("T")
 Shape = TypeVar("Shape", Polygon, MultiPolygon)
@@ -43,10 +59,10 @@ class Native(FloorPlanSource):
     """A plan in Fleet2D's own format.
 
     Attributes:
-        path: The plan's JSON file.
+        path: The plan's JSON or YAML file.
     """
 
-    path: InputPath = Field(description="the plan's JSON file")
+    path: InputPath = Field(description="the plan's JSON or YAML file")
 
     def load(self) -> FloorPlan:
         """Read the plan."""
@@ -57,13 +73,21 @@ def read_native(path: Path, cell: float = 0.05) -> FloorPlan:
     """Read a floor plan in Fleet2D's own format.
 
     Args:
-        path: The JSON file.
+        path: The file: YAML if its name ends in .yaml or .yml, else JSON.
         cell: Side of a grid cell [m].
 
     Raises:
         FloorPlanError: It can't be read, isn't in this format, or has no free space.
     """
-    content = read_json(path)
+    return native_plan(read_document(path), path, cell)
+
+
+def native_plan(content: dict[str, Any], path: Path, cell: float = 0.05) -> FloorPlan:
+    """Return the floor plan of a file's content.
+
+    Raises:
+        FloorPlanError: It isn't in this format, or has no free space.
+    """
     try:
         return _plan(content, path, cell)
     except FloorPlanError as error:
@@ -71,7 +95,7 @@ def read_native(path: Path, cell: float = 0.05) -> FloorPlan:
 
 
 def native_document(plan: FloorPlan) -> dict[str, Any]:
-    """Return a plan as the JSON object that `read_native` reads."""
+    """Return a plan as the mapping that `read_native` reads, of what JSON knows."""
     lattice = plan.lattice
     document: dict[str, Any] = {
         "format": FORMAT,
@@ -85,12 +109,20 @@ def native_document(plan: FloorPlan) -> dict[str, Any]:
                 "labels": list(room.labels),
                 "region": [
                     _written_part(lattice, polygon)
-                    for polygon in _cell_polygons(plan.room_of_cell == room.index)
+                    for polygon in cell_polygons(plan.room_of_cell == room.index)
                 ],
             }
             for room in plan.rooms
         ],
     }
+    document["doorways"] = [
+        {"name": d.name, "start": list(d.start), "end": list(d.end), "leaf": d.leaf}
+        for d in plan.doorways
+    ]
+    if plan.objects:
+        document["objects"] = [written_object(thing) for thing in plan.objects]
+    if plan.no_go:
+        document["no_go"] = [_written_shape(area) for area in plan.no_go]
     if plan.entrance is not None:
         document["entrance"] = list(plan.entrance)
     return document
@@ -106,7 +138,7 @@ def _plan(content: dict[str, Any], path: Path, cell: float) -> FloorPlan:
     if content.get("version") != VERSION:
         found = content.get("version")
         raise FloorPlanError(
-            f"version {found!r} of the format is not known: this Fleet2D reads {VERSION}"
+            f"version {shown_value(found)} of the format is not known: this Fleet2D reads {VERSION}"
         )
     _check_keys(content, _KEYS, required=("free",), where="the plan")
     name = content.get("name", path.stem)
@@ -120,6 +152,12 @@ def _plan(content: dict[str, Any], path: Path, cell: float) -> FloorPlan:
         cell,
         source=f"Fleet2D floor plan, {path.name}",
         entrance=None if entrance is None else _point(entrance, "entrance"),
+        doorways=_listed(content["doorways"], "doorways", _doorway)
+        if "doorways" in content
+        else None,
+        regions_are="exact" if "rooms" in content else "none",
+        objects=_listed(content.get("objects", []), "objects", _object),
+        no_go=_listed(content.get("no_go", []), "no_go", _shape),
     )
 
 
@@ -139,8 +177,83 @@ def _room(value: object, where: str) -> LabelledRegion:
     if "region" in room:
         shape = _space(room["region"], f"{where}.region")
     else:
-        shape = _valid(Polygon(read_ring(room["polygon"], f"{where}.polygon")), f"{where}.polygon")
+        shape = _shape(room["polygon"], f"{where}.polygon")
     return LabelledRegion(tuple(labels), shape, name, room_type(kind))
+
+
+def _doorway(value: object, where: str) -> DoorLine:
+    door = _checked(value, _DOORWAY_KEYS, where, required=("start", "end"))
+    start, end = (_point(door[key], f"{where}.{key}") for key in ("start", "end"))
+    leaf = door.get("leaf", True)
+    if not isinstance(leaf, bool):
+        raise FloorPlanError(f"{where}.leaf is {shown_value(leaf)}: true or false is expected")
+    return DoorLine(start, end, _name(door, where) or None, leaf)
+
+
+def _object(value: object, where: str) -> PlacedObject:
+    thing = _checked(value, _OBJECT_KEYS, where, required=("type", "footprint"))
+    kind = thing["type"]
+    if not isinstance(kind, str) or not kind:
+        raise FloorPlanError(f"{where}.type is {shown_value(kind)}: a text is expected")
+    return PlacedObject(
+        name=_name(thing, where),
+        type=kind,
+        footprint=_shape(thing["footprint"], f"{where}.footprint"),
+        blocks=read_blocks(thing.get("blocks", "path"), f"{where}.blocks"),
+        uses=tuple(read_uses(thing.get("uses", []), f"{where}.uses")),
+        heading=read_numbers([thing.get("heading", 0.0)], 1, f"{where}.heading")[0],
+    )
+
+
+def read_blocks(value: object, where: str) -> Blocks:
+    """Return what can't pass an object.
+
+    Raises:
+        FloorPlanError: The value is none of the words for that.
+    """
+    blocks: Blocks = _one_of(value, get_args(Blocks), where)
+    return blocks
+
+
+def read_uses(value: object, where: str) -> list[UsePlace]:
+    """Return the places to use an object from.
+
+    Raises:
+        FloorPlanError: The value is no list of such places.
+    """
+    return _listed(value, where, _use)
+
+
+def _use(value: object, where: str) -> UsePlace:
+    use = _checked(value, _USE_KEYS, where, required=("x", "y", "heading"))
+    x, y, heading = read_numbers([use[key] for key in ("x", "y", "heading")], 3, where)
+    posture = _one_of(use.get("posture", "stand"), get_args(Posture), f"{where}.posture")
+    approach = use.get("approach")
+    if approach is not None:
+        approach = _point(approach, f"{where}.approach")
+    return UsePlace(x, y, heading, posture, approach)
+
+
+def _name(thing: dict[str, Any], where: str) -> str:
+    """Return the name, empty where there is none."""
+    name = thing.get("name", "")
+    if not isinstance(name, str) or ("name" in thing and not name):
+        raise FloorPlanError(f"{where}.name is {shown_value(name)}: a text is expected")
+    return name
+
+
+def _one_of(value: object, choices: tuple[Any, ...], where: str) -> Any:
+    if value not in choices:
+        known = ", ".join(choices)
+        raise FloorPlanError(f"{where} is {shown_value(value)}: one of {known} is expected")
+    return value
+
+
+def _shape(value: object, where: str) -> Polygon:
+    """Return a polygon that is written as its corners, or as an outline with holes."""
+    if isinstance(value, dict):
+        return _part(value, where)
+    return _valid(Polygon(read_ring(value, where)), where)
 
 
 def _space(value: object, where: str) -> Polygon | MultiPolygon:
@@ -203,6 +316,34 @@ def _check_keys(
 # --- Writing -----------------------------------------------------------------------------------
 
 
+def written_object(thing: PlacedObject) -> dict[str, Any]:
+    """Return an object as the format has it."""
+    written: dict[str, Any] = {
+        "name": thing.name,
+        "type": thing.type,
+        "footprint": _written_shape(thing.footprint),
+        "blocks": thing.blocks,
+    }
+    if thing.heading:
+        written["heading"] = thing.heading
+    if thing.uses:
+        written["uses"] = [_written_use(use) for use in thing.uses]
+    return written
+
+
+def _written_use(use: UsePlace) -> dict[str, Any]:
+    written = {"x": use.x, "y": use.y, "heading": use.heading, "posture": use.posture}
+    return written if use.approach is None else {**written, "approach": list(use.approach)}
+
+
+def _written_shape(polygon: Polygon) -> Any:
+    outline, *holes = (
+        shapely.get_coordinates(ring)[:-1].tolist()
+        for ring in (polygon.exterior, *polygon.interiors)
+    )
+    return {"outline": outline, "holes": holes} if holes else outline
+
+
 def _written_part(lattice: Lattice, polygon: Polygon) -> dict[str, Any]:
     def written(ring: shapely.LinearRing) -> Any:
         return lattice.to_metres(shapely.get_coordinates(ring)[:-1]).tolist()
@@ -213,7 +354,7 @@ def _written_part(lattice: Lattice, polygon: Polygon) -> dict[str, Any]:
     return part
 
 
-def _cell_polygons(mask: NDArray[np.bool_]) -> list[Polygon]:
+def cell_polygons(mask: NDArray[np.bool_]) -> list[Polygon]:
     """Return the area of cells as polygons [lattice]: the union of their runs along the rows."""
     edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, first = np.nonzero(edges == 1)

@@ -13,9 +13,14 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.adjacency import RoomLink, room_links
+from fleet2d.floorplan.arrangement import described, number_objects
+from fleet2d.floorplan.division import Regions, Survey, divide, found_doorways, survey
+from fleet2d.floorplan.doorways import DoorLine, Doorway, fit_lines, name_doorways
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import GRID, Snapped, build_mesh, snap_polygon
-from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, assign_rooms, beside_rooms
+from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, beside_rooms
 from fleet2d.floorplan.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.problems import did_you_mean
@@ -43,7 +48,12 @@ class FloorPlan:
         room_of_cell: Index of each cell's room, -1 where not free, int16 (rows, columns).
         rooms: The rooms by index: disjoint, and together all free cells.
         entrance: A place just inside the front door (x, y) [m], where the file gives one.
+        doorways: The passages between rooms by index, as given or found.
+        objects: Furniture and devices, in the order given.
+        no_go: Areas that robots keep out of [m].
         notes: What was odd in the file and what was made of it; not part of the content.
+        regions: The labels as the file gives them; not part of the content.
+        lost_doorways: Doorways of the file that stand in no passage; not part of the content.
 
     Example:
         >>> kitchen = LabelledRegion(("Kitchen",), shapely.box(0, 0, 2, 3))
@@ -63,7 +73,12 @@ class FloorPlan:
     room_of_cell: NDArray[np.int16]
     rooms: tuple[Room, ...]
     entrance: tuple[float, float] | None = None
+    doorways: tuple[Doorway, ...] = ()
+    objects: tuple[PlacedObject, ...] = ()
+    no_go: tuple[Polygon, ...] = ()
     notes: tuple[str, ...] = ()
+    regions: tuple[LabelledRegion, ...] = ()
+    lost_doorways: tuple[DoorLine, ...] = ()
 
     @classmethod
     def build(
@@ -75,6 +90,10 @@ class FloorPlan:
         *,
         source: str = "",
         entrance: tuple[float, float] | None = None,
+        doorways: Sequence[DoorLine] | None = (),
+        regions_are: Regions = "exact",
+        objects: Sequence[PlacedObject] = (),
+        no_go: Sequence[Polygon] = (),
         notes: Sequence[str] = (),
     ) -> Self:
         """Make a floor plan of free space and labels, both in metres.
@@ -86,6 +105,12 @@ class FloorPlan:
             cell: Side of a cell [m].
             source: Where the plan comes from.
             entrance: A place just inside the front door [m].
+            doorways: Lines across passages [m]; one that stands in no passage is noted and left
+                out. None to look for them.
+            regions_are: `exact`: the rooms themselves. `boxes`: rough, they label what walls bound.
+                `none`: rooms are found from the walls alone.
+            objects: Furniture and devices [m].
+            no_go: Areas that robots keep out of [m].
             notes: What the caller found odd.
 
         Raises:
@@ -93,6 +118,12 @@ class FloorPlan:
                 than rounding explains, it is too large, or the entrance is not in it.
         """
         lattice, polygons = _snapped(name, free, cell)
+        lines = list(doorways or ())
+        polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
+        passages: Survey | None = None
+        if doorways is None or regions_are != "exact":
+            polygons, passages = survey(lattice, polygons, regions_are)
+        polygons = _in_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         cells: NDArray[np.bool_] = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0
         if not cells.any():
@@ -100,9 +131,15 @@ class FloorPlan:
                 f"the free space of {name} holds no cell of {cell:g} m: choose a smaller"
                 " floorplan.cell, and check that the file is in metres"
             )
-        room_of_cell, rooms, room_notes = assign_rooms(lattice, cells, regions)
+        room_of_cell, rooms, room_notes = divide(
+            lattice, polygons, mesh, cells, regions, regions_are, passages
+        )
         cells.setflags(write=False)
         room_of_cell.setflags(write=False)
+        fitted = [(line, at) for line, at in zip(lines, segments, strict=True) if at is not None]
+        if doorways is None and passages is not None:
+            fitted = found_doorways(lattice, polygons, room_of_cell, passages)
+        names = [room.name for room in rooms]
         plan = cls(
             name=name,
             source=source,
@@ -113,7 +150,14 @@ class FloorPlan:
             room_of_cell=room_of_cell,
             rooms=rooms,
             entrance=entrance,
-            notes=(*notes, *_part_notes(lattice, polygons), *room_notes),
+            doorways=name_doorways(lattice, beside_rooms(room_of_cell), names, fitted),
+            objects=number_objects(objects),
+            no_go=tuple(no_go),
+            notes=(*notes, *_part_notes(lattice, polygons), *room_notes, *door_notes),
+            regions=tuple(regions),
+            lost_doorways=tuple(
+                line for line, at in zip(lines, segments, strict=True) if at is None
+            ),
         )
         plan._check_entrance()
         return plan
@@ -167,15 +211,22 @@ class FloorPlan:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of name, walls, cells, rooms and entrance; the same on any machine."""
+        """SHA-256 of all but source and notes; the same on any machine."""
         lattice = self.lattice
-        head = {
+        head: dict[str, Any] = {
             "name": self.name,
             "lattice": [lattice.cell, *lattice.origin, lattice.columns, lattice.rows],
             "rooms": [[room.name, room.type, *room.labels] for room in self.rooms],
             "entrance": self.entrance,
             "rings": [[len(ring.coords) for ring in rings(p)] for p in self.polygons],
         }
+        # What a plan doesn't have is not in its digest.
+        if self.doorways:
+            head["doorways"] = [[d.name, *d.start, *d.end, d.leaf] for d in self.doorways]
+        if self.objects:
+            head["objects"] = [described(thing) for thing in self.objects]
+        if self.no_go:
+            head["no_go"] = [shapely.get_coordinates(area).tolist() for area in self.no_go]
         content = hashlib.sha256(json.dumps(head).encode())
         content.update(shapely.get_coordinates(self.polygons).astype("<i8").tobytes())
         content.update(self.room_of_cell.astype("<i2").tobytes())
@@ -209,11 +260,61 @@ class FloorPlan:
             f" Its rooms are: {', '.join(names)}"
         )
 
+    def doorway(self, name: str | int) -> Doorway:
+        """Return a doorway by its name or index.
+
+        Raises:
+            FloorPlanError: The plan has no such doorway.
+        """
+        if isinstance(name, int) and 0 <= name < len(self.doorways):
+            return self.doorways[name]
+        names = [doorway.name for doorway in self.doorways]
+        if name in names:
+            return self.doorways[names.index(str(name))]
+        raise FloorPlanError(
+            f"{self.name} has no doorway {name!r}{did_you_mean(str(name), names)}"
+            f" Its doorways are: {', '.join(names) or 'none'}"
+        )
+
+    @cached_property
+    def room_graph(self) -> tuple[RoomLink, ...]:
+        """The ways between rooms: doorways by index, then open borders."""
+        return room_links(self.lattice, self.room_of_cell, self.doorways)
+
+    def neighbors(self, room: str | int) -> tuple[Room, ...]:
+        """Return the rooms that one gets to from a room, without crossing others, by index."""
+        index = self.room(room).index
+        joined = {b for link in self.room_graph for b in link.rooms if index in link.rooms}
+        return tuple(self.rooms[other] for other in sorted(joined - {index}))
+
     def rooms_of_type(self, kind: str) -> tuple[Room, ...]:
         """Return the rooms of a type, then those that only have it as a further label."""
         wanted = room_type(kind)
         first = [room for room in self.rooms if room.type == wanted]
         return (*first, *(r for r in self.rooms if wanted in r.labels and r.type != wanted))
+
+    def object(self, name: str) -> PlacedObject:
+        """Return an object by its name.
+
+        Raises:
+            FloorPlanError: The plan has no such object.
+        """
+        names = [thing.name for thing in self.objects]
+        if name in names:
+            return self.objects[names.index(name)]
+        raise FloorPlanError(
+            f"{self.name} has no object {name!r}{did_you_mean(name, names)}"
+            f" Its objects are: {', '.join(names) or 'none'}"
+        )
+
+    def objects_of_type(self, kind: str) -> tuple[PlacedObject, ...]:
+        """Return the objects of a type, such as `bed`."""
+        return tuple(thing for thing in self.objects if thing.type == kind)
+
+    def objects_in(self, room: Room) -> tuple[PlacedObject, ...]:
+        """Return the objects whose middle is in a room."""
+        middles = [(thing, thing.footprint.centroid) for thing in self.objects]
+        return tuple(thing for thing, at in middles if self.room_at(at.x, at.y) == room)
 
     def named(self, name: str) -> Self:
         """Return the same plan under another name."""
@@ -279,8 +380,13 @@ def _snapped(name: str, free: Polygon | MultiPolygon, cell: float) -> tuple[Latt
     lattice = Lattice.around(tuple(corners.tolist()), cell)
     shift = lattice.to_lattice((0.0, 0.0))
     moved = [shapely.transform(polygon, lambda xy: xy + shift) for polygon in snapped.polygons]
-    canonical = shapely.orient_polygons(shapely.normalize(moved))
-    return lattice, sorted(canonical.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
+    return lattice, _in_order(moved)
+
+
+def _in_order(polygons: Sequence[Polygon]) -> list[Polygon]:
+    """Return polygons and their rings in one order, however they came about."""
+    canonical = shapely.orient_polygons(shapely.normalize(polygons))
+    return sorted(canonical.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
 
 
 def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:

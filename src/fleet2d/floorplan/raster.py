@@ -3,6 +3,7 @@
 import io
 import re
 import warnings
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ MAX_PIXELS = 2**26
 """A map of 8192 x 8192 pixels: 400 m a side at 5 cm."""
 
 _PNG = b"\x89PNG\r\n\x1a\n"
+_CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
 # Three numbers, each after white space and comments; then one white space.
 _PGM_HEADER = re.compile(
     rb"P([25])" + rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" * 3 + rb"(?:#[^\r\n]*)?\s"
@@ -135,14 +137,38 @@ def _read_png(content: bytes) -> GreyPicture:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size
             picture = Image.open(io.BytesIO(content), formats=["PNG"])
         _check_size(*picture.size)
+        _check_rows(content)
         if picture.mode.startswith("I"):  # 16 bits, grey only
             return GreyPicture(np.asarray(picture).astype(np.uint16), 65535)
         channels = np.asarray(picture.convert("RGBA"))
     except Image.DecompressionBombError as error:
         raise FloorPlanError(f"is too large: {error}") from error
-    except (OSError, SyntaxError, ValueError) as error:
+    except (OSError, SyntaxError, ValueError, zlib.error) as error:
         raise FloorPlanError(f"is a damaged PNG: {error}") from error
     # The mean of the colours, times three to keep it whole.
     shades = channels[..., :3].sum(axis=-1, dtype=np.uint16)
     clear = channels[..., 3] < 255
     return GreyPicture(shades, 3 * 255, clear if clear.any() else None)
+
+
+def _check_rows(content: bytes) -> None:
+    """Refuse a PNG with fewer rows than it says; Pillow takes what lacks for black.
+
+    Raises:
+        FloorPlanError: There are too few.
+        zlib.error: What is packed can't be unpacked.
+    """
+    width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
+    bits, colours, interlaced = content[24], content[25], content[28]
+    if interlaced:
+        return
+    row = 1 + (width * bits * _CHANNELS.get(colours, 1) + 7) // 8
+    packed, at = [], len(_PNG)
+    while at + 8 <= len(content):
+        length = int.from_bytes(content[at : at + 4], "big")
+        if content[at + 4 : at + 8] == b"IDAT":
+            packed.append(content[at + 8 : at + 8 + length])
+        at += 12 + length
+    rows = len(zlib.decompressobj().decompress(b"".join(packed), height * row)) // row
+    if rows < height:
+        raise FloorPlanError(f"holds {rows} rows, but its header says {height}: it is cut off")

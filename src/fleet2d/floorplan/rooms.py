@@ -1,42 +1,22 @@
-"""From labelled regions in a file to rooms: disjoint sets of cells that cover all free space."""
+"""Rooms: disjoint sets of cells that cover all free space, and what they are called."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon
+from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.vocabulary import UNKNOWN, leading_type, room_type
+from fleet2d.floorplan.regions import LabelledRegion, Region, paint_regions, snap_regions
+from fleet2d.floorplan.vocabulary import UNKNOWN
 from fleet2d.kernels.fields import squared_distance as squared_distance_kernel
 
+__all__ = ["NO_ROOM", "LabelledRegion", "Room", "assign_rooms", "beside_rooms", "make_rooms"]
+
 NO_ROOM = -1
-
-
-@dataclass(frozen=True)
-class LabelledRegion:
-    """A part of a floor plan that a file gives a name to.
-
-    Attributes:
-        labels: What the file calls it, as spelled there; none for a region of unknown use.
-        shape: Where it is [m]; it may reach over walls and over other regions.
-        name: Name of the room, or None to be numbered by type (`bedroom_0`).
-        type: Type of the room, or None for the one of its labels that leads.
-    """
-
-    labels: tuple[str, ...]
-    shape: Polygon | MultiPolygon
-    name: str | None = None
-    type: str | None = None
-
-    @property
-    def types(self) -> tuple[str, ...]:
-        """The labels as room types, each once."""
-        return tuple(dict.fromkeys(room_type(label) for label in self.labels))
 
 
 @dataclass(frozen=True)
@@ -64,20 +44,6 @@ class Room:
     bounds: tuple[float, float, float, float]
 
 
-@dataclass(frozen=True)
-class _Snapped:
-    """A region on the lattice, with the regions of the same shape merged into it."""
-
-    types: tuple[str, ...]
-    shape: Polygon | MultiPolygon
-    name: str | None = None
-    given_type: str | None = None
-
-    @property
-    def type(self) -> str:
-        return self.given_type or leading_type(self.types)
-
-
 def assign_rooms(
     lattice: Lattice, free: NDArray[np.bool_], regions: Sequence[LabelledRegion]
 ) -> tuple[NDArray[np.int16], tuple[Room, ...], list[str]]:
@@ -99,12 +65,27 @@ def assign_rooms(
     Raises:
         FloorPlanError: Two regions ask for the same name.
     """
-    merged = _merge_equal([_snap(lattice, region) for region in regions])
-    painted = _paint(free, merged)
+    merged = snap_regions(lattice, regions)
+    painted = paint_regions(free, merged)
     counts = np.bincount(painted[free], minlength=len(merged) + 1)
-    notes = [_lost_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
+    notes = [lost_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
     if counts[-1]:
-        merged = [*merged, _Snapped((), Polygon())]
+        merged = [*merged, Region((), Polygon())]
+    room_of_cell, rooms = make_rooms(lattice, painted, merged)
+    return room_of_cell, rooms, notes
+
+
+def make_rooms(
+    lattice: Lattice, painted: NDArray[np.int64], merged: Sequence[Region]
+) -> tuple[NDArray[np.int16], tuple[Room, ...]]:
+    """Return the rooms of the regions that have cells, and the room of each cell.
+
+    Args:
+        lattice: The plan's lattice.
+        painted: Region of each cell, -1 where not free, (rows, columns).
+        merged: The regions.
+    """
+    counts = np.bincount(painted[painted != NO_ROOM], minlength=len(merged))
     kept = [k for k in range(len(merged)) if counts[k] > 0]
     if len(kept) > np.iinfo(np.int16).max:
         raise FloorPlanError(f"the floor plan has {len(kept)} rooms: at most 32767 are possible")
@@ -116,59 +97,10 @@ def assign_rooms(
     rooms = tuple(
         _room(lattice, room_of_cell, boxes[i], i, names[i], merged[k]) for i, k in enumerate(kept)
     )
-    return room_of_cell, rooms, notes
+    return room_of_cell, rooms
 
 
-def _snap(lattice: Lattice, region: LabelledRegion) -> _Snapped:
-    shape = shapely.transform(region.shape, lambda xy: lattice.to_walls(xy).astype(np.float64))
-    return _Snapped(region.types, shapely.normalize(shape), region.name, region.type)
-
-
-def _merge_equal(regions: list[_Snapped]) -> list[_Snapped]:
-    """Return the regions with those of exactly the same shape joined, at the place of the first."""
-    by_shape: dict[bytes, _Snapped] = {}
-    for region in regions:
-        key = shapely.to_wkb(region.shape)
-        known = by_shape.get(key)
-        if known is None:
-            by_shape[key] = region
-            continue
-        types = tuple(dict.fromkeys(known.types + region.types))
-        by_shape[key] = _Snapped(
-            types, known.shape, known.name or region.name, known.given_type or region.given_type
-        )
-    return list(by_shape.values())
-
-
-def _paint(free: NDArray[np.bool_], regions: list[_Snapped]) -> NDArray[np.int64]:
-    """Return the region of each cell: len(regions) for a free cell of none, -1 where not free."""
-    painted = np.where(free, len(regions), NO_ROOM).astype(np.int64)
-    order = sorted(range(len(regions)), key=lambda k: (-regions[k].shape.area, -k))
-    for k in order:
-        _paint_one(painted, regions[k].shape, k)
-    return painted
-
-
-def _paint_one(painted: NDArray[np.int64], shape: Polygon | MultiPolygon, value: int) -> None:
-    """Give `value` to the free cells whose centre lies inside `shape`."""
-    if shape.is_empty:
-        return
-    # Shapes have even coordinates and centres odd ones, so no centre is on the side of a box.
-    to_centre = UNITS_PER_CELL // 2 + 1
-    x0, y0, x1, y1 = ((int(v) - to_centre) // UNITS_PER_CELL + 1 for v in shape.bounds)
-    rows, columns = slice(max(y0, 0), max(y1, 0)), slice(max(x0, 0), max(x1, 0))
-    window = painted[rows, columns]
-    chosen = window != NO_ROOM
-    if not shape.equals(shapely.box(*shape.bounds)):
-        y, x = np.nonzero(chosen)
-        centre_x = (x + columns.start) * UNITS_PER_CELL + to_centre
-        centre_y = (y + rows.start) * UNITS_PER_CELL + to_centre
-        shapely.prepare(shape)
-        chosen[y, x] = shapely.contains_xy(shape, centre_x, centre_y)
-    window[chosen] = value
-
-
-def _names(regions: list[_Snapped]) -> list[str]:
+def _names(regions: list[Region]) -> list[str]:
     """Return a name for each room: its own, or its type and a number."""
     own = Counter(region.name for region in regions if region.name is not None)
     twice = [name for name, uses in own.items() if uses > 1]
@@ -205,7 +137,7 @@ def _room(
     box: NDArray[np.int64],
     index: int,
     name: str,
-    region: _Snapped,
+    region: Region,
 ) -> Room:
     row0, column0, row1, column1 = (int(v) for v in box)
     inside = room_of_cell[row0 : row1 + 1, column0 : column1 + 1] == index
@@ -228,15 +160,17 @@ def _room(
     )
 
 
-def _lost_note(lattice: Lattice, region: _Snapped) -> str:
+def lost_note(
+    lattice: Lattice,
+    region: Region,
+    why: str = "has no free cell that isn't a smaller room's: it is no room",
+) -> str:
+    """Say that a region is no room."""
     name = region.name or " and ".join(region.types) or UNKNOWN
     if region.shape.is_empty:
         return f"the region {name} is empty: it is no room"
     (x0, y0), (x1, y1) = lattice.to_metres(np.reshape(region.shape.bounds, (2, 2))).tolist()
-    return (
-        f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m has no free cell"
-        " that isn't a smaller room's: it is no room"
-    )
+    return f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}"
 
 
 def beside_rooms(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 import shapely
-import yaml
 from numpy.typing import NDArray
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.component import register
@@ -19,7 +18,7 @@ from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.occupancy import OccupancyMap, free_space
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.raster import GreyPicture, read_grey
-from fleet2d.floorplan.source import MAX_COORDINATE_M, FloorPlanSource
+from fleet2d.floorplan.source import MAX_COORDINATE_M, PixelSource, read_yaml, shown_value
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
@@ -41,12 +40,11 @@ _KEYS = {
 
 
 @register("floorplan", "ros")
-class Ros(FloorPlanSource):
+class Ros(PixelSource):
     """A map of the ROS map_server.
 
     Attributes:
         path: The map's YAML file; it names the image.
-        cell: Side of a grid cell, 0.01 m to 1 m; None for the map's resolution.
         speck_area_m2: Groups of pixels smaller than this with free space all round, such as the
             legs of a chair, become free; 0 keeps all.
         ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
@@ -56,10 +54,6 @@ class Ros(FloorPlanSource):
     """
 
     path: InputPath = Field(description="the map's YAML file; it names the image")
-    cell: Length | None = Field(  # type: ignore[assignment]
-        default=None,
-        description="side of a grid cell, 0.01 m to 1 m; left out: the map's resolution",
-    )
     speck_area_m2: float = Field(
         default=SPECK_AREA_M2,
         ge=0,
@@ -76,21 +70,15 @@ class Ros(FloorPlanSource):
         description="how far straightened walls may be from the map's pixels; 0: exact walls",
     )
 
-    @model_validator(mode="before")
     @classmethod
-    def _take_resolution(cls, data: Any) -> Any:
-        """Fill in the cell, so that a stored scenario has it; `load` says what is wrong."""
-        if not isinstance(data, Mapping) or data.get("cell") is not None or "path" not in data:
-            return data
-        try:
-            path = TypeAdapter(InputPath).validate_python(data["path"])
-            return {**data, "cell": _settings(path).usual_cell}
-        except (ValidationError, FloorPlanError):
-            return data
+    def usual_cell(cls, settings: Mapping[str, Any]) -> float:
+        """Return the map's resolution."""
+        return _settings(read_yaml(settings["path"])).usual_cell
 
     def files(self) -> list[Path]:
         """Return the YAML file and the image."""
-        return [self.path, _image_file(_settings(self.path).image, self.path)[0]]
+        settings = _settings(read_yaml(self.path))
+        return [self.path, _image_file(settings.image, self.path)[0]]
 
     def load(self) -> FloorPlan:
         """Read the map."""
@@ -123,8 +111,9 @@ def read_ros(
     Raises:
         FloorPlanError: A file can't be read, isn't such a map, or has no free space.
     """
+    content = read_yaml(path)
     try:
-        settings = _settings(path)
+        settings = _settings(content)
         file, notes = _image_file(settings.image, path)
         raw = _occupancy(settings, read_grey(file), notes)
         free, done = free_space(raw, speck_area_m2=speck_area_m2, ray_width=ray_width)
@@ -136,6 +125,8 @@ def read_ros(
             free,
             cell=settings.usual_cell if cell is None else cell,
             source=f"ROS map, {path.name}",
+            doorways=None,
+            regions_are="none",
             notes=notes,
         )
     except FloorPlanError as error:
@@ -155,20 +146,22 @@ class _MapSettings:
     negate: bool
     occupied_thresh: float
     free_thresh: float
+    raw: bool
 
     @property
     def usual_cell(self) -> float:
         return max(self.resolution, MIN_CELL_M)
 
 
-def _settings(path: Path) -> _MapSettings:
-    content = _read_yaml(path)
+def _settings(content: dict[str, Any]) -> _MapSettings:
     for key, line in _KEYS.items():
         if key not in content:
             raise FloorPlanError(f"no ROS map: the key {key!r} is missing, as in `{line}`")
     image = content["image"]
     if not isinstance(image, str) or not image:
-        raise FloorPlanError(f"image is {image!r}: the name of a PGM or PNG file is expected")
+        raise FloorPlanError(
+            f"image is {shown_value(image)}: the name of a PGM or PNG file is expected"
+        )
     resolution = _number(content["resolution"], "resolution")
     if not 0 < resolution <= MAX_RESOLUTION_M:
         raise FloorPlanError(
@@ -181,30 +174,19 @@ def _settings(path: Path) -> _MapSettings:
             f"free_thresh, {free:g}, is above occupied_thresh, {occupied:g}: they are the wrong way"
             " round"
         )
-    _check_mode(content.get("mode", "trinary"))
+    mode = content.get("mode", "trinary")
+    if mode not in ("trinary", "scale", "raw"):
+        raise FloorPlanError(f"mode is {shown_value(mode)}: trinary, scale or raw is expected")
     negate = content["negate"]
     if negate not in (0, 1):
-        raise FloorPlanError(f"negate is {negate!r}: 0 or 1 is expected")
-    return _MapSettings(image, resolution, _origin(content["origin"]), bool(negate), occupied, free)
-
-
-def _read_yaml(path: Path) -> dict[str, Any]:
-    if path.is_dir():
-        raise FloorPlanError("is a folder: name the map's YAML file in it")
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise FloorPlanError("there is no such file: check floorplan.path") from None
-    except OSError as error:
-        raise FloorPlanError(f"can't be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        what = " ".join(str(error).split())[:200]
+        raise FloorPlanError(f"negate is {shown_value(negate)}: 0 or 1 is expected")
+    if negate and mode == "raw":
         raise FloorPlanError(
-            f"not YAML: {what} (floorplan.path names the map's YAML file, not the image)"
-        ) from None
-    if not isinstance(content, dict):
-        raise FloorPlanError("no ROS map: a mapping with image, resolution, … is expected")
-    return content
+            "negate is 1 in mode raw, which ROS 1 and ROS 2 take differently: save the map with"
+            " negate 0, or as trinary"
+        )
+    origin = _origin(content["origin"])
+    return _MapSettings(image, resolution, origin, bool(negate), occupied, free, mode == "raw")
 
 
 def _number(value: object, key: str) -> float:
@@ -214,9 +196,9 @@ def _number(value: object, key: str) -> float:
             raise ValueError
         number = float(value)
     except (ValueError, OverflowError):
-        raise FloorPlanError(f"{key} is {value!r}: a number is expected") from None
+        raise FloorPlanError(f"{key} is {shown_value(value)}: a number is expected") from None
     if not math.isfinite(number):
-        raise FloorPlanError(f"{key} is {value!r}: a finite number is expected")
+        raise FloorPlanError(f"{key} is {number}: a finite number is expected")
     return number
 
 
@@ -229,21 +211,12 @@ def _threshold(content: dict[str, Any], key: str) -> float:
 
 def _origin(value: object) -> tuple[float, float, float]:
     if not isinstance(value, list) or len(value) != 3:
-        raise FloorPlanError(f"origin is {value!r}: a list [x, y, yaw] is expected")
+        raise FloorPlanError(f"origin is {shown_value(value)}: a list [x, y, yaw] is expected")
     x, y, yaw = (_number(v, f"origin[{k}]") for k, v in enumerate(value))
     if max(abs(x), abs(y)) > MAX_COORDINATE_M:
-        raise FloorPlanError(f"origin is {value!r}: too far out for coordinates in metres")
+        found = shown_value(value)
+        raise FloorPlanError(f"origin is {found}: too far out for coordinates in metres")
     return x, y, yaw
-
-
-def _check_mode(mode: object) -> None:
-    if mode == "raw":
-        raise FloorPlanError(
-            "mode raw is not supported: its pixels are any numbers, and nothing says which of them"
-            " are free. Save the map as trinary"
-        )
-    if mode not in ("trinary", "scale"):
-        raise FloorPlanError(f"mode is {mode!r}: trinary or scale is expected")
 
 
 # --- The image ---------------------------------------------------------------------------------
@@ -252,11 +225,11 @@ def _check_mode(mode: object) -> None:
 def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
     """Find the image, and say so if it isn't where the YAML file says."""
     file = path.parent / image
-    if file.is_file():
+    if _is_file(file):
         return file, []
     # Maps move to other computers, and absolute paths in them don't.
     beside = path.parent / image.replace("\\", "/").rpartition("/")[2]
-    if beside.is_file():
+    if _is_file(beside):
         return beside, [f"there is no image {image}: {beside.name} beside {path.name} was taken"]
     raise FloorPlanError(
         f"there is no image {file}: put it there, or correct `image`, which is relative to the"
@@ -264,10 +237,20 @@ def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
     )
 
 
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # its name is too long to be one
+        return False
+
+
 def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -> OccupancyMap:
     """Tell free, occupied and unknown pixels apart as map_server does."""
     shades = np.arange(picture.white + 1) / picture.white
     chance = shades if settings.negate else 1 - shades
+    if settings.raw:  # percent; what is above 100 is unknown, and neither free nor occupied
+        percent = np.rint(shades * 255)
+        chance = np.where(percent <= 100, percent / 100, np.nan)
     occupied = _chosen(chance > settings.occupied_thresh, picture)
     free = _chosen(chance < settings.free_thresh, picture)
     grey = round(UNKNOWN_GREY * picture.white)

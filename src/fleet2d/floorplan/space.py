@@ -1,12 +1,16 @@
 """Where a round body can be, and its shortest ways: the free space shrunk by the body's radius."""
 
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.gates import Segment
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.cells import label_triangles
@@ -28,8 +32,8 @@ I64 = NDArray[np.int64]
 class Space:
     """The places where the centre of a body of one radius may be (its configuration space).
 
-    The walls are grown by a regular octagon round the body: a body keeps its radius from every
-    wall, on all sides alike, and at most 8 % more from slanted ones.
+    Walls, obstacles and shut doors are grown by a regular octagon round the body: a body keeps its
+    radius from each, on all sides alike, and at most 8 % more from slanted ones.
 
     Attributes:
         radius: The body's radius [m].
@@ -39,15 +43,39 @@ class Space:
         parts: Number of connected parts; part 0 holds the most cells.
     """
 
-    def __init__(self, plan: FloorPlan, radius: float) -> None:
+    def __init__(
+        self,
+        plan: FloorPlan,
+        radius: float,
+        *,
+        walls: Mesh | None = None,
+        obstacles: Sequence[Polygon] = (),
+        shut: Sequence[Segment] = (),
+    ) -> None:
+        """Work out the space.
+
+        Args:
+            plan: The floor plan.
+            radius: The body's radius [m].
+            walls: What a body can't see through; left out: the plan's.
+            obstacles: What else it can't drive through [lattice].
+            shut: The lines of shut doors [lattice].
+
+        Raises:
+            FloorPlanError: The body fits nowhere.
+        """
         self.plan = plan
+        self.walls = plan.mesh if walls is None else walls
         # What behaviors ask for again and again: the same rooms, and on rounds the same ways.
         self.route = lru_cache(ROUTES_KEPT)(self._find_route)
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
         self.radius = radius
         lattice = plan.lattice
-        polygons = _shrunk(plan.polygons, radius * lattice.units_per_m)
+        reach = radius * lattice.units_per_m
+        blocks = [np.asarray(o.exterior.coords) for o in obstacles]
+        blocks += [np.array(segment, np.float64) for segment in shut]
+        polygons = _shrunk(plan.polygons, reach, [grown_shape(block, reach) for block in blocks])
         if not polygons:
             raise FloorPlanError(
                 f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
@@ -130,7 +158,7 @@ class Space:
         return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
-        walls = self.plan.mesh
+        walls = self.walls
         triangle = locate(walls, x, y)
         for row, column in self._by_distance(x, y)[:ESCAPES].tolist():
             target = self.plan.lattice.cell_centre(row, column)
@@ -175,24 +203,49 @@ class Space:
         )
 
 
-def _shrunk(polygons: list[shapely.Polygon], radius: float) -> list[shapely.Polygon]:
-    """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side."""
-    reach = _even_at_least(radius + ROUNDING)
-    # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
-    half_side = _even_at_least(reach * 0.41421357)
-    a, b = reach, half_side
-    octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
-    shrunk: list[shapely.Polygon] = []
+def _shrunk(
+    polygons: list[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
+) -> list[Polygon]:
+    """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side.
+
+    Args:
+        polygons: Free space.
+        radius: Of the body.
+        blocked: Places taken out of what is left.
+    """
+    octagon = _octagon(radius)
+    shrunk: list[Polygon] = []
     for polygon in polygons:
         grown = [
             _grown_walls(np.asarray(r.coords), octagon)
             for r in (polygon.exterior, *polygon.interiors)
         ]
+        grown.append(np.array(blocked, np.object_))
         rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
         for part in shapely.get_parts(rest):
             if part.geom_type == "Polygon" and part.area > 0:
                 shrunk += snap_polygon(part).polygons
     return shrunk
+
+
+def _octagon(radius: float) -> I64:
+    """Return the corners of the octagon that stands for a body."""
+    a = _even_at_least(radius + ROUNDING)
+    # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
+    b = _even_at_least(a * 0.41421357)
+    return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+
+
+def grown_shape(corners: NDArray[np.float64], radius: float) -> BaseGeometry:
+    """Return a line or the inside of a ring [lattice], grown by the octagon of a body.
+
+    Args:
+        corners: Two ends, or the closed ring of an outline, float64 (n, 2).
+        radius: Of the body [lattice].
+    """
+    walls = _grown_walls(corners, _octagon(radius))
+    solid = [Polygon(corners)] if len(corners) > 3 else []
+    return shapely.union_all([*walls, *solid])
 
 
 def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:

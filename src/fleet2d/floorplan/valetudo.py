@@ -5,6 +5,7 @@ Their pixels are numbered from the top and their lengths are in centimetres. Her
 plan and the recorded path share this frame.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,15 +15,16 @@ import numpy as np
 import shapely
 import shapely.affinity
 from numpy.typing import NDArray
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.occupancy import outline
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.source import FloorPlanSource, read_json
+from fleet2d.floorplan.source import PixelSource, distinct_names, read_json
 from fleet2d.floorplan.valetudo_file import (
     Box,
     Layer,
@@ -36,73 +38,43 @@ from fleet2d.floorplan.valetudo_file import (
     read_layers,
     read_points,
 )
-from fleet2d.floorplan.vocabulary import PRIORITY, UNKNOWN, room_type
+from fleet2d.floorplan.vocabulary import UNKNOWN, usual_type
+from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
 from fleet2d.paths import InputPath
-from fleet2d.units import Length
 
-NoGo = Literal["keep_out", "ignore"]
+NoGo = Literal["keep_out", "wall", "ignore"]
+
+# A charger's side, the room that one takes in front of it, and how far off that may be [m].
+CHARGER_M, STAND_RADIUS_M, STAND_REACH_M = 0.2, 0.2, 1.0
 
 MAX_PARTS = 10_000
 
 # What touches a pixel by no more than this [pixels] only shares its side.
 TINY = 1e-6
 
-# What people and vacuum apps call rooms, where the vocabulary has another word for them.
-_ALSO_CALLED = {
-    "child_room": ("children_s_room", "kids_room", "nursery", "kinderzimmer"),
-    "guest_room": ("gästezimmer",),
-    "bedroom": ("schlafzimmer",),
-    "living_room": ("lounge", "wohnzimmer"),
-    "kitchen": ("küche",),
-    "bathroom": ("bath", "bad", "badezimmer"),
-    "dining_room": ("dining_area", "esszimmer", "essbereich"),
-    "office": ("study", "home_office", "büro", "arbeitszimmer"),
-    "toilet": ("wc", "restroom", "gäste_wc"),
-    "laundry": ("laundry_room", "utility_room", "waschküche"),
-    "wardrobe": ("closet", "walk_in_closet", "cloakroom", "ankleide", "garderobe"),
-    "storage": ("storage_room", "pantry", "abstellraum", "vorratskammer"),
-    "entryway": ("entrance", "entry", "eingang"),
-    "hallway": ("corridor", "flur", "diele"),
-    "balcony": ("balkon",),
-    "terrace": ("terrasse",),
-}
-_TYPE_OF = {kind: kind for kind in PRIORITY} | {
-    name: kind for kind, names in _ALSO_CALLED.items() for name in names
-}
-
 
 @register("floorplan", "valetudo")
-class Valetudo(FloorPlanSource):
+class Valetudo(PixelSource):
     """A map of a robot vacuum that runs Valetudo.
 
     Attributes:
         path: The map's JSON file.
-        cell: Side of a grid cell, 0.01 m to 1 m; None for the map's pixels.
-        no_go: Whether no-go areas and virtual walls are obstacles.
+        no_go: What no-go areas and virtual walls are: areas that robots keep out of, walls for
+            everybody and for sight, or nothing.
     """
 
     path: InputPath = Field(description="the map's JSON file")
-    cell: Length | None = Field(  # type: ignore[assignment]
-        default=None,
-        description="side of a grid cell, 0.01 m to 1 m; left out: the side of the map's pixels",
-    )
     no_go: NoGo = Field(
         default="keep_out",
-        description="no-go areas and virtual walls: keep_out makes them obstacles, ignore floor",
+        description="no-go areas and virtual walls: robots keep_out of them, they are a wall, or"
+        " ignore them",
     )
 
-    @model_validator(mode="before")
     @classmethod
-    def _take_pixel(cls, data: Any) -> Any:
-        """Fill in the cell, so that a stored scenario has it; `load` says what is wrong."""
-        if not isinstance(data, Mapping) or data.get("cell") is not None or "path" not in data:
-            return data
-        try:
-            path = TypeAdapter(InputPath).validate_python(data["path"])
-            return {**data, "cell": pixel_side(checked_map(read_json(path)))}
-        except (ValidationError, FloorPlanError):
-            return data
+    def usual_cell(cls, settings: Mapping[str, Any]) -> float:
+        """Return the side of the map's pixels."""
+        return pixel_side(checked_map(read_json(settings["path"])))
 
     def load(self) -> FloorPlan:
         """Read the map."""
@@ -118,8 +90,8 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
     Args:
         path: The JSON file.
         cell: Side of a grid cell [m]; None for the side of the map's pixels.
-        no_go: What becomes of no-go areas and virtual walls: the pixels that they touch are
-            obstacles, or they are ignored.
+        no_go: What becomes of no-go areas and virtual walls: `FloorPlan.no_go`, or the pixels that
+            they touch are walls, or they are ignored.
 
     Raises:
         FloorPlanError: The file can't be read, isn't such a map, or has no floor.
@@ -133,16 +105,21 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
         box = Box.around(np.concatenate([layer.runs for layer in layers]))
         note_size(content, box, notes)
         free = _free_pixels(layers, box, notes)
-        _keep_out(content, free, box, no_go, notes)
+        areas = _no_go_areas(content, free, box, no_go, notes)
         if not free.any():
             raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
         _note_entities(content, notes)
+        regions = _regions(layers, pixel_m, notes)
         return FloorPlan.build(
             path.stem,
             _in_metres(free, box, pixel_m),
-            _regions(layers, pixel_m, notes),
+            regions,
             pixel_m if cell is None else cell,
             source=f"Valetudo map, {path.name}",
+            doorways=None,
+            regions_are="exact" if regions else "none",
+            objects=_charger(content, free, box),
+            no_go=areas,
             notes=notes,
         )
     except FloorPlanError as error:
@@ -190,22 +167,6 @@ def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
         return read_charger(checked_map(content))
     except FloorPlanError as error:
         raise FloorPlanError(f"{path}: {error}") from error
-
-
-def segment_type(name: str) -> str:
-    """Return the room type for a segment's name: of the vocabulary if its last words are there.
-
-    >>> segment_type("Master Bedroom"), segment_type("Küche"), segment_type("Bedroom 2")
-    ('bedroom', 'kitchen', 'bedroom')
-    >>> segment_type("Yoga Studio")
-    'yoga_studio'
-    """
-    own = room_type(name)
-    words = own.split("_")
-    while len(words) > 1 and words[-1].isdigit():
-        words.pop()
-    endings = ("_".join(words[first:]) for first in range(len(words)))
-    return next((_TYPE_OF[ending] for ending in endings if ending in _TYPE_OF), own)
 
 
 # --- Free space and rooms ----------------------------------------------------------------------
@@ -258,20 +219,12 @@ def _in_metres(mask: Mask, box: Box, pixel_m: float) -> MultiPolygon:
 def _regions(layers: list[Layer], pixel_m: float, notes: list[str]) -> list[LabelledRegion]:
     """Return the segments in the file's order, each under a name of its own."""
     regions: list[LabelledRegion] = []
-    wanted = {layer.name for layer in layers if layer.kind == "segment"}
-    used: set[str] = set()
-    for layer in layers:
-        if layer.kind != "segment":
-            continue
-        name, number = layer.name, 2
-        while name in used or (number > 2 and name in wanted):
-            name, number = f"{layer.name} {number}", number + 1
-        if name != layer.name:
-            notes.append(f"several segments are called {layer.name}: one of them is {name} here")
-        used.add(name)
+    segments = [layer for layer in layers if layer.kind == "segment"]
+    names = distinct_names([segment.name for segment in segments], "segments", notes)
+    for layer, name in zip(segments, names, strict=True):
         box = Box.around(layer.runs)
         shape = _in_metres(box.painted(layer.runs), box, pixel_m)
-        kind = segment_type(layer.name) if layer.named else UNKNOWN
+        kind = usual_type(layer.name) if layer.named else UNKNOWN
         regions.append(LabelledRegion((layer.name,), shape, name, kind))
     return regions
 
@@ -279,9 +232,12 @@ def _regions(layers: list[Layer], pixel_m: float, notes: list[str]) -> list[Labe
 # --- What lies on the floor ---------------------------------------------------------------------
 
 
-def _keep_out(content: dict[str, Any], free: Mask, box: Box, no_go: NoGo, notes: list[str]) -> None:
-    """Take out of the free pixels those that no-go areas and virtual walls touch."""
+def _no_go_areas(
+    content: dict[str, Any], free: Mask, box: Box, no_go: NoGo, notes: list[str]
+) -> list[Polygon]:
+    """Return the areas that robots keep out of [m]; those that are walls leave the free pixels."""
     pixel_m = pixel_side(content)
+    areas: list[Polygon] = []
     for kind, what in (("no_go_area", "no-go areas"), ("virtual_wall", "virtual walls")):
         shapes = []
         for entity, where in entities_of(content, kind):
@@ -290,14 +246,19 @@ def _keep_out(content: dict[str, Any], free: Mask, box: Box, no_go: NoGo, notes:
                 notes.append(f"{where}, {kind}, has no extent: ignored")
             else:
                 shapes.append(shape)
-        if shapes and no_go == "ignore":
-            notes.append(f"{what} in the map: {len(shapes)}, ignored")
-        elif shapes:
+        if not shapes:
+            continue
+        done = {"keep_out": "robots keep out of them", "ignore": "ignored"}.get(no_go)
+        if no_go == "keep_out":
+            areas += [part for shape in shapes for part in _parts_in_metres(shape, pixel_m)]
+        if no_go == "wall":
             before = np.count_nonzero(free)
             for shape in shapes:
                 _take_out(shape, free, box)
             area = (before - np.count_nonzero(free)) * pixel_m**2
-            notes.append(f"{what} in the map: {len(shapes)}, obstacles on {area:.2f} m2 of floor")
+            done = f"obstacles on {area:.2f} m2 of floor"
+        notes.append(f"{what} in the map: {len(shapes)}, {done}")
+    return areas
 
 
 def _forbidden(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
@@ -305,14 +266,21 @@ def _forbidden(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
     if kind == "virtual_wall":
         if len(corners) < 2:
             return Polygon()
-        return LineString(corners).buffer(0.5 - TINY, cap_style="flat")
+        return LineString(corners).buffer(0.5, cap_style="flat", join_style="mitre")
     if len(corners) < 3:
         return Polygon()
-    return shapely.make_valid(Polygon(corners)).buffer(-TINY, join_style="mitre")
+    return shapely.make_valid(Polygon(corners), method="structure", keep_collapsed=False)
+
+
+def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
+    # Rounded, so that the last bits of a machine's arithmetic don't matter.
+    metres = shapely.transform(shape, lambda xy: np.round(xy * pixel_m, 6))
+    return [part for part in shapely.get_parts(metres).tolist() if part.geom_type == "Polygon"]
 
 
 def _take_out(shape: BaseGeometry, free: Mask, box: Box) -> None:
     """Take out of the free pixels those that a shape [pixels] reaches into."""
+    shape = shape.buffer(-TINY, join_style="mitre")
     x0, y0, x1, y1 = shape.bounds
     first, last = (int(np.clip(y - box.row, 0, box.rows - 1)) for y in (y0, y1))
     left, right = (int(np.clip(x - box.column, 0, box.columns - 1)) for x in (x0, x1))
@@ -322,6 +290,27 @@ def _take_out(shape: BaseGeometry, free: Mask, box: Box) -> None:
         x, y = columns + float(box.column), np.full(len(columns), float(box.row + row))
         pixels = shapely.box(*np.stack([x, y, x + 1, y + 1]))
         free[row, columns] = ~shapely.intersects(shape, pixels)
+
+
+def _charger(content: dict[str, Any], free: Mask, box: Box) -> list[PlacedObject]:
+    """Return the vacuum's charger, and where one stands in front of it."""
+    at = read_charger(content)
+    if at is None:
+        return []
+    (x, y), pixel_m, half = at, pixel_side(content), CHARGER_M / 2
+    roomy = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= (STAND_RADIUS_M / pixel_m) ** 2
+    rows, columns = np.nonzero(roomy)
+    stand_x, stand_y = ((n + 0.5) * pixel_m for n in (columns + box.column, rows + box.row))
+    away = (stand_x - x) ** 2 + (stand_y - y) ** 2
+    nearest = int(np.argmin(away)) if len(away) else None
+    front, uses = 0.0, tuple[UsePlace, ...]()
+    if nearest is not None and away[nearest] <= STAND_REACH_M**2:
+        to_x, to_y = round(float(stand_x[nearest]), 6), round(float(stand_y[nearest]), 6)
+        # Rounded, so that the last bit of a machine's arctangent doesn't matter.
+        front = round(math.atan2(to_y - y, to_x - x), 6)
+        uses = (UsePlace(to_x, to_y, round(math.atan2(y - to_y, x - to_x), 6)),)
+    footprint = shapely.box(x - half, y - half, x + half, y + half)
+    return [PlacedObject("charger", "charger", footprint, "nothing", uses, front)]
 
 
 def _note_entities(content: dict[str, Any], notes: list[str]) -> None:

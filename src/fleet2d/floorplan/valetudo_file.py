@@ -4,7 +4,6 @@ Its pixels are numbered from the top and its lengths are in centimetres. Here th
 of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored.
 """
 
-import json
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.source import MAX_COORDINATE_M
+from fleet2d.floorplan.source import MAX_COORDINATE_M, shown_value
 
 MAP_CLASS = "ValetudoMap"
 VERSION = 2
@@ -94,8 +93,8 @@ def checked_map(content: dict[str, Any]) -> dict[str, Any]:
     version = _meta(content).get("version")
     if version != VERSION:
         raise FloorPlanError(
-            f"version {version!r} of Valetudo's map format is not known: this Fleet2D reads"
-            f" {VERSION}; save the map with a Valetudo that writes it"
+            f"version {shown_value(version)} of Valetudo's map format is not known: this Fleet2D"
+            f" reads {VERSION}; save the map with a Valetudo that writes it"
         )
     return content
 
@@ -109,10 +108,13 @@ def pixel_side(content: dict[str, Any]) -> float:
     """Return the side of the map's pixels [m]."""
     size = content.get("pixelSize")
     if isinstance(size, bool) or not isinstance(size, int | float):
-        raise FloorPlanError(f"pixelSize is {_shown(size)}: a number of centimetres is expected")
+        raise FloorPlanError(
+            f"pixelSize is {shown_value(size)}: a number of centimetres is expected"
+        )
     if not MIN_PIXEL_CM <= size <= MAX_PIXEL_CM:
         raise FloorPlanError(
-            f"pixelSize is {size:g}: {MIN_PIXEL_CM} to {MAX_PIXEL_CM} cm is expected (5 is usual)"
+            f"pixelSize is {shown_value(size)}: {MIN_PIXEL_CM} to {MAX_PIXEL_CM} cm is expected"
+            " (5 is usual)"
         )
     return size / CM_PER_M
 
@@ -123,8 +125,8 @@ def note_size(content: dict[str, Any], box: Box, notes: list[str]) -> None:
     if size is None:
         return
     sides: list[Any] = [size.get("x"), size.get("y")] if isinstance(size, dict) else []
-    if not sides or any(type(n) not in (int, float) or not 0 < n < float("inf") for n in sides):
-        raise FloorPlanError(f"size is {_shown(size)}: x and y in centimetres are expected")
+    if not sides or any(type(n) not in (int, float) or not 0 < n < 1e9 for n in sides):
+        raise FloorPlanError(f"size is {shown_value(size)}: x and y in centimetres are expected")
     columns, rows = (n / CM_PER_M / pixel_side(content) for n in sides)
     right, bottom = box.column + box.columns, -box.row
     if min(box.column, -(box.row + box.rows)) < 0 or right > columns + 1 or bottom > rows + 1:
@@ -138,10 +140,10 @@ def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], 
     """Return the objects in one of the map's lists, and how to name each in an error."""
     found = content.get(key, [])
     if not isinstance(found, list):
-        raise FloorPlanError(f"{key} is {_shown(found)}: a list is expected")
+        raise FloorPlanError(f"{key} is {shown_value(found)}: a list is expected")
     for number, item in enumerate(found):
         if not isinstance(item, dict):
-            raise FloorPlanError(f"{key}[{number}] is {_shown(item)}: an object is expected")
+            raise FloorPlanError(f"{key}[{number}] is {shown_value(item)}: an object is expected")
     return [(item, f"{key}[{number}]") for number, item in enumerate(found)]
 
 
@@ -151,7 +153,7 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[Layer]:
     for layer, where in objects_in(content, "layers"):
         kind = layer.get("type")
         if kind not in ("floor", "segment", "wall"):
-            notes.append(f"{where} is of the unknown type {_shown(kind)}: ignored")
+            notes.append(f"{where} is of the unknown type {shown_value(kind)}: ignored")
             continue
         runs = _runs(layer, where)
         name, named = _segment_name(layer, len(layers))
@@ -163,7 +165,9 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[Layer]:
         stated = dimensions.get("pixelCount") if isinstance(dimensions, dict) else None
         pixels = int(np.count_nonzero(Box.around(runs).painted(runs)))
         if stated is not None and stated != pixels:
-            notes.append(f"{what} has {pixels} pixels, though its pixelCount says {_shown(stated)}")
+            notes.append(
+                f"{what} has {pixels} pixels, though its pixelCount says {shown_value(stated)}"
+            )
         layers.append(Layer(kind, name, named, runs))
     if all(layer.kind == "wall" for layer in layers):
         raise FloorPlanError("it has no floor: no layer of type floor or segment has any pixel")
@@ -197,7 +201,9 @@ def _whole_numbers(
     """Return a flat list of whole numbers in groups, int64 (n, group)."""
     values = layer.get(key) or []
     if not isinstance(values, list):
-        raise FloorPlanError(f"{where}.{key} is {_shown(values)}: a list of {what} is expected")
+        raise FloorPlanError(
+            f"{where}.{key} is {shown_value(values)}: a list of {what} is expected"
+        )
     if len(values) % group:
         raise FloorPlanError(
             f"{where}.{key} has {len(values)} numbers, which is no multiple of {group} ({what}): it"
@@ -206,8 +212,8 @@ def _whole_numbers(
     for value in values:
         if type(value) is not int or abs(value) > MAX_PIXEL_NUMBER:
             raise FloorPlanError(
-                f"{where}.{key} has {_shown(value)}: whole numbers up to {MAX_PIXEL_NUMBER} are"
-                " expected"
+                f"{where}.{key} has {shown_value(value)}: whole numbers up to {MAX_PIXEL_NUMBER}"
+                " are expected"
             )
     return np.array(values, np.int64).reshape(-1, group)
 
@@ -225,12 +231,14 @@ def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
     values = entity.get("points")
     if not isinstance(values, list) or len(values) % 2:
         raise FloorPlanError(
-            f"{where}.points is {_shown(values)}: a list x, y, x, y, … is expected"
+            f"{where}.points is {shown_value(values)}: a list x, y, x, y, … is expected"
         )
     for value in values:
         sensible = isinstance(value, int | float) and not isinstance(value, bool)
         if not sensible or not abs(value) <= MAX_COORDINATE_M * CM_PER_M:
-            raise FloorPlanError(f"{where}.points has {_shown(value)}: no sensible centimetres")
+            raise FloorPlanError(
+                f"{where}.points has {shown_value(value)}: no sensible centimetres"
+            )
     places = np.array(values, np.float64).reshape(-1, 2) / CM_PER_M
     places[:, 1] *= -1
     return places
@@ -242,8 +250,3 @@ def read_charger(content: dict[str, Any]) -> tuple[float, float] | None:
         for x, y in read_points(entity, where)[:1].tolist():
             return x, y
     return None
-
-
-def _shown(value: object) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

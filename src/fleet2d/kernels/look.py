@@ -1,4 +1,4 @@
-"""What one camera sees of all users over a span of steps."""
+"""What the cameras of one robot see of all users over a span of steps, and what it makes of it."""
 
 from typing import NamedTuple
 
@@ -6,26 +6,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels._jit import kernel
-from fleet2d.kernels.headings import QUARTER, TURN, half_sine
+from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.kernels.lens import Lenses, camera_pose, in_wedge, near_wedge, points_in_view
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.random import random_bits
+from fleet2d.kernels.perception import (
+    DETECT,
+    FACES,
+    HOW_MANY,
+    LOOKS_LIKE,
+    MINUTES,
+    NOBODY,
+    SEEMS,
+    TURNED,
+    WHERE,
+    ErrorTables,
+    attention,
+    bell,
+    blurred,
+    ghost_place,
+    identify,
+    notice_chance,
+    pick,
+    random_share,
+)
+from fleet2d.kernels.random import random_below, random_bits
 from fleet2d.kernels.sight import walk_line_of_sight
 
 I64 = NDArray[np.int64]
+U8 = NDArray[np.uint8]
 
 USER_LOST = 0
 USER_SEEN = 1
 
-
-class Lens(NamedTuple):
-    """A camera's constants."""
-
-    near_squared: int  # lattice units squared
-    far_squared: int
-    half_angle: int  # 1/8192 of a turn; 4096 and more is all round
-    chance: int  # probability of noticing a user in view, times 2**53
-    patience: int  # steps without a detection after which a user counts as lost
+# The columns of a sighting. Where a camera was wrong about somebody, USER is NOBODY; where it
+# didn't recognize somebody, IDENTITY is. X to POSTURE are as perceived.
+STEP, CAMERA, USER, IDENTITY, X, Y, HEADING, POSTURE = range(8)
+TRUE_X, TRUE_Y, TRUE_HEADING, TRUE_POSTURE = range(8, 12)
+SIGHTING = 12
+MINUTE_US = 60_000_000
 
 
 class Crowd(NamedTuple):
@@ -33,102 +52,294 @@ class Crowd(NamedTuple):
 
     x: I64
     y: I64
-    away: NDArray[np.uint8]
+    heading: I64
+    away: U8
+    posture: NDArray[np.int8]
 
 
 class Memory(NamedTuple):
-    """What a camera carries from span to span, one entry per user."""
+    """What a robot carries from span to span.
 
-    key: NDArray[np.uint64]  # stream of the detection draws
-    noticed: I64  # last step with a detection
-    seen: NDArray[np.uint8]  # 1 while the user counts as seen
+    Identities are users, and last somebody not recognized.
+    """
 
-
-class Detections(NamedTuple):
-    """Detections, in order of (step, user); all arrays of one length."""
-
-    step: I64
-    user: NDArray[np.int32]
-    x: I64  # perceived position, lattice units
-    y: I64
+    noticed: I64  # (identities,): last step at which one was noticed; -1: never
+    seen: I64  # (identities,): 1 while one counts as seen
+    drawn: I64  # (cameras, users): the draw of the last look, for `attention`
+    drawn_at: I64  # (cameras, users): its step; -1: there was none
+    taken_for: I64  # (cameras, users): identity when last noticed
+    tracked: I64  # (cameras, users): step of that look; -1: there was none
+    counts: I64  # (cameras, users, 2): looks at which a user was in view, and was noticed
+    backlog: I64  # (cameras, rows, SIGHTING): a ring of what isn't known yet
+    waiting: I64  # (cameras, 2): its first row, and its length
 
 
 class SightEvents(NamedTuple):
-    """Users that come into view or are lost, in order of (step, user)."""
+    """Identities that come into view or are lost, in order of (step, identity)."""
 
     step: I64
     user: NDArray[np.int32]
     kind: NDArray[np.int32]  # USER_SEEN | USER_LOST
 
 
+class Rule(NamedTuple):
+    """What holds for all cameras of a robot."""
+
+    patience: int  # steps without a sighting after which an identity counts as lost
+    step_us: int
+    start_us: int  # time of day at step 0
+    burst: int  # most sightings that become known in one step
+    stop_lost: bool  # whether an event ends the span
+    stop_seen: bool
+
+
 @kernel
-def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
-    """Tell whether (dx, dy) lies within `half_angle` [1/8192 turn] of a heading, or on it."""
-    if half_angle >= TURN:
-        return True
-    right, left = 2 * heading - half_angle, 2 * heading + half_angle
-    from_right = half_sine(right + 2 * QUARTER) * dy - half_sine(right) * dx
-    to_left = half_sine(left) * dx - half_sine(left + 2 * QUARTER) * dy
-    if half_angle <= 2 * QUARTER:
-        # With a wedge of half a turn, both borders are one line: the test is the half plane.
-        return from_right >= 0 and to_left >= 0
-    return from_right >= 0 or to_left >= 0
+def perceive(
+    lenses: Lenses,
+    errors: ErrorTables,
+    memory: Memory,
+    rule: Rule,
+    camera: int,
+    user: int,
+    heading: int,
+    dx: int,
+    dy: int,
+    shown: int,
+    now: int,
+    row: I64,
+) -> bool:
+    """Decide whether a user in view at (dx, dy) is noticed, and as what: USER, IDENTITY … of `row`.
+
+    `row` holds the truth; X and Y come out from the camera.
+    """
+    distance = int(np.sqrt(np.float64(dx * dx + dy * dy)))
+    at = distance >> errors.shift[camera]
+    bearing = turn_between(heading, heading_of(dx, dy)) if distance > 0 else 0
+    facing = abs(turn_between(heading_of(-dx, -dy), row[TRUE_HEADING])) if distance > 0 else 0
+    posture = row[TRUE_POSTURE]
+    minute = (rule.start_us + now * rule.step_us) // MINUTE_US % MINUTES
+    chance = notice_chance(
+        errors, camera, lenses.chance[camera], at, bearing, facing, posture, shown, minute
+    )
+    if attention(errors, camera, user, now, memory.drawn, memory.drawn_at) >= chance:
+        return False
+    keys = errors.keys[camera, user]
+    row[IDENTITY] = identify(
+        errors, camera, user, now, at, rule.patience, memory.taken_for, memory.tracked
+    )
+    row[X], row[Y] = blurred(errors, camera, user, now, dx, dy, distance)
+    turned = bell(keys[TURNED], now, errors.heading_noise[camera])
+    row[HEADING] = (row[TRUE_HEADING] + turned) & (TURN - 1)
+    row[POSTURE] = pick(errors.seems[camera, posture], random_share(keys[SEEMS], now))
+    return True
+
+
+@kernel
+def imagine(
+    walls: Mesh,
+    lenses: Lenses,
+    errors: ErrorTables,
+    memory: Memory,
+    camera: int,
+    source: int,
+    count: int,
+    now: int,
+    x: int,
+    y: int,
+    heading: int,
+    triangle: int,
+) -> None:
+    """Put the false positives that a source gives in one look into the backlog."""
+    near, far = lenses.near_squared[camera], lenses.far_squared[camera]
+    half_angle, keys = lenses.half_angle[camera], errors.ghost_keys[camera, source]
+    spot = errors.spot[camera, source]
+    if source > 0:
+        dx, dy = spot[0] - x, spot[1] - y
+        if not (near <= dx * dx + dy * dy <= far and in_wedge(heading, half_angle, dx, dy)):
+            return
+    for k in range(count):
+        found, px, py = ghost_place(
+            walls, spot, source == 0, random_bits(random_bits(keys[WHERE], now), k),
+            x, y, triangle, heading, half_angle, near, far,
+        )  # fmt: skip
+        if not found:
+            continue
+        row = append(memory, camera)
+        like = random_share(random_bits(keys[LOOKS_LIKE], now), k)
+        who = pick(errors.looks_like[camera], like)
+        row[STEP], row[CAMERA] = now + lenses.latency[camera], camera
+        row[USER] = NOBODY
+        row[IDENTITY] = who if who < errors.whom.shape[2] else NOBODY
+        row[X], row[Y], row[TRUE_X], row[TRUE_Y] = px, py, px, py
+        row[HEADING] = random_below(random_bits(keys[FACES], now), k, TURN)
+        row[TRUE_HEADING], row[POSTURE], row[TRUE_POSTURE] = row[HEADING], 0, 0
+
+
+@kernel
+def append(memory: Memory, camera: int) -> I64:
+    """Return a new row at the end of a camera's backlog."""
+    rows = memory.backlog.shape[1]
+    end = memory.waiting[camera, 0] + memory.waiting[camera, 1]
+    memory.waiting[camera, 1] += 1
+    row: I64 = memory.backlog[camera, end % rows]
+    return row
+
+
+@kernel
+def deliver(memory: Memory, camera: int, now: int, sightings: I64, found: int) -> int:
+    """Move what is known by now from the backlog to the sightings; return their new number."""
+    waiting, rows = memory.waiting, memory.backlog.shape[1]
+    while waiting[camera, 1] > 0:
+        row = memory.backlog[camera, waiting[camera, 0]]
+        if row[STEP] > now:
+            break
+        sightings[found] = row
+        identity = row[IDENTITY] if row[IDENTITY] >= 0 else memory.noticed.shape[0] - 1
+        memory.noticed[identity] = now
+        found += 1
+        waiting[camera, 0] = (waiting[camera, 0] + 1) % rows
+        waiting[camera, 1] -= 1
+    return found
 
 
 @kernel
 def look(
     walls: Mesh,
-    lens: Lens,
+    lenses: Lenses,
+    errors: ErrorTables,
+    rule: Rule,
     robot: Poses,
     crowd: Crowd,
     first: int,
     memory: Memory,
-    stops: tuple[bool, bool],
-    sightings: Detections,
+    sightings: I64,
     events: SightEvents,
 ) -> tuple[int, int, int]:
     """Look at all users in each step of a span, up to the first step with an event that stops it.
 
-    `stops` says whether (USER_LOST, USER_SEEN) stop. Returns the steps done (the stopping one
-    included) and the numbers of sightings and events written.
+    It also stops when another step's sightings might not fit. Returns the steps done (the stopping
+    one included) and the numbers of sightings and events written.
     """
     # Taking an array out of a tuple costs a counted reference, so it is done once, not per step.
     robot_x, robot_y, robot_heading, robot_away = robot.x, robot.y, robot.heading, robot.away
     user_x, user_y, user_away = crowd.x, crowd.y, crowd.away
-    key, last, seen = memory.key, memory.noticed, memory.seen
+    near, far, half_angle = lenses.near_squared, lenses.widest, lenses.half_angle
+    period, points, reach, moves = lenses.period, lenses.points, lenses.reach, lenses.moves
+    sources, ghosts, ghost_keys = errors.sources, errors.ghosts, errors.ghost_keys
+    last, seen, waiting = memory.noticed, memory.seen, memory.waiting
     vertices, triangles, neighbors = walls.vertices, walls.triangles, walls.neighbors
+    cameras, users = far.shape
     found = happened = 0
+    awake = int(seen.sum())
     for j in range(robot_x.shape[0]):
-        stop = False
-        x, y = robot_x[j], robot_y[j]
-        triangle = -1
-        for u in range(user_x.shape[0]):
-            noticed = False
-            dx, dy = user_x[u, j] - x, user_y[u, j] - y
-            squared = dx * dx + dy * dy
-            in_range = lens.near_squared <= squared <= lens.far_squared
-            if in_range and not (user_away[u, j] or robot_away[j]):
-                if in_wedge(robot_heading[j], lens.half_angle, dx, dy):
+        now = first + j
+        for c in range(cameras):
+            if robot_away[j] or (period[c] > 1 and now % period[c] != 0):
+                continue
+            x, y, heading = robot_x[j], robot_y[j], robot_heading[j]
+            if moves[c] != 0:
+                x, y, heading = camera_pose(lenses, c, x, y, heading, now * rule.step_us)
+            triangle = -1
+            for u in range(users):
+                dx, dy = user_x[u, j] - x, user_y[u, j] - y
+                squared = dx * dx + dy * dy
+                if user_away[u, j] or squared > far[c, u]:
+                    continue
+                if points[c] == 0:
+                    if squared < near[c] or not in_wedge(heading, half_angle[c], dx, dy):
+                        continue
                     if triangle < 0:
                         triangle = locate(walls, x, y)
-                    if walk_line_of_sight(
-                        vertices, triangles, neighbors, x, y, triangle, x + dx, y + dy
-                    ):
-                        draw = random_bits(key[u], first + j) >> np.uint64(11)
-                        noticed = bool(np.int64(draw) < lens.chance)
-            if noticed:
-                last[u] = first + j
-                sightings.step[found], sightings.user[found] = first + j, u
-                sightings.x[found], sightings.y[found] = x + dx, y + dy
-                found += 1
-            is_seen = noticed or (seen[u] == 1 and first + j - last[u] < lens.patience)
-            if is_seen != (seen[u] == 1):
-                seen[u] = is_seen
-                kind = USER_SEEN if is_seen else USER_LOST
-                events.step[happened], events.user[happened] = first + j, u
-                events.kind[happened] = kind
-                happened += 1
-                stop = stop or stops[kind]
+                    shown = int(
+                        walk_line_of_sight(
+                            vertices, triangles, neighbors, x, y, triangle, x + dx, y + dy
+                        )
+                    )
+                else:
+                    if not near_wedge(heading, half_angle[c], dx, dy, reach[c, u]):
+                        continue
+                    if triangle < 0:
+                        triangle = locate(walls, x, y)
+                    shown = points_in_view(walls, lenses, c, u, x, y, heading, triangle, dx, dy)
+                if shown > 0:
+                    see(lenses, errors, memory, rule, crowd, c, u, j, x, y, heading, shown, now)
+            for source in range(sources[c]):
+                draw = random_share(ghost_keys[c, source, HOW_MANY], now)
+                if draw >= ghosts[c, source, 0]:  # seldom: there are any
+                    triangle = locate(walls, x, y)
+                    count = pick(ghosts[c, source], draw)
+                    imagine(
+                        walls,
+                        lenses,
+                        errors,
+                        memory,
+                        c,
+                        source,
+                        count,
+                        now,
+                        x,
+                        y,
+                        heading,
+                        triangle,
+                    )
+        before = found
+        for c in range(cameras):
+            if waiting[c, 1] > 0:
+                found = deliver(memory, c, now, sightings, found)
+        stop = found + rule.burst > sightings.shape[0]
+        if found > before or awake > 0:
+            for i in range(last.shape[0]):
+                is_seen = last[i] == now or (seen[i] == 1 and now - last[i] < rule.patience)
+                if is_seen != (seen[i] == 1):
+                    seen[i] = is_seen
+                    awake += 1 if is_seen else -1
+                    kind = USER_SEEN if is_seen else USER_LOST
+                    events.step[happened], events.user[happened] = now, i
+                    events.kind[happened] = kind
+                    happened += 1
+                    stop = stop or (rule.stop_seen if is_seen else rule.stop_lost)
         if stop:
             return j + 1, found, happened
     return robot_x.shape[0], found, happened
+
+
+@kernel
+def see(
+    lenses: Lenses,
+    errors: ErrorTables,
+    memory: Memory,
+    rule: Rule,
+    crowd: Crowd,
+    camera: int,
+    user: int,
+    column: int,
+    x: int,
+    y: int,
+    heading: int,
+    shown: int,
+    now: int,
+) -> None:
+    """Look at a user in view, and put a sighting into the backlog if the user is noticed."""
+    memory.counts[camera, user, 0] += 1
+    if lenses.errs[camera] == 0:
+        draw = random_bits(errors.keys[camera, user, DETECT], now) >> np.uint64(11)
+        if np.int64(draw) >= lenses.chance[camera]:
+            return
+    row = append(memory, camera)
+    row[STEP], row[CAMERA] = now + lenses.latency[camera], camera
+    row[USER] = row[IDENTITY] = user
+    row[TRUE_X], row[TRUE_Y] = crowd.x[user, column], crowd.y[user, column]
+    row[TRUE_HEADING] = crowd.heading[user, column]
+    row[TRUE_POSTURE] = crowd.posture[user, column]
+    if lenses.errs[camera] == 0:
+        row[X:TRUE_X] = row[TRUE_X:]
+    else:
+        dx, dy = row[TRUE_X] - x, row[TRUE_Y] - y
+        if not perceive(
+            lenses, errors, memory, rule, camera, user, heading, dx, dy, shown, now, row
+        ):
+            memory.waiting[camera, 1] -= 1  # the row isn't used
+            return
+        row[X] += x
+        row[Y] += y
+    memory.counts[camera, user, 1] += 1

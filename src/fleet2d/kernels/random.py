@@ -1,7 +1,7 @@
 """Counter-based random bits: a pure function of (key, counter), so no draw depends on another.
 
 The generator is SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators",
-OOPSLA 2014) addressed by counter instead of by state. Keys come from :mod:`fleet2d.engine.streams`.
+OOPSLA 2014) addressed by counter instead of by state. Keys come from :mod:`fleet2d.streams`.
 """
 
 import numpy as np

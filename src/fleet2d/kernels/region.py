@@ -38,7 +38,7 @@ def _half(dx: int, dy: int) -> int:
 
 
 @kernel
-def _look_around(
+def look_around(
     vertices: Int64,
     triangles: Int32,
     neighbors: Int32,
@@ -95,7 +95,7 @@ def visible_region(
         The number of pieces; 0 for an eye outside or on a wall.
     """
     vertices, triangles, neighbors = mesh.vertices, mesh.triangles, mesh.neighbors
-    count, first = _look_around(vertices, triangles, neighbors, x, y, triangle, right, wall, stack)
+    count, first = look_around(vertices, triangles, neighbors, x, y, triangle, right, wall, stack)
     if first > 0:
         for values in (right, wall):
             moved = values[:first].copy()
@@ -200,7 +200,7 @@ def regions_of_cells(mesh: Mesh, cells: Int64, cell_triangles: Int32) -> tuple[I
         row, column = cells[i, 0], cells[i, 1]
         x, y = column * SUB + CELL_CENTRE, row * SUB + CELL_CENTRE
         triangle = int(cell_triangles[row, column])
-        count, first = _look_around(
+        count, first = look_around(
             vertices, triangles, neighbors, x, y, triangle, right, wall, stack
         )
         while used + count > all_right.shape[0]:

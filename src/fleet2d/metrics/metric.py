@@ -1,5 +1,6 @@
 """Metrics: algorithms that only record. They know the truth, and nobody acts on what they say."""
 
+from collections.abc import Set
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -22,6 +23,7 @@ class Metric(Component):
     """
 
     kind: ClassVar[str] = "metric"
+    needs: ClassVar[Set[str]] = frozenset()  # of exposure, explored, first_seen, last_seen …
     unit: ClassVar[str] = ""  # of its result, for people to read
 
     period: PositiveDuration = Field(

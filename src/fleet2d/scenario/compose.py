@@ -12,12 +12,13 @@ from fleet2d.problems import did_you_mean
 from fleet2d.scenario.document import Document, Keys, parse_yaml, read_document
 
 BUNDLED = Path(__file__).parent / "bundled"
-ENTRIES = ("users", "robots", "algorithms", "metrics")
+ENTRIES = ("users", "robots", "objects", "algorithms", "metrics")
 """The sections whose entries have names and can be deleted with null."""
 
 _SLOTS = (
     (re.compile(r"floorplan"), "floorplan"),
     (re.compile(r"(users|robots)/[^/]+(/behaviors/\d+)?"), "behavior"),
+    (re.compile(r"objects/[^/]+"), "object"),
     (re.compile(r"algorithms/[^/]+"), "algorithm"),
     (re.compile(r"metrics/[^/]+"), "metric"),
 )

@@ -18,13 +18,16 @@ from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.component import OneOf, Settings, ShortForm
 from fleet2d.entities.entity import Robot, User
+from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean, problem, problem_at
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.document import Document
 from fleet2d.scenario.explain import explain
+from fleet2d.sight.settings import SightSettings
 from fleet2d.units import Duration, PositiveDuration, format_duration, micros
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -145,6 +148,15 @@ class Scenario(Settings):
     robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _Named] = Field(
         default={}, description="The robots, by name."
     )
+    objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], _Named] = Field(
+        default={}, description="Doors and what senses, by name."
+    )
+    changes: tuple[HomeChange, ...] = Field(
+        default=(), description="What changes in the home during the run, and when."
+    )
+    sight: SightSettings = Field(
+        default=SightSettings(), description="How it is worked out what is in view."
+    )
     algorithms: Annotated[dict[str, Annotated[Algorithm, OneOf("algorithm")]], _Named, _Typed] = (
         Field(default={}, description="What computes during the run, by name.")
     )
@@ -159,8 +171,14 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        for name in self.users.keys() & self.robots.keys():
-            raise problem_at(("robots", name), f"there is a user named {name!r} already")
+        taken: dict[str, str] = {}
+        for section, noun in (("users", "a user"), ("robots", "a robot"), ("objects", "an object")):
+            for name in getattr(self, section):
+                if name in taken:
+                    raise problem_at(
+                        (section, name), f"there is {taken[name]} named {name!r} already"
+                    )
+                taken[name] = noun
         return self
 
     @property

@@ -1,27 +1,79 @@
 """The camera of a robot: what it could see (its field of view), and how surely it notices."""
 
 import math
+from collections.abc import Sequence
 from datetime import timedelta
-from typing import Self
+from typing import NamedTuple, Self
 
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
-from fleet2d.kernels.headings import TURN
-from fleet2d.kernels.look import Lens
-from fleet2d.units import AngleDeg, Duration, Length, Share, micros, problem
+from fleet2d.kernels.headings import TURN, UNIT, cosine, sine
+from fleet2d.problems import problem, problem_at
+from fleet2d.sight.perception import Perception
+from fleet2d.units import (
+    AngleDeg,
+    Duration,
+    Length,
+    PositiveDuration,
+    Share,
+    format_duration,
+    micros,
+)
 
 # Squares of distances in lattice units stay far inside 64 bits.
 FARTHEST_M = 10_000
+MOST_POINTS = 32
+
+
+class Pan(Settings):
+    """A camera that turns to and fro: it looks in each direction for a while, then in the next."""
+
+    headings_deg: tuple[AngleDeg, ...] = Field(
+        min_length=1,
+        max_length=64,
+        description="directions, one after the other, from where it is mounted to look",
+        examples=[[-45, 0, 45, 0]],
+    )
+    dwell: PositiveDuration = Field(
+        default=timedelta(seconds=5), description="how long it looks in each direction"
+    )
+
+
+class Lens(NamedTuple):
+    """One camera in the integers of the sight kernel; see `fleet2d.kernels.look.Lenses`."""
+
+    near: int  # lattice units
+    far: int
+    half_angle: int  # 1/8192 of a turn
+    chance: int  # times 2**53
+    patience: int  # steps
+    forward: int  # lattice units
+    left: int
+    heading: int  # 1/4096 of a turn
+    pans: tuple[int, ...]
+    pan_us: int
+    period: int  # steps
+    latency: int
+    points: int
+
+    def body(self, radius: float) -> list[tuple[int, int]]:
+        """Return the points of a body of `radius` [lattice units] that count: its centre first."""
+        steps = [round(i * TURN / self.points) for i in range(self.points)]
+        along, half = round(radius), UNIT // 2
+        circle = [
+            ((along * cosine(h) + half) // UNIT, (along * sine(h) + half) // UNIT) for h in steps
+        ]
+        return [(0, 0), *((int(x), int(y)) for x, y in circle)]
 
 
 class Camera(Settings):
-    """A camera at the centre of the body that looks where the body heads.
+    """A camera on the body. Left as it is, it sits at the centre and looks where the body heads.
 
     A user is in view when the user's centre is between the two ranges, within the angle, and no
-    wall touches the line between the centres: exactly when it lies in the visibility region of the
-    robot's position. Ranges are rounded to the lattice, the half angle to 1/8192 of a turn (0.044
-    degrees).
+    wall touches the line between the camera and it. Ranges and offset are rounded to the lattice,
+    the half angle to 1/8192 of a turn (0.044 degrees), headings to 1/4096. A camera that its offset
+    puts into a wall sees nothing.
     """
 
     range: tuple[Length, Length] = Field(
@@ -36,11 +88,37 @@ class Camera(Settings):
         description="width of the field of view, centred on the heading",
     )
     detection: Share = Field(
-        default=1.0, description="probability that a user in view is noticed, in each step"
+        default=1.0, description="probability that a user in view is noticed, in each look"
     )
     lost_after: Duration = Field(
         default=timedelta(seconds=5),
-        description="a user not noticed for this long counts as lost (event user_lost)",
+        description="a user not noticed for this long counts as lost (event user_lost); with"
+        " several cameras, the longest counts",
+    )
+    offset: tuple[Length, Length] = Field(
+        default=(0.0, 0.0),
+        description="where it is mounted: forward and left of the body's centre [m]",
+        examples=[[0.1, 0]],
+    )
+    heading_deg: AngleDeg = Field(
+        default=0.0, description="where it looks, counter-clockwise from where the body heads"
+    )
+    pan: Pan | None = Field(default=None, description="how it turns to and fro; null: it doesn't")
+    period: PositiveDuration | None = Field(
+        default=None, description="time from look to look; null: one in every step"
+    )
+    latency: Duration = Field(
+        default=timedelta(0), description="how long after a look its detections are known"
+    )
+    body_points: int = Field(
+        default=0,
+        ge=0,
+        le=MOST_POINTS,
+        description="points on a circle of a user's radius that are looked at besides the centre:"
+        " one in view is enough; 0: only the centre counts",
+    )
+    perception: Perception | None = Field(
+        default=None, description="how it errs; null: as the robot's `perception` says"
     )
 
     @model_validator(mode="after")
@@ -52,16 +130,55 @@ class Camera(Settings):
             )
         if far > FARTHEST_M:
             raise problem(f"range ends at {far:g} m: {FARTHEST_M:g} m is beyond any home")
+        if max(map(abs, self.offset)) > FARTHEST_M:
+            raise problem_at(("offset",), f"{FARTHEST_M:g} m from its body is beyond any home")
+        return self
+
+    @model_validator(mode="after")
+    def _looks_before_it_forgets(self) -> Self:
+        if self.period is not None and self.period > self.lost_after:
+            raise problem_at(
+                ("period",),
+                f"{format_duration(self.period)} is longer than lost_after,"
+                f" {format_duration(self.lost_after)}: each user would be lost between two looks",
+            )
         return self
 
     def lens(self, units_per_m: float, step_us: int) -> Lens:
-        """Return the camera in the integers of the sight kernel."""
+        """Return the camera in the integers of the sight kernel.
+
+        Raises:
+            ValueError: The period is no multiple of the step.
+        """
         near, far = (round(distance * units_per_m) for distance in self.range)
+        period, rest = divmod(step_us if self.period is None else micros(self.period), step_us)
+        if rest:
+            raise ValueError(
+                f"the period of {format_duration(self.period or timedelta())} is no multiple of"
+                f" simulation.step ({step_us / 1e6:g} s): choose a multiple"
+            )
         return Lens(
-            near_squared=near * near,
-            far_squared=far * far,
+            near=near,
+            far=far,
             # At 0, both borders are one line, and what lies right behind is on it, too.
             half_angle=max(1, round(self.angle_deg / 360 * TURN)),
             chance=round(self.detection * 2**53),
             patience=math.ceil(micros(self.lost_after) / step_us),
+            forward=round(self.offset[0] * units_per_m),
+            left=round(self.offset[1] * units_per_m),
+            heading=headings([self.heading_deg])[0],
+            pans=headings(self.pan.headings_deg if self.pan else ()),
+            pan_us=micros(self.pan.dwell) if self.pan else 1,
+            period=period,
+            latency=-(-micros(self.latency) // step_us),
+            points=self.body_points,
         )
+
+
+def headings(degrees: Sequence[float]) -> tuple[int, ...]:
+    """Return angles in 1/4096 of a turn, rounded.
+
+    >>> headings([90, -45])
+    (1024, 3584)
+    """
+    return tuple(round(angle / 360 * TURN) % TURN for angle in degrees)

@@ -22,7 +22,9 @@ from fleet2d.errors import InputError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.floorplan.rooms import NO_ROOM
+from fleet2d.floorplan.standing import grown_cells
 from fleet2d.kernels.fields import squared_distance
+from fleet2d.view.objects import draw_objects, label_objects
 
 ROOM_COLORS = {
     "living_room": "#f6e3c5",
@@ -79,17 +81,22 @@ def draw_floorplan(plan: FloorPlan, path: Path) -> None:
     Raises:
         InputError: The name ends otherwise, the file can't be written.
     """
-    ending = path.suffix.lower()
-    if ending not in (".png", ".svg"):
-        raise InputError(
-            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
-        )
+    check_picture(path)
     with drawing_style():
         figure = Figure(figsize=figure_size(plan), dpi=DPI)
         FigureCanvasAgg(figure)
         axes = figure.add_axes((0, 0, 1, 1))
         floorplan_axes(plan, axes)
         save_figure(figure, path)
+
+
+def check_picture(path: Path) -> None:
+    """Raise InputError unless a file's name ends as that of a picture that we write."""
+    ending = path.suffix.lower()
+    if ending not in (".png", ".svg"):
+        raise InputError(
+            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
+        )
 
 
 def drawing_style() -> AbstractContextManager[Any]:
@@ -145,12 +152,15 @@ def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bo
     _draw_walls(plan, axes)
     _draw_rooms(plan, axes)
     _draw_borders(plan, axes)
+    draw_objects(plan, axes)
     _draw_scale(plan, axes)
     if plan.entrance is not None:
         _draw_entrance(plan.entrance, axes)
     if names:
+        bare = _bare_floor(plan)
         for room in plan.rooms:
-            _write_room(plan, room, axes)
+            _write_room(plan, room, bare, axes)
+        label_objects(plan, axes)
     if title:
         words = f"{len(plan.rooms)} room{'s' * (len(plan.rooms) != 1)}"
         height = 0.65 * _margin(plan)
@@ -284,10 +294,25 @@ def _draw_entrance(entrance: tuple[float, float], axes: Axes) -> None:
     )
 
 
-def _write_room(plan: FloorPlan, room: Room, axes: Axes) -> None:
-    """Write a room's name and area in its middle, as large as fits, upright in narrow rooms."""
-    row, column = _middle(plan, room)
-    across, up = _clear_lengths(plan, room, row, column)
+def _bare_floor(plan: FloorPlan) -> NDArray[np.int16]:
+    """Return the room of each cell that no object stands on, -1 elsewhere, (rows, columns)."""
+    bare = plan.room_of_cell.copy()
+    for thing in plan.objects:
+        window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
+        bare[window][covered] = NO_ROOM
+    return bare
+
+
+def _write_room(plan: FloorPlan, room: Room, bare: NDArray[np.int16], axes: Axes) -> None:
+    """Write a room's name and area in the middle of its floor that is bare.
+
+    As large as fits, and upright in narrow rooms.
+    """
+    inside = bare == room.index
+    if not inside.any():
+        inside = plan.room_of_cell == room.index
+    row, column = _middle(inside)
+    across, up = _clear_lengths(plan.lattice.cell, inside, row, column)
     axes.apply_aspect()  # only now does the transform to pixels hold
     pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
     points_per_m = float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
@@ -307,9 +332,9 @@ def _write_room(plan: FloorPlan, room: Room, axes: Axes) -> None:
             return
 
 
-def _middle(plan: FloorPlan, room: Room) -> tuple[int, int]:
-    """Return the (row, column) in the middle of those that are about as deep in the room as any."""
-    rows, columns = np.nonzero(plan.room_of_cell == room.index)
+def _middle(cells: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the (row, column) in the middle of those that are about as deep inside as any."""
+    rows, columns = np.nonzero(cells)
     top, left = int(rows.min()), int(columns.min())
     inside = np.zeros((int(rows.max()) - top + 3, int(columns.max()) - left + 3), np.bool_)
     inside[rows - top + 1, columns - left + 1] = True
@@ -321,11 +346,12 @@ def _middle(plan: FloorPlan, room: Room) -> tuple[int, int]:
     return int(rows[nearest]), int(columns[nearest])
 
 
-def _clear_lengths(plan: FloorPlan, room: Room, row: int, column: int) -> tuple[float, float]:
-    """Return how far a room extends from a cell along x and y, as far to either side [m]."""
-    inside = plan.room_of_cell == room.index
+def _clear_lengths(
+    cell: float, inside: NDArray[np.bool_], row: int, column: int
+) -> tuple[float, float]:
+    """Return how far cells extend from one along x and y, as far to either side [m]."""
     lengths = []
     for line, here in ((inside[row], column), (inside[:, column], row)):
         gaps = np.abs(np.flatnonzero(~line) - here)
-        lengths.append(float(2 * gaps.min() - 1) * plan.lattice.cell)
+        lengths.append(float(2 * gaps.min() - 1) * cell)
     return lengths[0], lengths[1]

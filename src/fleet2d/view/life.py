@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.sight.region import VisibleRegion
+from fleet2d.sight.region import VisibleRegion, Walled
 from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 from fleet2d.view.traces import Trace
 
@@ -209,7 +209,7 @@ def telling_view(
 
 
 def field_of_view(
-    plan: FloorPlan, xy: F64, heading: float, camera: dict[str, Any]
+    plan: Walled, xy: F64, heading: float, camera: dict[str, Any]
 ) -> shapely.MultiPolygon:
     """Return what a camera sees from a place [m]: visible, in range, and within its angle."""
     try:

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 class Patrol(Behavior):
     """Make rounds: go to each room or waypoint in turn, look around, stay a while, go on.
 
-    In a room the robot stops at the point farthest from its walls.
+    In a room the robot stops at the point farthest from its walls. Stops behind a shut door are
+    left out of a round.
     """
 
     rooms: Literal["all"] | tuple[Place, ...] = Field(
@@ -62,10 +63,13 @@ class Patrol(Behavior):
         stops = self.stops
         if self.order == "random":
             stops = now.random("order").shuffled(stops)
-        plan = now.plan()
+        plan, begun = now.plan(), False
         for stop in stops:
+            if now.home.shut and not plan.reaches(*stop):
+                continue  # behind a shut door; another round may find it open
             plan.go_to_point(*stop)
             if self.look_around:
                 plan.turn_by(1.0)
             plan.stay(self.dwell)
-        return plan
+            begun = True
+        return plan if begun else plan.stay(self.dwell)

@@ -1,0 +1,225 @@
+"""How true the people are: simulated time use beside the American Time Use Survey.
+
+    python benchmarks/people.py compare [--people 1000] [--weeks 1] [--figure FILE] [--json FILE]
+    python benchmarks/people.py derive SURVEY_FOLDER      # writes routines/survey.json anew
+
+`compare` draws the days of that many people of each group of `population`, and prints how far the
+share of them that do each activity is from the survey's, by hour: the total variation distance, and
+the largest difference of each activity. `derive` makes the table that `population` draws from of
+the survey's summary files.
+"""
+
+import argparse
+import csv
+import json
+import statistics
+from collections import Counter, defaultdict
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import fleet2d.routines.survey as survey
+from fleet2d.streams import Draws, stream_key
+
+MONDAY = date(2026, 1, 5).toordinal()
+GROUPS = {"O1": "workers", "O2": "retired", "O3": "working_parents", "O4": "at_home"}
+# Codes of the survey's lexicon, longest prefix first, and the category or activity that they are.
+CODES = {
+    "0101": "sleeping", "0102": "wash", "0103": "wash", "0104": "wash", "0105": "wash",
+    "020102": "laundry", "0201": "clean", "0202": "food_prep", "020203": "dishes", "0203": "tidy",
+    "0205": "garden", "0206": "care", "0208": "tidy", "0209": "paperwork", "02": "tidy",
+    "03": "care", "04": "care", "05": "work", "06": "study", "07": "shopping", "08": "errand",
+    "09": "errand", "10": "errand", "11": "eating", "1201": "talk", "1202": "outing",
+    "120303": "tv", "120304": "tv", "120301": "rest", "120307": "games", "120308": "computer",
+    "120312": "read", "1203": "hobby", "1204": "outing", "12": "talk", "13": "exercise",
+    "14": "outing", "15": "errand", "16": "phone", "18": "travel", "50": "rest",
+}  # fmt: skip
+
+
+def category(code: str) -> str:
+    """Return what a code of the survey's lexicon is for us."""
+    return next((CODES[code[:n]] for n in (6, 4, 2) if code[:n] in CODES), "rest")
+
+
+def parts(shares: list[float], whole: int = 10_000) -> list[int]:
+    """Round shares to parts of a whole that add up to it (largest remainders)."""
+    total = sum(shares)
+    exact = [share / total * whole for share in shares]
+    result = [int(x) for x in exact]
+    rest = sorted(range(len(exact)), key=lambda i: result[i] - exact[i])
+    for i in rest[: whole - sum(result)]:
+        result[i] += 1
+    return result
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def derive(folder: Path) -> dict[str, Any]:
+    """Make our table of the survey's summary files."""
+    shares: dict[tuple[str, str, int], dict[str, float]] = defaultdict(dict)
+    for row in rows(folder / "time_at_activity.csv"):
+        key = row["stratum"], row["day_type"], int(row["hour"])
+        shares[key][row["category"]] = float(row["weighted_pct"])
+    at_home = {
+        (row["analysis"].split("_")[0], row["stratum"]): round(float(row["pct_home"]) * 100)
+        for row in rows(folder / "tewhere_validation.csv")
+    }
+    minutes, groups = [], {}
+    for stratum, name in GROUPS.items():
+        episodes, time, weight = Counter(), Counter(), 0.0
+        for row in rows(folder / f"activity_frequency_{stratum}.csv"):
+            what = category(row["trcode"])
+            episodes[what] += int(row["n_episodes"])
+            time[what] += int(row["n_episodes"]) * float(row["mean_duration_min"])
+            weight += float(row["total_weighted_min"])
+        minutes.append(weight)
+        others = sorted(set(episodes) - set(survey.CATEGORIES))
+        groups[name] = {
+            "work_at_home": at_home["D4", stratum],
+            "minutes": {c: round(time[c] / episodes[c]) for c in survey.CATEGORIES if episodes[c]},
+            "other": {
+                c: [share, round(time[c] / episodes[c])]
+                for c, share in zip(others, parts([episodes[c] for c in others]), strict=True)
+                if share
+            },
+        }
+        for kind in ("weekday", "weekend"):
+            groups[name][kind] = [
+                parts([shares[stratum, kind, h][c] for c in survey.CATEGORIES]) for h in range(24)
+            ]
+    for name, share in zip(groups, parts(minutes), strict=True):
+        groups[name] = {"share": share, **groups[name]}
+    return {
+        "source": "U.S. Bureau of Labor Statistics, American Time Use Survey, 2022-2023"
+        " (https://www.bls.gov/tus/), summarised by group: shares of people in parts of 10,000 who"
+        " do each category at half past each hour, of days that begin at 04:00; mean minutes of an"
+        " episode; what 'other' is made of, by share of episodes and mean minutes",
+        "categories": list(survey.CATEGORIES),
+        "eat_at_home": at_home["D5", "all"],
+        "exercise_at_home": at_home["D6", "all"],
+        "groups": groups,
+    }
+
+
+def written(table: dict[str, Any]) -> str:
+    """Write the table with a line per hour."""
+    text = json.dumps(table, indent=1)
+    lines, depth = [], 0
+    for line in text.splitlines():
+        inner = line.strip()
+        if depth and lines:
+            space = " " if lines[-1][-1] == "," and not inner.startswith("]") else ""
+            lines[-1] += space + inner
+            depth += inner.endswith("[") - inner.startswith("]")
+        else:
+            lines.append(line)
+            opens = inner.endswith("[") and not inner.startswith(('"weekday"', '"weekend"'))
+            depth = int(opens)
+    return "\n".join(lines) + "\n"
+
+
+def measured(group: str, people: int, weeks: int) -> dict[str, list[Counter[str]]]:
+    """Count what people do at half past each hour, by kind of day."""
+    counts = {kind: [Counter() for _ in range(24)] for kind in ("weekday", "weekend")}
+    table = survey.group(group)
+    for person in range(people):
+        key = stream_key(4, f"users.person_{person}", "population")
+        state = survey.first_state(table, Draws(key, 0), MONDAY)
+        for ordinal in range(MONDAY, MONDAY + 7 * weeks):
+            blocks, state = survey.live(table, Draws(key, ordinal), ordinal, state)
+            kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
+            k = 0
+            for hour in range(4, 28):
+                while blocks[k].end <= hour * 3600 + 1800:
+                    k += 1
+                counts[kind][hour % 24][blocks[k].category] += 1
+    return counts
+
+
+def compare(people: int, weeks: int) -> list[dict[str, Any]]:
+    """Return a row for each group, kind of day and hour."""
+    result = []
+    for group in survey.groups():
+        counts = measured(group, people, weeks)
+        for kind, by_hour in counts.items():
+            for hour, count in enumerate(by_hour):
+                wanted = survey.shares(group, kind)[hour]
+                total = sum(count.values())
+                ours = {c: count[c] / total for c in survey.CATEGORIES}
+                apart = {c: ours[c] - wanted[c] for c in survey.CATEGORIES}
+                result.append(
+                    {
+                        "group": group, "day": kind, "hour": hour, "ours": ours, "survey": wanted,
+                        "apart": apart, "tv": sum(map(abs, apart.values())) / 2,
+                    }
+                )  # fmt: skip
+    return result
+
+
+def show(found: list[dict[str, Any]]) -> None:
+    """Print the table."""
+    print(f"{'group':<17}{'day':<9}{'TV median':>10}{'worst':>8}   largest difference per activity")
+    for group in survey.groups():
+        for kind in ("weekday", "weekend"):
+            some = [r for r in found if (r["group"], r["day"]) == (group, kind)]
+            tvs = [r["tv"] for r in some]
+            far = {c: max(abs(r["apart"][c]) for r in some) for c in survey.CATEGORIES}
+            told = " ".join(f"{c} {v:.3f}" for c, v in far.items())
+            print(f"{group:<17}{kind:<9}{statistics.median(tvs):>10.4f}{max(tvs):>8.4f}   {told}")
+    tvs = [r["tv"] for r in found]
+    print(f"{'all':<26}{statistics.median(tvs):>10.4f}{max(tvs):>8.4f}")
+
+
+def draw(found: list[dict[str, Any]], path: Path) -> None:
+    """Draw shares by hour, ours as lines over the survey's as dots."""
+    import matplotlib.pyplot as plt
+
+    groups = survey.groups()
+    size = 13, 3 * len(groups)
+    figure, axes = plt.subplots(len(groups), 2, figsize=size, sharex=True, sharey=True)
+    for i, group in enumerate(groups):
+        for j, kind in enumerate(("weekday", "weekend")):
+            some = [r for r in found if (r["group"], r["day"]) == (group, kind)]
+            for c in survey.CATEGORIES:
+                (line,) = axes[i, j].plot(range(24), [r["ours"][c] for r in some], lw=1.2, label=c)
+                axes[i, j].plot(
+                    range(24), [r["survey"][c] for r in some], "o", ms=3, color=line.get_color()
+                )
+            axes[i, j].set_title(f"{group}, {kind} (lines: simulated, dots: survey)", fontsize=9)
+    axes[0, 1].legend(fontsize=7, ncol=3)
+    figure.supxlabel("hour of the day")
+    figure.supylabel("share of people")
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    """Do what is asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    one = commands.add_parser("compare")
+    one.add_argument("--people", type=int, default=1000, help="of each group")
+    one.add_argument("--weeks", type=int, default=1)
+    one.add_argument("--figure", type=Path)
+    one.add_argument("--json", type=Path, help="write the rows to this file, too")
+    two = commands.add_parser("derive")
+    two.add_argument("folder", type=Path)
+    arguments = parser.parse_args()
+    if arguments.command == "derive":
+        survey.TABLE.write_text(written(derive(arguments.folder)), encoding="utf-8")
+        return
+    found = compare(arguments.people, arguments.weeks)
+    show(found)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(found, indent=1))
+    if arguments.figure:
+        draw(found, arguments.figure)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""How close generated homes come to HouseExpo's plans, and how long one takes.
+
+    python benchmarks/synthetic_homes.py HOUSEEXPO [--homes 1000] [--figure FILE.png] [--json FILE]
+
+HOUSEEXPO is a folder of plans with an INDEX.tsv. Its kinds `empty` (no rooms), `tiny` (one room of
+a few metres) and `big` (no homes: offices and floors of flats) are left out. All homes are drawn
+with default settings, seeds from 0. Compared like with like: wall corners after the outline is
+simplified to 10 cm, because HouseExpo's outlines are traced from pixels; doorways, and the graph of
+rooms that they make, as each floor plan has them.
+"""
+
+import argparse
+import csv
+import json
+import statistics
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from fleet2d.floorplan.houseexpo import read_houseexpo
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.synthetic.source import Synthetic
+
+LEFT_OUT = ("empty", "tiny", "big")
+TOLERANCE_M = 0.1
+# One use under two names.
+SAME = {"toilet": "bathroom", "child_room": "bedroom", "guest_room": "bedroom", "hall": "hallway"}
+SIZES_OF = ("living_room", "kitchen", "dining_room", "bedroom", "bathroom", "office", "garage")
+
+Values = dict[str, list[float]]
+
+
+def main() -> None:
+    arguments = _arguments()
+    real = measures(_houseexpo(arguments.houseexpo))
+    homes, seconds = generated(arguments.homes)
+    synthetic = measures(homes)
+    rows = [_row(name, real[name], synthetic[name]) for name in real if name in synthetic]
+    print(f"{len(real['area [m2]'])} plans of HouseExpo, {len(homes)} synthetic homes")
+    print(f"{'':<22}{'HouseExpo: quartiles':>26}{'synthetic: quartiles':>26}{'KS':>8}{'n':>12}")
+    for row in rows:
+        print(_written(row))
+    alike = len(homes) - len({plan.named("home").digest for plan in homes})
+    print(f"alike: {alike}; with notes: {sum(bool(plan.notes) for plan in homes)}")
+    low, middle, high = min(seconds), statistics.median(seconds), max(seconds)
+    slow = float(np.percentile(seconds, 95))
+    print(f"ms per home: {1e3 * middle:.1f} median, {1e3 * low:.1f} to {1e3 * high:.1f},", end=" ")
+    print(f"95 % below {1e3 * slow:.1f}")
+    if arguments.json:
+        report = {"rows": rows, "seconds": {"min": low, "median": middle, "max": high}}
+        arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    if arguments.figure:
+        draw(real, synthetic, arguments.figure)
+
+
+def generated(count: int) -> tuple[list[FloorPlan], list[float]]:
+    """Return homes by seed, and how long each took [s]; kernels are compiled before."""
+    Synthetic().load()
+    homes, seconds = [], []
+    for seed in range(count):
+        start = time.perf_counter()
+        homes.append(Synthetic(seed=seed, furnish=False).load())
+        seconds.append(time.perf_counter() - start)
+    return homes, seconds
+
+
+def measures(plans: Iterable[FloorPlan]) -> Values:
+    """Return what is compared: for each measure its values over all plans or rooms."""
+    found: Values = {name: [] for name in ("area [m2]", "rooms", "bedrooms", "bathrooms")}
+    found |= {f"{kind} [m2]": [] for kind in SIZES_OF}
+    found |= {
+        name: [] for name in ("doorways", "degree of rooms", "wall corners", "outline corners")
+    }
+    for plan in plans:
+        kinds = [SAME.get(room.type, room.type) for room in plan.rooms]
+        found["area [m2]"].append(plan.area_m2)
+        found["rooms"].append(len(plan.rooms))
+        found["bedrooms"].append(kinds.count("bedroom"))
+        found["bathrooms"].append(kinds.count("bathroom"))
+        for kind, room in zip(kinds, plan.rooms, strict=True):
+            if kind in SIZES_OF:
+                found[f"{kind} [m2]"].append(room.area_m2)
+        pairs = {frozenset(door.rooms) for door in plan.doorways if len(set(door.rooms)) == 2}
+        if pairs:
+            found["doorways"].append(len(pairs))
+            found["degree of rooms"] += [
+                float(sum(room.index in pair for pair in pairs)) for room in plan.rooms
+            ]
+        found["wall corners"].append(_corners(plan, outer=False))
+        found["outline corners"].append(_corners(plan, outer=True))
+    return {name: values for name, values in found.items() if values}
+
+
+def _corners(plan: FloorPlan, *, outer: bool) -> float:
+    """Return how many corners the walls have, or the home as seen from outside."""
+    unit = plan.lattice.units_per_m
+    shape = shapely.union_all(plan.polygons)
+    if outer:  # walls and doorways closed, niches of front doors cut off
+        shape = shape.buffer(0.2 * unit, join_style="mitre").buffer(-0.7 * unit, join_style="mitre")
+        shape = shape.buffer(0.5 * unit, join_style="mitre")
+        parts = shapely.get_parts(shape)
+        shape = shapely.Polygon(max(parts, key=lambda part: part.area).exterior)
+    simple = shapely.simplify(shape, (0.2 if outer else TOLERANCE_M) * unit)
+    return float(
+        sum(
+            len(ring.coords) - 1
+            for part in shapely.get_parts(simple)
+            for ring in (part.exterior, *part.interiors)
+        )
+    )
+
+
+def ks_distance(first: Sequence[float], second: Sequence[float]) -> float:
+    """Return the two-sample Kolmogorov-Smirnov distance: 0 the same, 1 nothing in common."""
+    values = np.concatenate([first, second])
+    shares = [
+        np.searchsorted(np.sort(sample), values, side="right") / len(sample)
+        for sample in (first, second)
+    ]
+    return float(np.abs(shares[0] - shares[1]).max())
+
+
+def draw(real: Values, synthetic: Values, path: Path) -> None:
+    """Draw the distributions of both, one panel a measure."""
+    from matplotlib.figure import Figure
+
+    from fleet2d.view.floorplan import drawing_style
+
+    names = [name for name in real if name in synthetic]
+    columns = 5
+    rows = -(-len(names) // columns)
+    with drawing_style():
+        figure = Figure(figsize=(2.9 * columns, 2.2 * rows), dpi=110, layout="constrained")
+        for number, name in enumerate(names):
+            axes = figure.add_subplot(rows, columns, number + 1)
+            for values, color, label in (
+                (real[name], "#3b4048", "HouseExpo"),
+                (synthetic[name], "#c8452f", "synthetic"),
+            ):
+                ordered = np.sort(values)
+                shares = np.arange(1, len(ordered) + 1) / len(ordered)
+                axes.step(ordered, shares, color=color, label=label)
+            axes.set_title(f"{name}  KS {ks_distance(real[name], synthetic[name]):.2f}", fontsize=9)
+            axes.set_xlim(0, 1.05 * float(np.percentile([*real[name]], 98)) + 1)
+            axes.tick_params(labelsize=7)
+            if not number:
+                axes.legend(fontsize=7, frameon=False)
+        figure.savefig(path)
+
+
+def _row(name: str, real: Sequence[float], synthetic: Sequence[float]) -> dict[str, Any]:
+    def quartiles(values: Sequence[float]) -> list[float]:
+        found: list[float] = np.percentile(values, [25, 50, 75]).tolist()
+        return found
+
+    return {
+        "measure": name,
+        "houseexpo": quartiles(real),
+        "synthetic": quartiles(synthetic),
+        "ks": ks_distance(real, synthetic),
+        "n": [len(real), len(synthetic)],
+    }
+
+
+def _written(row: dict[str, Any]) -> str:
+    def three(values: list[float]) -> str:
+        return " / ".join(f"{value:.1f}" for value in values)
+
+    n = f"{row['n'][0]}, {row['n'][1]}"
+    return (
+        f"{row['measure']:<22}{three(row['houseexpo']):>26}{three(row['synthetic']):>26}"
+        f"{row['ks']:>8.2f}{n:>14}"
+    )
+
+
+def _houseexpo(folder: Path) -> list[FloorPlan]:
+    with (folder / "INDEX.tsv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file, delimiter="\t"))
+    kept = [row["id"] for row in rows if row["kind"] not in LEFT_OUT]
+    return [read_houseexpo(folder / f"{name}.json") for name in kept]
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("houseexpo", type=Path, help="folder of plans with INDEX.tsv")
+    parser.add_argument("--homes", type=int, default=1000)
+    parser.add_argument("--figure", type=Path, help="PNG to draw the distributions to")
+    parser.add_argument("--json", type=Path, help="file to write the table to")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

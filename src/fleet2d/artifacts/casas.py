@@ -1,0 +1,49 @@
+"""The readings of a run's sensors as a text file in the layout of the CASAS smart homes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fleet2d.errors import RunDirectoryError
+
+if TYPE_CHECKING:
+    from fleet2d.artifacts.reader import Run
+
+# What CASAS writes where nobody said what the person was doing.
+OTHER = "Other_Activity"
+
+
+def write_casas(run: "Run", path: Path) -> int:
+    """Write a line per reading: date, time, room, sensor, state, activity.
+
+    Spaces within a name become underscores, for the columns are set apart by spaces.
+
+    Args:
+        run: A run whose scenario has sensors.
+        path: The file to write.
+
+    Returns:
+        The number of lines.
+
+    Raises:
+        RunDirectoryError: The run has no sensors, or the file can't be written.
+    """
+    if "sensors" not in run.tables:
+        raise RunDirectoryError(
+            "the run has no table of sensors: give its scenario objects that sense, such as"
+            " hall: {type: motion_sensor, at: [1, 2]}"
+        )
+    rows = run.tables["sensors"].to_pylist()
+    lines = [
+        f"{row['time']:%Y-%m-%d %H:%M:%S.%f} {_word(row['room'])} {_word(row['sensor'])}"
+        f" {row['state']} {_word(row['activity']) or OTHER}\n"
+        for row in rows
+    ]
+    try:
+        path.write_text("".join(lines), encoding="utf-8")
+    except OSError as error:
+        raise RunDirectoryError(f"{path} can't be written: {error.strerror}") from error
+    return len(lines)
+
+
+def _word(name: str) -> str:
+    return "_".join(name.split())

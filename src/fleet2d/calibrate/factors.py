@@ -1,0 +1,91 @@
+"""The factors of a detection's probability, as the scenario's curves have them."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+SURE = 12.0  # a logit from which on a share is as good as 1
+
+
+def share_of(logit: float) -> float:
+    """Return the share of a logit; 1 where it is as good as that.
+
+    >>> share_of(0.0), share_of(SURE)
+    (0.5, 1.0)
+    """
+    return 1.0 if logit >= SURE else 1 / (1 + math.exp(-logit))
+
+
+class Constant:
+    """The same share for every row."""
+
+    least, most = (-SURE,), (SURE,)
+    starts = ((2.0,),)
+
+    def __init__(self, name: str, rows: int) -> None:
+        self.names: tuple[str, ...] = (name,)
+        self._rows = rows
+
+    def shares(self, theta: F64) -> tuple[F64, F64]:
+        """Return the share of each row, and its derivative by the logit."""
+        share = share_of(float(theta[0]))
+        slope = np.full((self._rows, 1), max(share * (1 - share), 1e-9))
+        return np.full(self._rows, share), slope
+
+    def natural(self, index: int, value: float) -> float:
+        """Return the share."""
+        return share_of(value)
+
+
+class Falling:
+    """A logistic fall along a quantity: 1 / (1 + exp((x - midpoint) / width))."""
+
+    def __init__(self, name: str, values: F64) -> None:
+        self.names = (f"{name} midpoint", f"{name} width")
+        self._x = values
+        span = max(float(values.max()), 1e-6)
+        self.least = (-span, math.log(span / 1000))
+        self.most = (3 * span, math.log(3 * span))
+        self.starts = tuple((share * span, math.log(span / 8)) for share in (0.5, 0.8, 1.1))
+
+    def shares(self, theta: F64) -> tuple[F64, F64]:
+        """Return the share of each row, and its derivatives by midpoint and log of width."""
+        midpoint, width = float(theta[0]), math.exp(float(theta[1]))
+        steps = np.clip((self._x - midpoint) / width, -700, 700)
+        share = 1 / (1 + np.exp(steps))
+        bend = share * (1 - share)
+        return share, np.stack([bend / width, bend * steps], axis=1)
+
+    def natural(self, index: int, value: float) -> float:
+        """Return midpoint or width in the quantity's unit."""
+        return math.exp(value) if index else value
+
+
+class Turned:
+    """How much less is noticed from the side and from behind than of a face."""
+
+    names = ("side", "back")
+    least, most = (-SURE, -SURE), (SURE, SURE)
+    starts = ((2.0, 1.0),)
+
+    def __init__(self, degrees: F64) -> None:
+        part = degrees / 90
+        self._side = np.where(part < 1, part, 2 - part)
+        self._back = np.maximum(part - 1, 0)
+
+    def shares(self, theta: F64) -> tuple[F64, F64]:
+        """Return the share of each row, and its derivatives by the two logits."""
+        side, back = share_of(float(theta[0])), share_of(float(theta[1]))
+        share = (1 - self._side - self._back) + side * self._side + back * self._back
+        slopes = [
+            self._side * max(side * (1 - side), 1e-9),
+            self._back * max(back * (1 - back), 1e-9),
+        ]
+        return share, np.stack(slopes, axis=1)
+
+    def natural(self, index: int, value: float) -> float:
+        """Return the share."""
+        return share_of(value)

@@ -1,0 +1,385 @@
+"""What changes in a home during a run: when, in which order, and whom it stops.
+
+Everything that is known beforehand waits in a queue by step: the scenario's changes, doors by their
+schedule, doors that somebody will come to, doors that fall shut. The floor plan comes first in a
+step, so what is due at a step holds for everybody in it.
+"""
+
+import heapq
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString
+
+from fleet2d.engine.clock import Clock
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.objects.door import Door
+from fleet2d.entities.objects.home_object import HomeObject
+from fleet2d.entities.plan import Track
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError
+from fleet2d.floorplan.arrangement import moved
+from fleet2d.floorplan.change import HomeChange
+from fleet2d.floorplan.gates import Segment
+from fleet2d.floorplan.home import Home, lattice_footprint
+from fleet2d.floorplan.space import grown_shape
+from fleet2d.kernels.motion import Breakpoints
+from fleet2d.problems import did_you_mean
+from fleet2d.units import micros
+
+# A door begins to open this long before somebody reaches its line.
+OPENS_AHEAD_US = 1_000_000
+# What can't shut or stand for somebody in the way tries again after this long.
+TRIES_AGAIN_US = 1_000_000
+DAY_US = 86_400_000_000
+
+I64 = NDArray[np.int64]
+
+
+class Due(NamedTuple):
+    """A change that waits for its step; ties are taken in the order they were put in.
+
+    Attributes:
+        by: Who causes it, for the events table.
+        door: Number of the door that it opens for somebody, or shuts by itself; else -1.
+        opens_for: Row and decision of who comes to the door: void once that plan is replaced.
+    """
+
+    step: int
+    number: int
+    change: HomeChange | None
+    by: str = ""
+    door: int = -1
+    opens_for: tuple[int, int] | None = None
+    passed_us: int = 0
+
+
+class Happened(NamedTuple):
+    """A change that was made: a row of the events table."""
+
+    step: int
+    target: str | None
+    event: str
+    detail: str
+
+
+class Changes:
+    """The changes of a run.
+
+    Attributes:
+        doors: The doors by number, in the order of the scenario.
+        names: Their names.
+    """
+
+    def __init__(
+        self,
+        objects: Mapping[str, HomeObject],
+        changes: Sequence[HomeChange],
+        home: Home,
+        clock: Clock,
+    ) -> None:
+        self.home, self.clock = home, clock
+        self.doors = {name: thing for name, thing in objects.items() if isinstance(thing, Door)}
+        self.names = list(self.doors)
+        self._used_us = [-1] * len(self.names)
+        self._queue: list[Due] = []
+        self._count = 0
+        for number, door in enumerate(self.doors.values()):
+            if door.locked:
+                self._put(0, HomeChange(lock=self.names[number]), "at first")
+            if not door.open:
+                self._put(0, HomeChange(shut=self.names[number]), "at first")
+            self._schedule(number, door)
+        for index, change in enumerate(changes):
+            self._add_declared(index, change)
+
+    def next_due(self) -> int | None:
+        """Return the step at which something changes next."""
+        return self._queue[0].step if self._queue else None
+
+    def ask(self, change: HomeChange, step: int, by: str) -> None:
+        """Let a change happen at a step, as an algorithm or a script wants it.
+
+        Raises:
+            ComponentError: There is nothing of that name to change.
+        """
+        try:
+            self._check(change)
+        except ScenarioError as error:
+            raise ComponentError(f"{by} asks for a change that can't be: {error}") from None
+        if change.at is not None:
+            step = max(step, self._step_of(change.at))
+        self._put(step, change, by)
+
+    def expect(self, row: int, actor: Actor) -> None:
+        """Note the doors on the way of somebody who opens doors, once a plan is made."""
+        if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
+            return
+        for door in range(len(self.names)):
+            for moment in crossings(actor.motion.breakpoints, self.home.door_line(door)):
+                step = max(actor.planned_at, (moment - OPENS_AHEAD_US) // self.clock.step_us)
+                plan = (row, actor.planned_at)
+                self._put(step, None, actor.name, door, plan, moment)
+
+    def make(self, step: int, actors: Sequence[Actor]) -> list[Happened]:
+        """Make all changes that are due at a step; ask those anew whose way they cut.
+
+        Raises:
+            ComponentError: What an algorithm or a script asks for can't be.
+        """
+        happened: list[Happened] = []
+        while self._queue and self._queue[0].step <= step:
+            due = heapq.heappop(self._queue)
+            if due.change is not None:
+                happened += self._declared(due, due.change, step, actors)
+            elif due.opens_for is not None:
+                happened += self._open_for(due, step, actors)
+            else:
+                happened += self._fall_shut(due, step, actors)
+        return happened
+
+    # What is due
+
+    def _declared(
+        self, due: Due, change: HomeChange, step: int, actors: Sequence[Actor]
+    ) -> list[Happened]:
+        verb, target = change.verb, change.target
+        if verb == "room":
+            room = self.home.plan.room(target)
+            self.home.use_room_as(room, str(change.type))
+            return [Happened(step, None, "room_changed", f"{target}: {change.type}")]
+        if verb == "move":
+            return self._move(due, change, step, actors)
+        door = self.names.index(target)
+        if verb in ("lock", "unlock"):
+            self.home.set_lock(door, locked=verb == "lock")
+            self._stop(step, actors, self._door_shape(door))
+            return [Happened(step, target, f"{verb}ed", due.by)]
+        is_open = verb == "open"
+        if is_open != (door in self.home.shut):
+            return []
+        return self._turn(door, is_open, due, step, actors)
+
+    def _open_for(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Happened]:
+        row, planned_at = due.opens_for or (0, 0)
+        if actors[row].planned_at != planned_at:
+            return []
+        door = due.door
+        self._used_us[door] = max(self._used_us[door], due.passed_us)
+        after = self.doors[self.names[door]].closes_after
+        if after is not None:
+            shuts = self.clock.step_at_or_after(due.passed_us + micros(after))
+            self._put(max(shuts, step + 1), None, "", door)
+        if door not in self.home.shut or door in self.home.locked:
+            return []
+        return self._turn(door, True, due, step, actors)
+
+    def _fall_shut(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Happened]:
+        """Shut a door behind the last who went through."""
+        after = self.doors[self.names[due.door]].closes_after
+        if after is None or due.door in self.home.shut:
+            return []
+        if step * self.clock.step_us < self._used_us[due.door] + micros(after):
+            return []
+        return self._turn(due.door, False, due, step, actors)
+
+    def _turn(
+        self, door: int, is_open: bool, due: Due, step: int, actors: Sequence[Actor]
+    ) -> list[Happened]:
+        shape = self._door_shape(door)
+        if not is_open and self._in_the_way(shape, actors):
+            self._try_again(due, step)
+            return []
+        self.home.set_door(door, is_open=is_open)
+        self._stop(step, actors, None if is_open else shape)
+        after = self.doors[self.names[door]].closes_after
+        if is_open and due.opens_for is None and after is not None:
+            now = step * self.clock.step_us
+            self._used_us[door] = max(self._used_us[door], now)
+            self._put(self.clock.step_at_or_after(now + micros(after)), None, "", door)
+        return [Happened(step, self.names[door], "opened" if is_open else "shut", due.by)]
+
+    def _move(
+        self, due: Due, change: HomeChange, step: int, actors: Sequence[Actor]
+    ) -> list[Happened]:
+        plan = self.home.plan
+        thing = next(o for o in self.home.objects if o.name == change.target)
+        assert change.to is not None
+        there = moved(thing, plan.lattice, change.to, change.turn_deg)
+        shape = _corners(lattice_footprint(plan, there))
+        solid = there.blocks != "nothing"
+        if solid and self._in_the_way(shape, actors):
+            self._try_again(due, step)
+            return []
+        self.home.put(there)
+        self._stop(step, actors, shape if solid else None)
+        x, y = change.to
+        return [Happened(step, None, "moved", f"{thing.name} to ({x:g}, {y:g})")]
+
+    # Who is in the way
+
+    def _door_shape(self, door: int) -> NDArray[np.float64]:
+        return np.array(self.home.door_line(door), np.float64)
+
+    def _in_the_way(self, shape: NDArray[np.float64], actors: Sequence[Actor]) -> bool:
+        """Tell whether somebody stands where a shape [lattice] is to be."""
+        units = self.home.plan.lattice.units_per_m
+        for actor in actors:
+            if not actor.state.away:
+                zone = grown_shape(shape, actor.entity.radius * units)
+                if shapely.intersects_xy(zone, actor.state.x, actor.state.y):
+                    return True
+        return False
+
+    def _stop(self, step: int, actors: Sequence[Actor], shape: NDArray[np.float64] | None) -> None:
+        """Ask everybody anew whose way is cut, and who walks at random by walls that changed."""
+        units = self.home.plan.lattice.units_per_m
+        for actor in actors:
+            if not isinstance(actor.motion, Track):
+                actor.ask_at = step
+            elif shape is not None and not self._passes(actor, shape):
+                zone = grown_shape(shape, actor.entity.radius * units)
+                way = _way_ahead(actor, step * self.clock.step_us)
+                if way is not None and way.intersects(zone):
+                    actor.ask_at = step
+
+    def _passes(self, actor: Actor, shape: NDArray[np.float64]) -> bool:
+        """Tell whether a body opens the door that a shape is."""
+        if not actor.entity.opens_doors or len(shape) > 2:
+            return False
+        door = next(d for d in range(len(self.names)) if np.array_equal(self._door_shape(d), shape))
+        return door not in self.home.locked
+
+    # The queue
+
+    def _put(
+        self,
+        step: int,
+        change: HomeChange | None,
+        by: str,
+        door: int = -1,
+        opens_for: tuple[int, int] | None = None,
+        passed_us: int = 0,
+    ) -> None:
+        due = Due(step, self._count, change, by, door, opens_for, passed_us)
+        heapq.heappush(self._queue, due)
+        self._count += 1
+
+    def _try_again(self, due: Due, step: int) -> None:
+        wait = max(1, self.clock.step_at_or_after(TRIES_AGAIN_US))
+        self._put(step + wait, due.change, due.by, due.door, due.opens_for, due.passed_us)
+
+    def _schedule(self, number: int, door: Door) -> None:
+        """Put in what a door's schedule says, for all days of the run."""
+        midnight = datetime.combine(self.clock.start.date(), datetime.min.time())
+        end = self.clock.time(self.clock.steps)
+        while midnight < end:
+            for turn in door.schedule:
+                self._turn_daily(self.names[number], turn.open, turn.locked, midnight + turn.at)
+            midnight += timedelta(days=1)
+
+    def _turn_daily(
+        self, name: str, is_open: bool | None, locked: bool | None, when: datetime
+    ) -> None:
+        if when < self.clock.start:
+            return
+        step = self._step_of(when)
+        if is_open is not None:
+            change = HomeChange(open=name) if is_open else HomeChange(shut=name)
+            self._put(step, change, "schedule")
+        if locked is not None:
+            change = HomeChange(lock=name) if locked else HomeChange(unlock=name)
+            self._put(step, change, "schedule")
+
+    def _add_declared(self, index: int, change: HomeChange) -> None:
+        if change.at is None:
+            raise ScenarioError(f"changes.{index}: there is no 'at': say when it happens")
+        try:
+            self._check(change)
+        except ScenarioError as error:
+            raise ScenarioError(f"changes.{index}: {error}") from None
+        self._put(self._step_of(change.at), change, "scenario")
+
+    def _step_of(self, at: datetime | timedelta) -> int:
+        elapsed = micros(at) if isinstance(at, timedelta) else self.clock.elapsed(at)
+        return max(0, self.clock.step_at_or_after(elapsed))
+
+    def _check(self, change: HomeChange) -> None:
+        """Refuse what names nothing that is there.
+
+        Raises:
+            ScenarioError: Says what there is.
+        """
+        if change.verb == "room":
+            kind, known = "room", [room.name for room in self.home.rooms]
+        elif change.verb == "move":
+            kind, known = "object in the floor plan", [thing.name for thing in self.home.objects]
+        else:
+            kind, known = "door", self.names
+        if change.target not in known:
+            raise ScenarioError(
+                f"there is no {kind} {change.target!r}{did_you_mean(change.target, known)}"
+                f" There are: {', '.join(known) or 'none'}"
+            )
+        if change.verb == "move":
+            self._check_move(change)
+
+    def _check_move(self, change: HomeChange) -> None:
+        plan = self.home.plan
+        thing = next(o for o in self.home.objects if o.name == change.target)
+        assert change.to is not None
+        try:
+            there = moved(thing, plan.lattice, change.to, change.turn_deg)
+        except (PlacementError, OverflowError) as error:
+            raise ScenarioError(str(error)) from None
+        inside = shapely.intersection(
+            shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, there)
+        )
+        if inside.area == 0:
+            x, y = change.to
+            raise ScenarioError(
+                f"({x:g}, {y:g}) m is not in the home: {thing.name} can't stand there"
+            )
+
+
+def crossings(track: Breakpoints, line: Segment) -> list[int]:
+    """Return the moments [us] at which a track goes through a segment, to the microsecond.
+
+    A leg that only touches the line counts once; one along the line doesn't.
+
+    Args:
+        track: The motion [lattice].
+        line: From jamb to jamb [lattice].
+    """
+    (ax, ay), (bx, by) = line
+    x, y = track.x, track.y
+    side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    legs = np.flatnonzero((side[:-1] > 0) != (side[1:] > 0))
+    found: list[int] = []
+    for i in legs.tolist():
+        px, py, qx, qy = int(x[i]), int(y[i]), int(x[i + 1]), int(y[i + 1])
+        a = (qx - px) * (ay - py) - (qy - py) * (ax - px)
+        b = (qx - px) * (by - py) - (qy - py) * (bx - px)
+        if (a > 0) != (b > 0) or 0 in (a, b):
+            near, far = abs(int(side[i])), abs(int(side[i + 1]))
+            begin, end = int(track.time[i]), int(track.time[i + 1])
+            found.append(begin + (end - begin) * near // max(near + far, 1))
+    return found
+
+
+def _way_ahead(actor: Actor, now_us: int) -> LineString | None:
+    """Return what is left of a body's way [lattice], or None when it only stays where it is."""
+    assert isinstance(actor.motion, Track)
+    track = actor.motion.breakpoints
+    ahead = track.time > now_us
+    points = np.stack(
+        [np.append(actor.state.x, track.x[ahead]), np.append(actor.state.y, track.y[ahead])], axis=1
+    )
+    return LineString(points) if (points != points[0]).any() else None
+
+
+def _corners(shape: shapely.Polygon) -> NDArray[np.float64]:
+    return np.asarray(shape.exterior.coords)

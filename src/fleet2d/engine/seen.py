@@ -1,0 +1,118 @@
+"""The seen area of a robot in a run: what its cameras have had in view, cell by cell."""
+
+from copy import deepcopy
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.engine.buckets import PoseBlock
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.entity import Robot
+from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.seen import bench_for
+from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
+from fleet2d.sight.tables import Scene, stack_lenses
+
+# Poses kept: half as many as slots. Rounds through a large home take a few thousand.
+SLOTS = 1 << 14
+
+I64 = NDArray[np.int64]
+
+
+class SeenArea:
+    """What the cameras of one robot have had in view since the start.
+
+    A cell is in view at a step if its centre is: not too near or far, within the angle, and no wall
+    touches the line to it, from the exact pose that the camera has at that step.
+
+    Attributes:
+        robot: Whose cameras.
+        row: Its row in a PoseBlock.
+        steps: Steps taken in so far.
+    """
+
+    def __init__(self, robot: Actor, row: int, *, every: int = 1, keeps_last: bool = True) -> None:
+        """Begin with nothing seen.
+
+        Args:
+            robot: Whose cameras.
+            row: Its row in a PoseBlock.
+            every: It looks at the steps that this divides; each look stands for so many steps.
+            keeps_last: Whether the last step at which each cell was in view can be asked for.
+        """
+        assert isinstance(robot.entity, Robot)
+        self.robot, self.row, self.every = robot, row, every
+        self.steps = 0
+        plan = robot.home.plan
+        lattice, step_us = plan.lattice, robot.clock.step_us
+        lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
+        scene = Scene([], [], lattice, step_us, robot.path)
+        self._lenses = stack_lenses(lenses, [False] * len(lenses), scene)
+        grid, none = (lattice.rows, lattice.columns), (0, 0)
+        self._record = Record(
+            first=np.full(grid, NEVER, np.int64),
+            last=np.full(grid if keeps_last else none, NEVER, np.int64),
+            exposure=np.zeros(len(plan.rooms), np.int64),
+            counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
+        )
+        self._glances = no_glances(SLOTS, len(plan.rooms))
+        self._face(robot.home.walls)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return a twin that goes on by itself; walls and cameras don't change, and are shared."""
+        twin = self.__class__.__new__(self.__class__)
+        memo[id(self)] = twin
+        memo[id(self._watched)] = self._watched
+        twin.__dict__.update({key: deepcopy(value, memo) for key, value in self.__dict__.items()})
+        return twin
+
+    def _face(self, walls: Mesh) -> None:
+        """Take other walls: what is known of poses no longer holds."""
+        plan = self.robot.home.plan
+        self._watched = Watched(
+            walls, self._lenses, plan.room_of_cell, self.robot.clock.step_us, self.every
+        )
+        self._bench = bench_for(walls, plan.lattice.rows, plan.lattice.columns)
+        self._glances.last[:] = self._glances.told[:] = NEVER
+        self._glances.taken[0] = 0
+
+    def span(self, block: PoseBlock, first: int, count: int) -> None:
+        """Take in the steps from `first` to `first + count - 1`."""
+        walls = self.robot.home.walls
+        if walls is not self._watched.walls:
+            self._settle()
+            self._face(walls)
+        poses = block.row(self.row, count)
+        watch(self._watched, poses, first, self._glances, self._bench, self._record)
+        self.steps = first + count
+
+    def _settle(self) -> None:
+        if len(self._record.last):
+            settle(self._watched, self._glances, self._bench, self._record.last)
+
+    @property
+    def exposure(self) -> I64:
+        """Cells of each room in view, summed over the steps so far: int64 (rooms,), a copy."""
+        return self._record.exposure.copy()
+
+    def explored(self) -> NDArray[np.bool_]:
+        """Return which cells were ever in view: bool (rows, columns)."""
+        explored: NDArray[np.bool_] = self._record.first != NEVER
+        return explored
+
+    def first_seen(self) -> I64:
+        """Return the first step at which each cell was in view: int64 (rows, columns), -1 never."""
+        return self._record.first.copy()
+
+    def last_seen(self) -> I64:
+        """Return the last step at which each cell was in view: int64 (rows, columns), -1 never."""
+        self._settle()
+        return self._record.last.copy()
+
+    def time_since_seen(self) -> NDArray[np.float64]:
+        """Return how long ago each cell was in view [s]: float64 (rows, columns), NaN: never."""
+        last = self.last_seen()
+        steps = np.where(last == NEVER, np.nan, self.steps - 1 - last)
+        elapsed: NDArray[np.float64] = steps * (self.robot.clock.step_us / 1e6)
+        return elapsed

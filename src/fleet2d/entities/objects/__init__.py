@@ -1,0 +1,1 @@
+"""Objects of a home that have a state: doors, and what senses."""

@@ -1,0 +1,33 @@
+"""Contact sensors: whether a door is open."""
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.objects.sensor import I64, Sensor, SensorView
+from fleet2d.floorplan.home import Home
+
+
+@register("object", "contact_sensor")
+class ContactSensor(Sensor):
+    """Says OPEN while a door is open, and CLOSE when it shuts."""
+
+    of: str = Field(description="the name of the door, one of the scenario's objects")
+
+    words: ClassVar[tuple[str, str]] = ("OPEN", "CLOSE")
+
+    def watch(self, door: int) -> None:
+        """Take note of which door it is, by its number."""
+        self.door = door
+
+    def place(self, home: Home) -> str:
+        """Return the first room of the doorway."""
+        return home.rooms[home.doors[self.door].rooms[0]].name
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return all steps while the door is open: it changes between two spans only."""
+        shut = self.door in home.shut
+        steps = np.arange(0 if shut else view.steps, dtype=np.int64) + view.first
+        return steps, np.full(len(steps), -1, np.int64)

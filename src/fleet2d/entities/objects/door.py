@@ -1,0 +1,108 @@
+"""Doors: what hangs in a doorway, opens and shuts."""
+
+from datetime import timedelta
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings, register
+from fleet2d.entities.objects.home_object import HomeObject
+from fleet2d.entities.place import Point
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.doorways import Doorway
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.problems import did_you_mean, problem
+from fleet2d.units import PositiveDuration, TimeOfDay
+
+
+class Turn(Settings):
+    """What happens to a door at a time of day, every day."""
+
+    at: TimeOfDay = Field(description="when, every day")
+    open: bool | None = Field(default=None, description="open it, or shut it")
+    locked: bool | None = Field(default=None, description="lock it, or unlock it")
+
+    @model_validator(mode="after")
+    def _does_something(self) -> Self:
+        if self.open is None and self.locked is None:
+            raise problem("nothing happens then: say 'open' or 'locked', true or false")
+        return self
+
+
+@register("object", "door")
+class Door(HomeObject):
+    """A door: shut, it ends sight and ways at once, exactly as a wall.
+
+    People open it as they come to it, unless it is locked; bodies with `opens_doors: false`, as
+    robots are, take it for a wall. It never shuts on somebody: it waits until the doorway is free.
+    """
+
+    doorway: str | Point = Field(
+        description="its doorway: by name, by a room that has one only, by 'room-room', or the one"
+        " nearest to a point [x, y] in metres",
+        examples=["bathroom_0", "kitchen_0-hallway_0", [4.0, 2.5]],
+    )
+    open: bool = Field(default=True, description="whether it stands open at first")
+    locked: bool = Field(default=False, description="whether nobody can open it by hand at first")
+    closes_after: PositiveDuration | None = Field(
+        default=None,
+        description="it shuts this long after somebody opened it or went through; left out: it"
+        " stays as it was left",
+        examples=["10 s"],
+    )
+    schedule: tuple[Turn, ...] = Field(
+        default=(), description="when it is opened, shut or locked, every day"
+    )
+
+    @model_validator(mode="after")
+    def _opens_by_day(self) -> Self:
+        late = [turn.at for turn in self.schedule if turn.at >= timedelta(days=1)]
+        if late:
+            raise problem("a door's schedule ends at 23:59:59: write 00:00 for midnight")
+        return self
+
+    def find(self, plan: FloorPlan) -> Doorway:
+        """Return its doorway in a floor plan.
+
+        Raises:
+            PlacementError: There is no such doorway, or several; says which there are.
+        """
+        if not plan.doorways:
+            raise PlacementError(f"{plan.name} has no doorways: give it some, or no doors")
+        if not isinstance(self.doorway, str):
+            x, y = self.doorway
+            return min(plan.doorways, key=lambda d: (_squared(d, x, y), d.index))
+        found = doorways_named(plan, self.doorway)
+        names = [doorway.name for doorway in plan.doorways]
+        if not found:
+            known = [*names, *(room.name for room in plan.rooms)]
+            raise PlacementError(
+                f"there is no doorway {self.doorway!r}{did_you_mean(self.doorway, known)}"
+                f" The doorways are: {', '.join(names)}"
+            )
+        if len(found) > 1:
+            raise PlacementError(
+                f"{self.doorway!r} has {len(found)} doorways: choose one of"
+                f" {', '.join(doorway.name for doorway in found)}"
+            )
+        return found[0]
+
+
+def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
+    """Return the doorway of a name, those between 'room-room', or all of a room."""
+    exact = [doorway for doorway in plan.doorways if doorway.name == name]
+    if exact:
+        return exact
+    rooms = {room.name: room.index for room in plan.rooms}
+    pairs = {
+        tuple(sorted((rooms[a], rooms[b]))) for a in rooms for b in rooms if f"{a}-{b}" == name
+    }
+    found = [d for d in plan.doorways if tuple(sorted(d.rooms)) in pairs]
+    if name in rooms:
+        found = [d for d in plan.doorways if rooms[name] in d.rooms]
+    return found
+
+
+def _squared(doorway: Doorway, x: float, y: float) -> float:
+    (x0, y0), (x1, y1) = doorway.start, doorway.end
+    return float(((x0 + x1) / 2 - x) ** 2 + ((y0 + y1) / 2 - y) ** 2)

@@ -1,0 +1,96 @@
+"""Motion sensors, as an alarm system has them: passive infrared, on a wall or the ceiling."""
+
+from datetime import timedelta
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.objects.sensor import I64, Mask, Sensor, SensorView, seen_by
+from fleet2d.entities.place import Point
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels.headings import TURN, half_sine
+from fleet2d.kernels.mesh import locate
+from fleet2d.kernels.region import region_contains_points, visible_region
+from fleet2d.kernels.sight import scratch_for
+from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
+
+
+@register("object", "motion_sensor")
+class MotionSensor(Sensor):
+    """Goes on when somebody moves in its field of view, past no wall, and off a while after.
+
+    Who stands, sits or sleeps still is not noticed.
+    """
+
+    at: Point = Field(description="where it hangs, [x, y] in metres", examples=[[1.0, 2.5]])
+    heading_deg: AngleDeg = Field(
+        default=0.0, description="where it looks, counter-clockwise from +x"
+    )
+    angle_deg: AngleDeg = Field(
+        default=360.0, gt=0, le=360, description="width of its field of view"
+    )
+    range: PositiveLength = Field(default=6.0, description="how far it sees")
+    hold: Duration = Field(
+        default=timedelta(seconds=5), description="it goes off when nobody moved for this long"
+    )
+    robots: bool = Field(default=False, description="whether robots excite it, too")
+
+    def start(self, home: Home, step_us: int) -> None:
+        """Find its place."""
+        x, y = home.plan.lattice.to_lattice(self.at).tolist()
+        if home.plan.room_at(*self.at) is None:
+            raise PlacementError(
+                f"({self.at[0]:g}, {self.at[1]:g}) m is outside the home: hang the sensor in a room"
+            )
+        self.eye = (int(x), int(y))
+        self.reach = round(self.range * home.plan.lattice.units_per_m)
+        self.version = -1
+
+    def place(self, home: Home) -> str:
+        """Return the room that it hangs in."""
+        room = home.plan.room_at(*self.at)
+        return room.name if room else ""
+
+    def hold_us(self) -> int:
+        """Return how long it stays on [us]."""
+        return micros(self.hold)
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps in which somebody moved in view."""
+        rows = slice(None) if self.robots else slice(view.users)
+        x, y, present = view.x[rows], view.y[rows], view.present[rows]
+        moved = (np.diff(x) != 0) | (np.diff(y) != 0)
+        near = moved & present[:, 1:] & present[:, :-1]
+        dx, dy = x[:, 1:] - self.eye[0], y[:, 1:] - self.eye[1]
+        near &= dx * dx + dy * dy <= self.reach * self.reach
+        bodies, columns = np.nonzero(near)
+        if len(columns):
+            points = np.stack([x[bodies, columns + 1], y[bodies, columns + 1]], axis=1)
+            near[bodies, columns] = self._in_view(points, home)
+        return seen_by(near, view.first)
+
+    def _in_view(self, points: I64, home: Home) -> Mask:
+        x, y = self.eye
+        if self.version != home.version:
+            self.version, self.walls = home.version, home.walls
+            wall, stack = scratch_for(self.walls.vertices)
+            right = np.empty_like(wall)
+            at = locate(self.walls, x, y)
+            count = visible_region(self.walls, x, y, at, right, wall, stack)
+            self.region = right[:count].copy(), wall[:count].copy()
+        seen: Mask = region_contains_points(self.walls, x, y, *self.region, points)
+        return seen & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
+
+    def _in_wedge(self, dx: I64, dy: I64) -> Mask:
+        half = round(self.angle_deg / 360 * TURN)
+        if half >= TURN:
+            return np.ones(len(dx), np.bool_)
+        middle = 2 * round(self.heading_deg / 360 * TURN)
+        quarter = TURN // 2  # of a turn, in halves of a heading
+        right, left = middle - half, middle + half
+        from_right = half_sine(right + quarter) * dy - half_sine(right) * dx >= 0
+        to_left = half_sine(left) * dx - half_sine(left + quarter) * dy >= 0
+        both: Mask = from_right & to_left if half <= quarter else from_right | to_left
+        return both

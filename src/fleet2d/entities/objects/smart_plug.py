@@ -1,0 +1,56 @@
+"""Smart plugs: whether a device is in use."""
+
+from datetime import timedelta
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.objects.occupancy_sensor import room_of
+from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, seen_by
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.home import Home
+from fleet2d.units import Duration, Length, micros
+
+
+@register("object", "smart_plug")
+class SmartPlug(Sensor):
+    """On while somebody stays at a place from which a device is used: a stove, a desk, a TV.
+
+    Who only passes by doesn't switch it on: it takes two steps on the spot.
+    """
+
+    of: str = Field(description="the object of the floor plan that it feeds, by name")
+    reach: Length = Field(
+        default=0.3, ge=0, description="how near to such a place counts as using the device"
+    )
+    hold: Duration = Field(
+        default=timedelta(minutes=1), description="it goes off when nobody used it for this long"
+    )
+
+    def start(self, home: Home, step_us: int) -> None:
+        """Check that the object exists, and can be used."""
+        if not home.object(self.of).uses:
+            raise PlacementError(
+                f"{self.of} has no place to use it from: a plug can't tell its use"
+            )
+
+    def place(self, home: Home) -> str:
+        """Return the room that the object stands in."""
+        return room_of(home, self.of)
+
+    def hold_us(self) -> int:
+        """Return how long it stays on [us]."""
+        return micros(self.hold)
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps in which somebody stays at one of its places."""
+        lattice = home.plan.lattice
+        x, y = view.x[: view.users], view.y[: view.users]
+        still = (np.diff(x) == 0) & (np.diff(y) == 0)
+        there = np.zeros(still.shape, np.bool_)
+        reach = round(self.reach * lattice.units_per_m)
+        for use in home.object(self.of).uses:
+            at_x, at_y = lattice.to_lattice((use.x, use.y)).tolist()
+            there |= (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2 <= reach * reach
+        return seen_by(there & still & view.present[: view.users, 1:], view.first)

@@ -1,0 +1,83 @@
+"""Pet: a cat or a dog that sleeps most of the day, and roams between."""
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.users.spots import Spots
+from fleet2d.problems import problem
+from fleet2d.routines.activity import AnyTakes, Takes
+from fleet2d.streams import Draws
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+# How many naps are planned at once.
+NAPS = 10
+
+
+@register("behavior", "pet")
+class Pet(Behavior):
+    """Nap somewhere, roam through a few spots of the home, nap somewhere else.
+
+    Naps and stops have lengths by law. The next spot is in the same room or in any other that it
+    may enter, by `stays_in_room`.
+    """
+
+    rooms: tuple[str, ...] = Field(
+        default=(), description="rooms and kinds of rooms that it may enter; none: all"
+    )
+    nap: AnyTakes = Field(
+        default=Takes(mean=timedelta(minutes=50), std=timedelta(minutes=40)),
+        description="how long it sleeps at a time",
+    )
+    stop: AnyTakes = Field(
+        default=Takes(mean=timedelta(seconds=40), std=timedelta(seconds=40)),
+        description="how long it stops at a spot while it roams",
+    )
+    spots: tuple[int, int] = Field(
+        default=(3, 12), description="at how many spots it stops between two naps, least and most"
+    )
+    stays_in_room: float = Field(
+        default=0.6, ge=0, le=1, description="how likely its next spot is in the same room"
+    )
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Self:
+        least, most = self.spots
+        if not 0 <= least <= most:
+            raise problem(f"found spots {list(self.spots)}; [least, most] is wanted, like [3, 12]")
+        return self
+
+    def start(self, actor: "Actor") -> None:
+        """Find the rooms that it may enter."""
+        named = [room for name in self.rooms for room in actor.rooms((name,))]
+        self.entered = list(dict.fromkeys(named)) or actor.reachable_rooms()
+        self.places = Spots(actor)
+        self.laws = self.nap.table(), self.stop.table()
+        self.naps = 0
+        self.room = Draws(actor.stream("first room"), 0).choice(self.entered)
+
+    def decide(self, now: Situation) -> Plan:
+        """Plan the next naps, and the ways between them."""
+        plan = now.plan()
+        nap, stop = self.laws
+        least, most = self.spots
+        for _ in range(NAPS):
+            draws = Draws(now.actor.stream("roam"), self.naps)
+            self.naps += 1
+            for _ in range(least + draws.below(most - least + 1)):
+                self._go_on(plan, draws)
+                plan.stay(timedelta(seconds=stop.draw(draws)))
+            self._go_on(plan, draws)
+            plan.take("lie").stay(timedelta(seconds=nap.draw(draws)))
+        return plan
+
+    def _go_on(self, plan: Plan, draws: Draws) -> None:
+        if draws.uniform() >= self.stays_in_room:
+            self.room = draws.choice(self.entered)
+        draws.choice(self.places.in_room(self.room)).walk(plan)

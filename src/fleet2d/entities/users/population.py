@@ -1,0 +1,80 @@
+"""Population: days whose activities follow the American Time Use Survey."""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
+from fleet2d.entities.users.spots import Spots
+from fleet2d.routines import survey
+from fleet2d.routines.activity import catalogue
+from fleet2d.routines.laws import weighted
+from fleet2d.routines.planner import Doing
+from fleet2d.routines.timeuse import activities, told_apart, works_at_home
+from fleet2d.streams import Draws, stream_key
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.place import Point, RoomChoice
+
+
+@register("behavior", "population")
+class Population(Inhabitant):
+    """Live as somebody drawn from the American Time Use Survey 2022-2023.
+
+    Of many such people, the share that does each activity at each hour is the survey's, for
+    weekdays and weekends. A person keeps at an activity for as long as its mean duration in the
+    survey lets expect, but knows no habits: no day is like the one before.
+    """
+
+    group: Literal["any", "workers", "retired", "working_parents", "at_home"] = Field(
+        default="any", description="whose days; any: drawn by the groups' shares of the people"
+    )
+
+    def start(self, actor: "Actor") -> None:
+        """Draw who it is, and find where its activities are done."""
+        self.days = actor.stream("day")
+        self.details = actor.stream("details")
+        draws = Draws(actor.stream("who"), 0)
+        self.people = survey.group(_drawn_group(draws) if self.group == "any" else self.group)
+        self.at_home = works_at_home(self.people, draws)
+        self.first = actor.clock.start.toordinal() - 1
+        self.states = [survey.first_state(self.people, draws, self.first)]
+        self.known: dict[int, Sequence[Doing]] = {}
+        known = catalogue()
+        self.settle(actor, {name: known[name] for name in activities(self.people)}, Spots(actor))
+
+    def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
+        """Return where one likely is at that time."""
+        draws, known = Draws(stream_key(0, "", "likely"), 0), catalogue()
+        people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
+        ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()
+        state = survey.first_state(people, draws, ordinal)
+        blocks, _ = survey.live(people, draws, ordinal, state)
+        time_s = (time - datetime.fromordinal(ordinal)) // timedelta(seconds=1)
+        return rooms_at(told_apart(people, blocks, False, draws), time_s, known)
+
+    def day(self, ordinal: int) -> Sequence[Doing]:
+        """Return what is done from 04:00 on the day of a date's ordinal to 04:00 on the next."""
+        if ordinal not in self.known:
+            while len(self.states) <= ordinal - self.first:
+                self._live(self.first + len(self.states) - 1)
+            self.known = {ordinal: self._live(ordinal)}
+        return self.known[ordinal]
+
+    def _live(self, ordinal: int) -> Sequence[Doing]:
+        state = self.states[ordinal - self.first]
+        blocks, after = survey.live(self.people, Draws(self.days, ordinal), ordinal, state)
+        if len(self.states) == ordinal - self.first + 1:
+            self.states.append(after)
+        return told_apart(self.people, blocks, self.at_home, Draws(self.details, ordinal))
+
+
+def _drawn_group(draws: Draws) -> str:
+    """Draw a group by its share of the people."""
+    names = survey.groups()
+    shares = [survey.table()["groups"][name]["share"] for name in names]
+    return names[weighted(draws, shares)]

@@ -1,0 +1,229 @@
+"""Replay: be where a log says that somebody was, in its rooms or at its positions."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.logs.follow_fixes import FixFollower, place_fixes
+from fleet2d.logs.follow_rooms import RoomFollower
+from fleet2d.logs.frame import Frame
+from fleet2d.logs.log import DAY_US, ActivityLog, LogError, PositionLog
+from fleet2d.logs.read import Layout, read_log
+from fleet2d.logs.report import report_fixes, report_rooms
+from fleet2d.logs.rooms import map_rooms
+from fleet2d.logs.visits import Rule, Visit, visits_of
+from fleet2d.paths import folder_of
+from fleet2d.problems import problem, shown
+from fleet2d.units import Duration, Length, PositiveDuration, Speed, micros
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+GAP_OF_ROOMS = timedelta(minutes=10)
+GAP_OF_FIXES = timedelta(minutes=1)
+
+
+def _resolve(value: object) -> Path:
+    if not isinstance(value, str | Path) or not str(value):
+        raise problem(f"found {shown(value)}; the path of a log is wanted")
+    path = (folder_of(value) / Path(value).expanduser()).resolve()
+    if not path.exists():
+        raise problem(f"no such file or folder: {path}")
+    return path
+
+
+LogPath = Annotated[
+    Path,
+    BeforeValidator(_resolve),
+    PlainSerializer(str, when_used="json"),
+    WithJsonSchema(
+        {
+            "type": "string",
+            "description": "path of a log, relative to the file it is written in",
+            "x-quantity": "path",
+        }
+    ),
+]
+
+
+def _rooms(value: object) -> object:
+    """Let a room be written without a list."""
+    if isinstance(value, dict):
+        return {key: (v,) if isinstance(v, str) else v for key, v in value.items()}
+    return value
+
+
+RoomMap = Annotated[
+    dict[str, tuple[str, ...] | None],
+    BeforeValidator(_rooms),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "additionalProperties": {
+                "anyOf": [
+                    {"type": "string"},
+                    {"type": "array", "items": {"type": "string"}, "minItems": 1},
+                    {"type": "null"},
+                ]
+            },
+            "x-quantity": "mapping of labels to rooms",
+        }
+    ),
+]
+
+
+@register("behavior", "replay")
+class Replay(Behavior):
+    """Be where a log says that somebody was: a smart home's events, a script, or positions.
+
+    Where the log names a room the body is in it at that step, having left for it early enough.
+    What the log doesn't tell isn't made up: the body is away then, and events say `unknown` and
+    `known`.
+    """
+
+    path: LogPath = Field(description="the log, or the folder of a home's logs")
+    format: Layout = Field(default="auto", description="its layout; auto looks")
+    id: str | None = Field(default=None, description="the tag, where positions have several")
+    columns: dict[str, str] = Field(
+        default={}, description="the names of the columns of positions, as {x: east}"
+    )
+    time_zone: str | None = Field(
+        default=None, description="of the home, where positions have times of a zone"
+    )
+    sort: bool = Field(
+        default=False, description="sort lines whose time runs backwards; else they are refused"
+    )
+    frame: Frame = Field(default=Frame(), description="how positions lie in the floor plan")
+    rooms: RoomMap = Field(
+        default={},
+        description="which room or kind of room each room label of the log is here, or away, or"
+        " door; null leaves it out; labels that aren't listed go by their usual meaning",
+    )
+    day: int | Literal["date", "weekday"] = Field(
+        default=0,
+        description="which day of the log is the first of the run: a number from 0, its date, or"
+        " the first of the same weekday",
+    )
+    gaps: Literal["unknown", "hold", "walk"] = Field(
+        default="unknown",
+        description="what happens in a gap: nobody knows; or it stays and leaves in time; or it"
+        " goes at once",
+    )
+    gap: PositiveDuration | None = Field(
+        default=None,
+        description="silence longer than this is a gap; left out: 10 min between rooms, 1 min"
+        " between positions",
+    )
+    still: Duration = Field(
+        default=timedelta(hours=12),
+        description="silence in one room up to this is no gap: who sleeps trips no sensor",
+    )
+    reach: Length = Field(
+        default=1.0, ge=0, description="a position farther than this from free space is left out"
+    )
+    fastest: Speed = Field(
+        default=3.0, description="walks faster than this are reported as implausible [m/s]"
+    )
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files that it reads."""
+        return tuple(sorted(self.path.glob("*.txt"))) if self.path.is_dir() else (self.path,)
+
+    def start(self, actor: "Actor") -> None:
+        """Read the log, lay the way through it, and say what came of it in `notes`."""
+        self.visits: list[Visit] = []
+        try:
+            log = read_log(
+                self.path,
+                self.format,
+                id=self.id,
+                columns=self.columns,
+                time_zone=self.time_zone,
+                sort=self.sort,
+            )
+            begin_us = self._begin(log, actor)
+            if isinstance(log, ActivityLog):
+                self._start_rooms(actor, log, begin_us)
+            else:
+                self._start_fixes(actor, log, begin_us)
+        except LogError as error:
+            raise LogError(f"{actor.path}: {error}") from None
+
+    def decide(self, now: Situation) -> Plan:
+        """Follow the log to its end; later than at first, go where it has the body by then.
+
+        Positions have no time for that: the body is put where the log has it.
+        """
+        plan = now.plan()
+        if now.step == 0:
+            for note in self.notes:
+                plan.note("replay", note)
+        if isinstance(self.follower, FixFollower):
+            return self.follower.follow(plan)
+        here = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
+        return self.follower.follow(plan, here, rejoin=now.step > 0)
+
+    def _begin(self, log: ActivityLog | PositionLog, actor: "Actor") -> int:
+        """Return the moment of the log that is step 0 [us since its first midnight]."""
+        start = actor.clock.start
+        clock_us = micros(start - start.replace(hour=0, minute=0, second=0, microsecond=0))
+        day = self.day
+        if isinstance(day, str):
+            if log.first_day is None:
+                raise LogError(f"day: {day} needs a log with dates, and this one has none")
+            ahead = (start.date() - log.first_day).days
+            day = ahead if day == "date" else ahead % 7
+        if not 0 <= day < log.days:
+            raise LogError(
+                f"the run begins on day {day} of the log, which has the days 0 to {log.days - 1};"
+                " choose another by 'day'"
+            )
+        return day * DAY_US + clock_us
+
+    def _start_rooms(self, actor: "Actor", log: ActivityLog, begin_us: int) -> None:
+        mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)
+        clock = actor.clock
+        gap_us = micros(self.gap or GAP_OF_ROOMS)
+        rule = Rule(
+            step_us=clock.step_us,
+            begin_us=begin_us,
+            steps=clock.steps,
+            gap_us=gap_us,
+            still_us=micros(self.still),
+            unknown=self.gaps == "unknown",
+            door_us=gap_us,
+        )
+        told = visits_of(log, mapped, rule)
+        self.visits = told.visits
+        self.follower: RoomFollower | FixFollower = RoomFollower(
+            actor, self.visits, self.gaps == "walk", self.fastest
+        )
+        trial = self.follower.follow(Plan(actor, 0), 0, rejoin=False)
+        del trial  # laid to know the walks before the run; laid again when it begins
+        self.notes = report_rooms(log, mapped, told, rule, self.follower.paces, self.fastest)
+
+    def _start_fixes(self, actor: "Actor", log: PositionLog, begin_us: int) -> None:
+        if self.rooms:
+            raise LogError("a log of positions names no rooms: leave out 'rooms'")
+        clock = actor.clock
+        time_us = log.time_us - begin_us
+        step = time_us // clock.step_us
+        kept = np.append(True, step[1:] != step[:-1]) & (time_us < clock.steps * clock.step_us)
+        fixes = place_fixes(
+            actor,
+            time_us[kept],
+            self.frame.to_plan(log.xy[kept]),
+            self.frame.turned(log.heading[kept] / (2 * np.pi)),
+            self.reach,
+        )
+        gap_us = micros(self.gap or GAP_OF_FIXES)
+        self.follower = FixFollower(actor, fixes, gap_us, self.gaps, self.fastest)
+        self.follower.follow(Plan(actor, 0))
+        thinned = int(np.count_nonzero(step[1:] == step[:-1]))
+        self.notes = report_fixes(log, fixes, self.follower, thinned, self.frame)

@@ -1,0 +1,149 @@
+"""Room sampling: rooms drawn from a long-term distribution, each for a while."""
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.users.spots import Spot, Spots
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.problems import problem
+from fleet2d.routines.activity import AnyTakes, Takes
+from fleet2d.routines.laws import weighted
+from fleet2d.streams import Draws
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.floorplan.plan import Room
+
+AWAY = "away"
+SECOND_US = 1_000_000
+# How many visits are planned at once.
+VISITS = 20
+# A stay that the time of ways has used up still lasts this long.
+SHORTEST_US = 10 * SECOND_US
+# How finely the rooms along a way are told, in points per metre.
+POINTS_PER_M = 10
+MILLION = 1_000_000
+
+
+class Stop(NamedTuple):
+    """Where a visit goes: a room, or out of the home (None), and how likely."""
+
+    room: "Room | None"
+    chance: int
+
+
+@register("behavior", "room_sampling")
+class RoomSampling(Behavior):
+    """Be in each room for a given share of the time, in visits of random length.
+
+    A semi-Markov process: the next room is drawn by the shares (the present one, too: then one goes
+    to another spot of it), the stay there from the law of dwell times. Ways cost time in the rooms
+    that they lead through; that is taken off the next stays in those rooms, so that the time in
+    each of the given rooms, ways included, tends to its share of the time in all of them. Only the
+    time in rooms that are not given can't be made up for.
+    """
+
+    shares: dict[str, float] = Field(
+        min_length=1,
+        description="how much of the time is spent in each room or kind of room, or 'away';"
+        " relative to each other",
+        examples=[{"living_room": 0.4, "bedroom": 0.4, "kitchen": 0.2}],
+    )
+    dwell: AnyTakes = Field(
+        default=Takes(law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)),
+        description="how long a visit takes",
+    )
+
+    @model_validator(mode="after")
+    def _makes_a_distribution(self) -> Self:
+        for name, share in self.shares.items():
+            if share < 0:
+                raise problem(f"the share of {name} is {share:g}: a share is 0 or more")
+        if sum(self.shares.values()) <= 0:
+            raise problem("all shares are 0: give one room a share above that")
+        return self
+
+    def start(self, actor: "Actor") -> None:
+        """Find the rooms; those of a kind have equal parts of its share."""
+        total = sum(self.shares.values())
+        chances: dict[int | None, float] = {}
+        self.rooms: dict[int | None, Room | None] = {None: None}
+        for name, share in self.shares.items():
+            rooms: Sequence[Room | None] = [None] if name == AWAY else actor.rooms((name,))
+            for room in rooms:
+                index = None if room is None else room.index
+                self.rooms[index] = room
+                chances[index] = chances.get(index, 0.0) + share / total / len(rooms)
+        self.stops = [Stop(self.rooms[i], round(p * MILLION)) for i, p in chances.items()]
+        self.law = self.dwell.table()
+        self.spots = Spots(actor)
+        self.debt_us: dict[int, int] = dict.fromkeys((i for i in chances if i is not None), 0)
+        self.visits = 0
+
+    def decide(self, now: Situation) -> Plan:
+        """Plan the next visits."""
+        plan = now.plan()
+        for _ in range(VISITS):
+            draws = Draws(now.actor.stream("visit"), self.visits)
+            self.visits += 1
+            self._visit(now.actor, plan, draws)
+        return plan
+
+    def _visit(self, actor: "Actor", plan: Plan, draws: Draws) -> None:
+        stop = self.stops[weighted(draws, [stop.chance for stop in self.stops])]
+        dwell_us = self.law.draw(draws) * SECOND_US
+        if stop.room is None:
+            self._walk(actor, plan, Spot(*actor.way_out))
+            plan.leave_home().stay(timedelta(microseconds=dwell_us))
+            return
+        self._walk(actor, plan, draws.choice(self.spots.in_room(stop.room)))
+        owed = self.debt_us[stop.room.index]
+        stay_us = max(dwell_us - owed, SHORTEST_US)
+        self.debt_us[stop.room.index] = owed - (dwell_us - stay_us)
+        plan.stay(timedelta(microseconds=stay_us))
+
+    def _walk(self, actor: "Actor", plan: Plan, goal: Spot) -> None:
+        """Walk to a spot, and note how much of the time each room had on the way."""
+        start, began_us = (plan.x, plan.y), plan.time_us
+        if start == goal and not plan.away:
+            return
+        goal.walk(plan)
+        route = actor.space.route(start, tuple(goal))
+        if route is None:
+            return
+        took_us = plan.time_us - began_us
+        for room, share in _rooms_along(actor, route):
+            if room in self.debt_us:
+                self.debt_us[room] += int(took_us * share)
+
+
+def _rooms_along(actor: "Actor", route: NDArray[np.int64]) -> list[tuple[int, float]]:
+    """Return the rooms that a way leads through, by index, and the share of it in each."""
+    plan = actor.home.plan
+    legs = np.diff(route, axis=0).astype(np.float64)
+    lengths = np.sqrt(legs[:, 0] * legs[:, 0] + legs[:, 1] * legs[:, 1])
+    steps = np.maximum(lengths * (POINTS_PER_M / plan.lattice.units_per_m), 1).astype(np.int64)
+    points = []
+    for leg in range(len(legs)):
+        along = (np.arange(steps[leg]) + 0.5) / steps[leg]
+        points.append(route[leg] + along[:, None] * legs[leg])
+    cells = np.concatenate(points).astype(np.int64) // UNITS_PER_CELL
+    weight = np.repeat(lengths / steps, steps)
+    rooms = plan.room_of_place[cells[:, 1], cells[:, 0]]
+    total = np.cumsum(weight)[-1]
+    return (
+        [
+            (room, float(np.cumsum(weight[rooms == room])[-1] / total))
+            for room in np.unique(rooms).tolist()
+        ]
+        if total > 0
+        else []
+    )

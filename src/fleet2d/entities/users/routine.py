@@ -1,0 +1,111 @@
+"""Routine: days drawn from a persona, alone or in a household."""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import register
+from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
+from fleet2d.entities.users.spots import Spots
+from fleet2d.errors import PlacementError
+from fleet2d.problems import did_you_mean, problem
+from fleet2d.routines.activity import Activity, catalogue
+from fleet2d.routines.household import AnyHousehold, Lives
+from fleet2d.routines.life import Life
+from fleet2d.routines.periods import AWAY, AnyPeriod, without
+from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
+from fleet2d.routines.planner import DAY_S, Doing
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.place import Point, RoomChoice
+
+
+@register("behavior", "routine")
+class Routine(Inhabitant):
+    """Live by a persona: a day's activities with their times, durations, order and probability.
+
+    Every day is drawn anew and keeps all that the persona's template asks. An activity is done at
+    its furniture, else in its room; within it one turns, gets up and fetches things. Members of a
+    household have the persona that it gives them, and common appointments.
+    """
+
+    persona: AnyPersona | None = Field(
+        default=None,
+        description="who it is: a bundled name, a YAML file, or a mapping that may extend either;"
+        " left out: works_outside",
+    )
+    household: AnyHousehold | None = Field(
+        default=None,
+        description="who it lives with: a mapping or a YAML file, the same for all of its members",
+    )
+    away: tuple[AnyPeriod, ...] = Field(
+        default=(), description="when it is out of the home, on holiday"
+    )
+    visits: tuple[AnyPeriod, ...] = Field(
+        default=(), description="when it is there, if it is only a visitor"
+    )
+
+    @model_validator(mode="after")
+    def _is_one_person(self) -> Self:
+        if self.persona is not None and self.household is not None:
+            raise problem("a member of a household has the persona that the household gives it")
+        return self
+
+    def start(self, actor: "Actor") -> None:
+        """Set up its life, and find where its activities are done."""
+        self.name = actor.name
+        spots, sleeps_in, side = Spots(actor), None, (0, 1)
+        if self.household is None:
+            self.life = Life(self.who, actor.seed, actor.path)
+        else:
+            members = list(self.household.members)
+            if actor.name not in members:
+                raise PlacementError(
+                    f"{actor.path}: it is no member of its household"
+                    f"{did_you_mean(actor.name, members)} Its members are: {', '.join(members)}"
+                )
+            self.lives = Lives(self.household, actor.seed)
+            spots = Spots(actor, members.index(actor.name), len(members))
+            sleeps_in = self.household.bedrooms()[actor.name]
+            side = self.household.side_of_bed(actor.name)
+        actor.speed *= self.who.pace
+        self.settle(actor, self._activities(), spots, sleeps_in, side)
+
+    @property
+    def who(self) -> Persona:
+        """Its persona."""
+        if self.household is not None:
+            members = self.household.members
+            return members[getattr(self, "name", next(iter(members)))]
+        return self.persona or bundled_persona("works_outside")
+
+    def _activities(self) -> dict[str, Activity]:
+        used = {**self.who.used_activities, AWAY: catalogue()[AWAY]}
+        if self.household is not None:
+            joint = self.household.together
+            names = [fields.activity or name for name, fields in joint.items()]
+            used |= {name: self.who.activity(name) for name in names}
+        return used
+
+    def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
+        """Return where one likely is at that time."""
+        likely, today = Life(self.who, 0, "").day, time.toordinal()
+        time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
+        if time_s < likely(today)[0].begin:
+            today, time_s = today - 1, time_s + DAY_S
+        return rooms_at(self._there(likely(today), today), time_s, self._activities())
+
+    def day(self, ordinal: int) -> Sequence[Doing]:
+        """Return what is done on the day of a date's ordinal."""
+        if self.household is None:
+            return self._there(self.life.day(ordinal), ordinal)
+        return self._there(self.lives.day(ordinal)[self.name], ordinal)
+
+    def _there(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+        away = self.away if self.household is None else (*self.away, *self.household.away)
+        if not away and not self.visits:
+            return day
+        return without(day, datetime.fromordinal(ordinal), away, self.visits)

@@ -1,0 +1,118 @@
+"""Spots: where people are in a room, so that two of a household are never in the same."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.plan import Plan
+    from fleet2d.floorplan.plan import Room
+
+T = TypeVar("T")
+
+# Between two spots [m]: two bodies of the usual radius of 0.2 m stand clear of each other.
+SPACING = 0.6
+
+
+class Spot(NamedTuple):
+    """A place to stand: a lattice point."""
+
+    x: int
+    y: int
+
+    def walk(self, plan: "Plan") -> None:
+        """Go there."""
+        if plan.away or (plan.x, plan.y) != (self.x, self.y):
+            plan.go_to_point(self.x, self.y)
+
+
+class Seat(NamedTuple):
+    """A place at a piece of furniture: its name, and the number of the place."""
+
+    thing: str
+    place: int
+
+    def walk(self, plan: "Plan") -> None:
+        """Go there and use it."""
+        plan.use(self.thing, self.place)
+
+
+class Spots:
+    """The spots of one body.
+
+    The spots of a room are a grid. The members of a household share them out by their rank: spot i
+    is that of member i modulo their number, so two of them never stand on the same, and nobody has
+    to know where the others are. So with the places at furniture. Where a room has fewer spots than
+    the household has members, they share.
+
+    Attributes:
+        rank: Which member of its household the body is.
+        members: How many there are.
+    """
+
+    def __init__(self, actor: "Actor", rank: int = 0, members: int = 1) -> None:
+        self.rank = rank
+        self.members = members
+        self._actor = actor
+        self._of_room: dict[int, list[Spot]] = {}
+        self._version = -1  # of the home that the spots were found in
+
+    def in_room(self, room: "Room") -> list[Spot]:
+        """Return the body's own spots of a room as it is at present, at least one."""
+        if self._version != self._actor.home.version:  # furniture was moved, a door was shut
+            self._version = self._actor.home.version
+            self._of_room.clear()
+        if room.index not in self._of_room:
+            self._of_room[room.index] = _shared(self._grid(room), self.rank, self.members)
+        return self._of_room[room.index]
+
+    def at_furniture(
+        self,
+        kinds: Sequence[str],
+        rooms: Sequence["Room"],
+        posture: str,
+        share: tuple[int, int] | None = None,
+    ) -> list[Seat]:
+        """Return the body's own places at the furniture in some rooms.
+
+        Of the types given, the first that is there is used, and the next ones as well while it has
+        fewer places than there are bodies to share them.
+
+        Args:
+            kinds: Types of furniture, to try in turn.
+            rooms: Where.
+            posture: Of the places of a piece, those for this posture, if it has any.
+            share: Which of how many bodies it is that use it; None: as in its household.
+        """
+        home, indices = self._actor.home, {room.index for room in rooms}
+        rank, members = share or (self.rank, self.members)
+        seats: list[Seat] = []
+        for kind in kinds:
+            for thing in (thing for thing in home.objects if thing.type == kind):
+                centre = thing.footprint.centroid
+                room = home.plan.room_at(centre.x, centre.y)
+                if room is not None and room.index in indices:
+                    fit = [i for i, use in enumerate(thing.uses) if use.posture == posture]
+                    seats += [Seat(thing.name, i) for i in fit or range(len(thing.uses))]
+            if len(seats) >= members:
+                break
+        return _shared(seats, rank, members) if seats else []
+
+    def _grid(self, room: "Room") -> list[Spot]:
+        """Return the spots of a room: a grid of cells, a tighter one in a small room."""
+        actor, lattice = self._actor, self._actor.home.plan.lattice
+        cells = actor.space.cells(room.index, actor.part)
+        pitch = math.ceil(SPACING / lattice.cell)
+        while pitch:
+            half = pitch // 2
+            on_grid = cells[(cells[:, 0] % pitch == half) & (cells[:, 1] % pitch == half)]
+            if len(on_grid) >= self.members:
+                return [Spot(*lattice.cell_centre(row, column)) for row, column in on_grid.tolist()]
+            pitch = half
+        return [Spot(*actor.middle(room))]
+
+
+def _shared(things: list[T], rank: int, members: int) -> list[T]:
+    """Return the part of one of several who share things, at least one."""
+    return things[rank % members :: members] or [things[rank % len(things)]]

@@ -1,0 +1,102 @@
+"""The command `fleet2d fit`: what it prints and writes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from fleet2d.fit.validate import Validation
+
+fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
+
+# So that `fleet2d fit` keeps its subcommands when there is one of them only.
+fitting.callback()(lambda: None)
+
+ROWS = ("the persona", "a first-order Markov chain", "the days they were fitted on")
+
+
+@fitting.command()
+def routine(
+    log: Annotated[Path, typer.Argument(help="A log of rooms and activities, or its folder.")],
+    out: Annotated[Path, typer.Option(help="The persona to write.")] = Path("persona.yaml"),
+    layout: Annotated[
+        str, typer.Option("--format", help="casas, uci_adl, homer; auto looks.")
+    ] = "auto",
+    picture: Annotated[
+        Path | None, typer.Option(help="Picture of the fit to write, .png or .svg.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="The seed of the sampled days.")] = 0,
+    sort: Annotated[bool, typer.Option(help="Sort lines whose time runs backwards.")] = False,
+) -> None:
+    """Learn a persona from a log, and say how well its days match days held back."""
+    for line in fit_routine(log, out, layout, picture, seed, sort=sort):
+        typer.echo(line)
+
+
+def fit_routine(
+    path: Path,
+    out: Path,
+    layout: str = "auto",
+    picture: Path | None = None,
+    seed: int = 0,
+    *,
+    sort: bool = False,
+) -> list[str]:
+    """Fit a persona to a log, write it, and return what to say about it.
+
+    Args:
+        path: The log.
+        out: The persona's file.
+        layout: The log's layout; "auto" looks.
+        picture: Where to draw how it compares with the log; None: nowhere.
+        seed: Of the days that are sampled to compare.
+        sort: Sort lines of the log whose time runs backwards.
+
+    Raises:
+        LogError: The log can't be read, is of positions, or has too few days.
+    """
+    from fleet2d.fit.days import find_days
+    from fleet2d.fit.persona import fit_persona, to_yaml
+    from fleet2d.fit.timeline import read_timeline
+    from fleet2d.fit.validate import validate
+    from fleet2d.logs.log import ActivityLog, LogError
+    from fleet2d.logs.read import read_log
+
+    if layout not in ("auto", "casas", "uci_adl", "homer"):
+        raise LogError(f"--format is {layout!r}; a log to fit is casas, uci_adl or homer")
+    log = read_log(path, layout, sort=sort)  # type: ignore[arg-type]
+    if not isinstance(log, ActivityLog):
+        raise LogError(f"{path} is a log of positions; a persona is fitted to one of rooms")
+    timeline = read_timeline(log)
+    days = find_days(timeline)
+    validation = validate(timeline, seed=seed)
+    fitted = fit_persona(timeline, days, f"fitted to {len(days)} days of {log.path.name}")
+    try:
+        out.write_text(to_yaml(fitted.document), encoding="utf-8")
+    except OSError as error:
+        raise LogError(f"{out} can't be written: {error.strerror}") from error
+    lines = [f"note: {note}" for note in (*log.notes, *fitted.notes)]
+    lines += table(validation)
+    if picture is not None:
+        from fleet2d.fit.picture import draw_fit
+
+        draw_fit(timeline, days, fitted, picture, seed)
+        lines.append(str(picture))
+    return [*lines, str(out)]
+
+
+def table(validation: "Validation") -> list[str]:
+    """Return the distances of a validation as lines of text."""
+    lines = [
+        f"{validation.days} days, held back {validation.folds} parts in turn; how far from them are"
+        " days sampled from a model fitted to the others:",
+        f"{'':30}{'time shares':>12}{'by hour':>10}{'stays KS':>10}{'stays [min]':>12}",
+    ]
+    for what, found in (("rooms", validation.rooms), ("activities", validation.activities)):
+        lines.append(what)
+        lines += [
+            f"  {name:28}{d.share:12.3f}{d.hours:10.3f}{d.ks:10.3f}{d.stay_min:12.1f}"
+            for name, d in zip(ROWS, found, strict=True)
+        ]
+    return lines

@@ -1,0 +1,77 @@
+"""Days drawn from a fitted persona and from a Markov chain, as minutes."""
+
+from datetime import date
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.fit.persona import Fitted
+from fleet2d.fit.timeline import DAY_S, I16, MINUTES, Timeline
+from fleet2d.routines.activity import Activity, seconds
+from fleet2d.routines.laws import KNOTS, exponential
+from fleet2d.routines.life import Life
+from fleet2d.routines.planner import Doing
+from fleet2d.streams import Draws, stream_key
+
+# The Monday on which the first sampled day is.
+MONDAY = date(2017, 1, 2).toordinal()
+
+
+def sample_persona(fitted: Fitted, timeline: Timeline, days: int, seed: int = 0) -> tuple[I16, I16]:
+    """Return the states and the places of days that a persona lives, int16 (days, 1440) each."""
+    life = Life(fitted.persona, seed, "fit")
+    key = stream_key(seed, "fit", "up at night")
+    places = timeline.places
+    place_of = {n: places.index(timeline.states[s].place) for n, s in fitted.states.items()}
+    states = np.zeros((days + 2) * DAY_S, np.int16)
+    rooms = np.zeros((days + 2) * DAY_S, np.int16)
+    for day in range(days + 1):  # the first night is of the day before the first
+        ordinal = MONDAY - 1 + day
+        for i, doing in enumerate(life.day(ordinal)):
+            begin, end = day * DAY_S + doing.begin, day * DAY_S + doing.end
+            states[begin:end] = fitted.states[doing.activity]
+            rooms[begin:end] = place_of[doing.activity]
+            activity = fitted.persona.activity(doing.activity)
+            if activity.fetches is not None and activity.fetches_from[0] in places:
+                there = places.index(activity.fetches_from[0])
+                for first, last in _fetches(activity, doing, Draws(key, ordinal * 1024 + i)):
+                    rooms[day * DAY_S + first : day * DAY_S + last] = there
+    sample = slice(DAY_S + 30, (days + 1) * DAY_S + 30, 60)  # the middles of the minutes
+    return states[sample].reshape(-1, MINUTES), rooms[sample].reshape(-1, MINUTES)
+
+
+def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, int]]:
+    """Return when somebody is up for something while doing it [s], as an inhabitant is."""
+    assert activity.fetches is not None
+    wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
+    times = []
+    now = doing.begin + wait.knots[draws.below(KNOTS)]
+    while now < doing.end:
+        over = now + takes.draw(draws)
+        if over < doing.end:
+            times.append((now, over))
+        now = over + wait.knots[draws.below(KNOTS)]
+    return times
+
+
+def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
+    """Return days of the first-order Markov chain of some days' minutes, int16 (days, 1440).
+
+    The chain that is most likely given them: of each label, how often which follows in the next
+    minute. It begins each run of days at a label drawn from how often there is each.
+    """
+    follows = np.zeros((count, count), np.int64)
+    known = (labels[:, :-1] >= 0) & (labels[:, 1:] >= 0)
+    np.add.at(follows, (labels[:, :-1][known], labels[:, 1:][known]), 1)
+    share = np.bincount(labels[labels >= 0], minlength=count)
+    for label in range(count):
+        if not follows[label].any():
+            follows[label] = share
+    limits: NDArray[np.int64] = follows.cumsum(axis=1)
+    draws = Draws(stream_key(seed, "fit", "markov"), 0)
+    out = np.empty(days * MINUTES, np.int16)
+    at = int(np.searchsorted(share.cumsum(), draws.below(int(share.sum())), side="right"))
+    for minute in range(len(out)):
+        out[minute] = at
+        at = int(np.searchsorted(limits[at], draws.below(int(limits[at, -1])), side="right"))
+    return out.reshape(-1, MINUTES)

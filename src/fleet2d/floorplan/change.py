@@ -1,0 +1,128 @@
+"""Changes of a home: what a scenario, an algorithm or a script may do to it during a run."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import date, datetime, timedelta
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.problems import problem
+from fleet2d.units import format_duration, parse_duration
+
+VERBS = ("open", "shut", "lock", "unlock", "move", "room")
+Point = tuple[float, float]
+
+
+def _moment(value: Any) -> datetime | timedelta:
+    moment = _local_time(value)
+    if moment is None:
+        return parse_duration(value)
+    if moment.tzinfo is not None:
+        raise problem("the clock on the home's wall is wanted, without a time zone")
+    return moment
+
+
+def _local_time(value: Any) -> datetime | None:
+    """Return a date and time, or None where the value is none."""
+    if isinstance(value, datetime):
+        return value
+    if isinstance(value, date):
+        return datetime(value.year, value.month, value.day)
+    try:
+        return datetime.fromisoformat(value) if isinstance(value, str) else None
+    except ValueError:
+        return None
+
+
+def _written(moment: datetime | timedelta) -> str:
+    return moment.isoformat() if isinstance(moment, datetime) else format_duration(moment)
+
+
+Moment = Annotated[
+    datetime | timedelta,
+    BeforeValidator(_moment),
+    PlainSerializer(_written),
+    WithJsonSchema(
+        {
+            "description": "a local time like 2026-01-07T14:00, or the time since the start like"
+            " '2 d 14 h'",
+            "type": ["string", "number", "object"],
+            "examples": ["2026-01-07T14:00", "2 d"],
+        }
+    ),
+]
+
+
+class HomeChange(Settings):
+    """One change of the home: exactly one of open, shut, lock, unlock, move and room.
+
+    Example:
+        >>> HomeChange(shut="bath_door").verb
+        'shut'
+        >>> HomeChange(at="2 d", room="office_0", type="bedroom").at
+        datetime.timedelta(days=2)
+    """
+
+    at: Moment | None = Field(
+        default=None, description="when; left out in what an algorithm or a script asks for: now"
+    )
+    open: str | None = Field(default=None, description="the door that is opened")
+    shut: str | None = Field(default=None, description="the door that is shut")
+    lock: str | None = Field(default=None, description="the door that is locked")
+    unlock: str | None = Field(default=None, description="the door that is unlocked")
+    move: str | None = Field(default=None, description="the piece of furniture that is moved")
+    to: Point | None = Field(
+        default=None, description="where its middle comes to stand, [x, y] in metres"
+    )
+    turn_deg: float = Field(
+        default=0.0, description="how far it is turned, counter-clockwise", ge=-3600, le=3600
+    )
+    room: str | None = Field(default=None, description="the room whose use changes")
+    type: str | None = Field(default=None, description="what the room is used for from then on")
+
+    @model_validator(mode="after")
+    def _is_one_change(self) -> Self:
+        verbs = [verb for verb in VERBS if getattr(self, verb) is not None]
+        if len(verbs) != 1:
+            found = " and ".join(verbs) or "nothing"
+            raise problem(f"{found} is given: one of {', '.join(VERBS)} is wanted")
+        for verb, further in (("move", "to"), ("room", "type")):
+            if (verbs[0] == verb) != (getattr(self, further) is not None):
+                raise problem(f"'{verb}' and '{further}' go together")
+        return self
+
+    @property
+    def verb(self) -> str:
+        """Which change it is."""
+        return next(verb for verb in VERBS if getattr(self, verb) is not None)
+
+    @property
+    def target(self) -> str:
+        """The name of what changes."""
+        return str(getattr(self, self.verb))
+
+
+@dataclass(frozen=True)
+class HomeChanges:
+    """What an algorithm puts out to change the home from the next step on.
+
+    Example:
+        >>> output = HomeChanges([HomeChange(shut="bath_door")])
+        >>> output.to_columns()["target"].tolist()
+        ['bath_door']
+    """
+
+    changes: tuple[HomeChange, ...]
+
+    def __init__(self, changes: Iterable[HomeChange]) -> None:
+        object.__setattr__(self, "changes", tuple(changes))
+
+    def to_columns(self) -> dict[str, np.ndarray[Any, Any]]:
+        """Return the changes as columns of a table."""
+        return {
+            "change": np.array([change.verb for change in self.changes], object),
+            "target": np.array([change.target for change in self.changes], object),
+        }

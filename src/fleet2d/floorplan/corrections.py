@@ -1,0 +1,167 @@
+"""Names and types of rooms that a scenario gives, or puts right."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+from shapely import MultiPolygon, Polygon
+
+from fleet2d.component import Settings
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.adjacency import doorway_segments
+from fleet2d.floorplan.doorways import DoorLine, name_doorways
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.regions import LabelledRegion, Region, cells_in, snap_regions
+from fleet2d.floorplan.rooms import Room, beside_rooms, make_rooms
+from fleet2d.floorplan.vocabulary import usual_type
+from fleet2d.problems import problem
+from fleet2d.units import Length
+
+
+class RoomCorrection(Settings):
+    """A room that is named or retyped, by a place in it, or drawn anew, by its corners.
+
+    Example:
+        >>> RoomCorrection(at=(2, 1), type="Kitchen").type
+        'Kitchen'
+    """
+
+    at: tuple[Length, Length] | None = Field(
+        default=None, description="a place in the room [x, y] [m]", examples=[[2.5, 1.0]]
+    )
+    polygon: tuple[tuple[Length, Length], ...] | None = Field(
+        default=None,
+        description="corners of a room that takes this space from others",
+        examples=[[[0, 0], [4, 0], [4, 3]]],
+    )
+    name: str | None = Field(
+        default=None, min_length=1, description="its name; left out: as it is, or by its type"
+    )
+    type: str | None = Field(
+        default=None, min_length=1, description="what it is used for; left out: as it is, or room"
+    )
+
+    @model_validator(mode="after")
+    def _says_where_and_what(self) -> Self:
+        if (self.at is None) == (self.polygon is None):
+            raise problem("a room needs either at, a place in it, or polygon, its corners")
+        if self.at is not None and self.name is None and self.type is None:
+            raise problem("a room at a place needs a name or a type to give it")
+        if self.polygon is not None and not _shape(self.polygon).is_valid:
+            raise problem("polygon is no sound outline: at least 3 corners, and no crossing sides")
+        return self
+
+
+def corrected(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
+    """Return a plan with rooms named, retyped and drawn anew.
+
+    Later corrections see what earlier ones made. A room without a cell left is none any more.
+
+    Args:
+        plan: The plan.
+        corrections: In the order of the scenario.
+
+    Raises:
+        FloorPlanError: A place is in no room, a polygon holds no free cell, or two rooms would
+            have one name.
+    """
+    if not corrections:
+        return plan
+    regions = [_as_region(room) for room in plan.rooms]
+    painted = plan.room_of_cell.astype(np.int64)
+    for number, correction in enumerate(corrections):
+        where = f"floorplan.rooms[{number}]"
+        if correction.polygon is not None:
+            painted = _drawn(plan, painted, correction, len(regions), where)
+            types = (usual_type(correction.type),) if correction.type else ()
+            regions.append(Region(types, Polygon(), correction.name, None if types else "room"))
+        else:
+            index = _found(plan, painted, correction, where)
+            regions[index] = _retyped(regions[index], correction)
+    room_of_cell, rooms = make_rooms(plan.lattice, painted, regions)
+    room_of_cell.setflags(write=False)
+    segments = doorway_segments(plan.lattice, plan.doorways)
+    return replace(
+        plan,
+        room_of_cell=room_of_cell,
+        rooms=rooms,
+        doorways=name_doorways(
+            plan.lattice,
+            beside_rooms(room_of_cell),
+            [room.name for room in rooms],
+            [(line, segments[k]) for k, line in enumerate(_lines(plan))],
+        ),
+    )
+
+
+def _shape(corners: Sequence[tuple[float, float]]) -> Polygon:
+    return Polygon(corners) if len(corners) >= 3 else Polygon([(0, 0), (1, 1), (0, 0)])
+
+
+def _sound(shape: Polygon | MultiPolygon) -> MultiPolygon:
+    """Return a shape that may cross itself since it was rounded, as polygons that don't."""
+    parts = shapely.get_parts(shapely.make_valid(shape))
+    return MultiPolygon([part for part in parts if part.geom_type == "Polygon"])
+
+
+def _as_region(room: Room) -> Region:
+    return Region(room.labels, Polygon(), room.name, room.type)
+
+
+def _retyped(region: Region, correction: RoomCorrection) -> Region:
+    """Return a region with another name or type; one that is named by its type is renamed."""
+    if correction.type is None:
+        return replace(region, name=correction.name)
+    kind = usual_type(correction.type)
+    numbered = region.name is not None and region.name.rpartition("_")[0] == region.type
+    name = correction.name or (None if numbered and kind != region.type else region.name)
+    return Region((kind,), region.shape, name, kind)
+
+
+def _found(
+    plan: FloorPlan, painted: NDArray[np.int64], correction: RoomCorrection, where: str
+) -> int:
+    """Return the number of the region that holds a place."""
+    x, y = correction.at or (0.0, 0.0)
+    row, column = plan.lattice.cell_of(*plan.lattice.to_lattice((x, y)).tolist())
+    if 0 <= row < plan.lattice.rows and 0 <= column < plan.lattice.columns:
+        index = int(beside_rooms(painted.astype(np.int16))[row, column])
+        if index >= 0:
+            return index
+    near_x, near_y = plan.nearest_free(x, y)
+    raise FloorPlanError(
+        f"{where}: ({x:g}, {y:g}) m is in no room of {plan.name}: the nearest free place is"
+        f" ({near_x:.2f}, {near_y:.2f}) m"
+    )
+
+
+def _drawn(
+    plan: FloorPlan, painted: NDArray[np.int64], correction: RoomCorrection, index: int, where: str
+) -> NDArray[np.int64]:
+    """Return the regions of the cells, those inside the polygon with a new number."""
+    shape = _shape(correction.polygon or ())
+    (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
+    patch = cells_in(plan.free, _sound(region.shape))
+    if patch.cells == 0:
+        x0, y0, x1, y1 = shape.bounds
+        raise FloorPlanError(
+            f"{where}: no free cell of {plan.name} is inside the polygon from ({x0:g}, {y0:g}) to"
+            f" ({x1:g}, {y1:g}) m"
+        )
+    out = painted.copy()
+    out[patch.window][patch.mask] = index
+    return out
+
+
+def _lines(plan: FloorPlan) -> list[DoorLine]:
+    """Return the doorways as lines; those that are named after rooms are to be named again."""
+    lines = []
+    for doorway in plan.doorways:
+        joined = "-".join(plan.rooms[room].name for room in doorway.rooms)
+        own = None if doorway.name.startswith(joined) else doorway.name
+        lines.append(DoorLine(doorway.start, doorway.end, own, doorway.leaf))
+    return lines

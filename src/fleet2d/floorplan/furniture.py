@@ -1,0 +1,195 @@
+"""The furniture catalogue: how large each type is, what it blocks, and where to use it from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from shapely import Polygon
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.objects import Blocks, PlacedObject, Point, Posture, UsePlace
+from fleet2d.kernels.headings import QUARTER, TURN, UNIT, cosine, in_radians, sine
+from fleet2d.problems import did_you_mean
+
+Range = tuple[float, float]
+
+LEFT, BACK, RIGHT = QUARTER, 2 * QUARTER, -QUARTER
+
+
+@dataclass(frozen=True)
+class Use:
+    """A place to use a type of furniture from, relative to the piece.
+
+    A piece faces `ahead`; `left` is a quarter turn counter-clockwise from there.
+
+    Attributes:
+        posture: Whether one stands, sits or lies there.
+        ahead: Share of the depth in front of the middle: -0.5 is the back, 0.5 the front.
+        left: Share of the width to the left of the middle: 0.5 is the left side.
+        ahead_m: And so many metres further ahead.
+        left_m: And so many metres further to the left.
+        facing: Where the person faces, headings (4096 to a turn) from where the piece faces.
+    """
+
+    posture: Posture
+    ahead: float = 0.0
+    left: float = 0.0
+    ahead_m: float = 0.0
+    left_m: float = 0.0
+    facing: int = 0
+
+
+@dataclass(frozen=True)
+class Furniture:
+    """A type of furniture.
+
+    Attributes:
+        type: Its name, as scenarios and files spell it.
+        width: How wide it is from left to right, least and most [m].
+        depth: How deep it is from back to front, least and most [m].
+        blocks: What can't pass: nothing, bodies (`path`), or bodies and sight (`sight`).
+        wall: Whether its back stands against a wall.
+        front_m: How much floor is kept free before it [m].
+        uses: Where to use it from.
+    """
+
+    type: str
+    width: Range
+    depth: Range
+    blocks: Blocks
+    wall: bool
+    front_m: float
+    uses: tuple[Use, ...] = ()
+
+
+# Someone who stands before a thing: a body's radius and a hand's breadth away, facing it.
+_STAND = (Use("stand", ahead=0.5, ahead_m=0.35, facing=BACK),)
+_WATCH = (Use("stand", ahead=0.5, ahead_m=1.0, facing=BACK),)
+_INSIDE = (Use("stand"),)
+_SIT = (Use("sit"),)
+_AT_DESK = (Use("sit", ahead=0.5, ahead_m=0.25, facing=BACK),)
+_BESIDE = (
+    Use("stand", ahead=0.1, left=0.5, left_m=0.35, facing=RIGHT),
+    Use("stand", ahead=0.1, left=-0.5, left_m=-0.35, facing=LEFT),
+)
+_AT_TABLE = (
+    Use("sit", ahead=0.5, left=0.3, ahead_m=0.25, facing=BACK),
+    Use("sit", ahead=0.5, left=-0.3, ahead_m=0.25, facing=BACK),
+    Use("sit", ahead=-0.5, left=0.3, ahead_m=-0.25),
+    Use("sit", ahead=-0.5, left=-0.3, ahead_m=-0.25),
+)
+_SEATS_3 = (Use("sit"), Use("sit", left=0.3), Use("sit", left=-0.3))
+_SINGLE_BED = (Use("lie"), *_BESIDE)
+_DOUBLE_BED = (Use("lie", left=0.25), Use("lie", left=-0.25), *_BESIDE)
+_IN_TUB = (Use("lie", facing=LEFT),)
+
+# fmt: off
+_CATALOGUE = (
+    #         type              width         depth         blocks     wall  front uses
+    Furniture("bed",            (1.40, 1.80), (2.00, 2.10), "path",    True,  0.0, _DOUBLE_BED),
+    Furniture("single_bed",     (0.80, 1.00), (1.90, 2.05), "path",    True,  0.0, _SINGLE_BED),
+    Furniture("nightstand",     (0.40, 0.50), (0.35, 0.45), "path",    True,  0.0, _STAND),
+    Furniture("wardrobe",       (1.00, 2.00), (0.60, 0.65), "sight",   True,  0.6, _STAND),
+    Furniture("dresser",        (0.80, 1.40), (0.45, 0.50), "path",    True,  0.6, _STAND),
+    Furniture("bookshelf",      (0.80, 1.20), (0.30, 0.40), "sight",   True,  0.6, _STAND),
+    Furniture("shelf",          (0.80, 1.60), (0.40, 0.50), "sight",   True,  0.6, _STAND),
+    Furniture("desk",           (1.20, 1.60), (0.60, 0.80), "path",    True,  0.0, _AT_DESK),
+    Furniture("chair",          (0.45, 0.50), (0.45, 0.50), "path",    False, 0.0, _SIT),
+    Furniture("table",          (1.20, 2.00), (0.80, 1.00), "path",    False, 0.0, _AT_TABLE),
+    Furniture("sofa",           (1.60, 2.40), (0.85, 0.95), "path",    True,  0.4, _SEATS_3),
+    Furniture("armchair",       (0.80, 0.90), (0.80, 0.90), "path",    False, 0.3, _SIT),
+    Furniture("coffee_table",   (0.80, 1.20), (0.50, 0.60), "path",    False, 0.0),
+    Furniture("tv",             (1.20, 1.60), (0.35, 0.45), "path",    True,  0.6, _WATCH),
+    Furniture("stove",          (0.60, 0.60), (0.60, 0.60), "path",    True,  0.9, _STAND),
+    Furniture("fridge",         (0.60, 0.70), (0.60, 0.65), "sight",   True,  0.9, _STAND),
+    Furniture("sink",           (0.60, 0.80), (0.60, 0.60), "path",    True,  0.9, _STAND),
+    Furniture("kitchen_counter",(0.40, 1.20), (0.60, 0.60), "path",    True,  0.9, _STAND),
+    Furniture("toilet",         (0.40, 0.50), (0.60, 0.70), "path",    True,  0.5, _SIT),
+    Furniture("washbasin",      (0.45, 0.60), (0.40, 0.50), "path",    True,  0.5, _STAND),
+    Furniture("shower",         (0.80, 0.90), (0.80, 0.90), "nothing", True,  0.4, _INSIDE),
+    Furniture("bathtub",        (1.60, 1.70), (0.70, 0.75), "path",    True,  0.5, _IN_TUB),
+    Furniture("washing_machine",(0.60, 0.60), (0.60, 0.60), "path",    True,  0.6, _STAND),
+    Furniture("shoe_rack",      (0.60, 0.90), (0.25, 0.35), "path",    True,  0.5, _STAND),
+    Furniture("bench",          (1.00, 1.40), (0.40, 0.50), "path",    True,  0.5, _SIT),
+    Furniture("workbench",      (1.40, 2.00), (0.60, 0.70), "path",    True,  0.8, _STAND),
+    Furniture("treadmill",      (0.80, 0.90), (1.70, 1.90), "path",    False, 0.4, _STAND),
+    Furniture("rug",            (1.20, 2.00), (1.20, 1.60), "nothing", False, 0.0),
+    Furniture("charger",        (0.25, 0.35), (0.20, 0.25), "nothing", True,  0.6, _STAND),
+)
+# fmt: on
+
+FURNITURE = MappingProxyType({furniture.type: furniture for furniture in _CATALOGUE})
+"""Every type of furniture by name."""
+
+
+def furniture_type(name: str) -> Furniture:
+    """Return a type of furniture by its name.
+
+    Raises:
+        FloorPlanError: There is no such type.
+
+    Example:
+        >>> furniture_type("sofa").blocks, furniture_type("fridge").blocks
+        ('path', 'sight')
+    """
+    if name not in FURNITURE:
+        raise FloorPlanError(
+            f"there is no furniture of type {name!r}{did_you_mean(name, FURNITURE)}"
+            f" Known types: {', '.join(sorted(FURNITURE))}"
+        )
+    return FURNITURE[name]
+
+
+def stand_furniture(
+    kind: str,
+    at: Point,
+    heading: int = QUARTER,
+    size: Sequence[float] | None = None,
+    *,
+    name: str = "",
+    blocks: Blocks | None = None,
+) -> PlacedObject:
+    """Return a piece of furniture at a place, with the places to use it from.
+
+    Args:
+        kind: Its type in the catalogue.
+        at: The middle of its footprint (x, y) [m].
+        heading: Where its front faces, headings (4096 to a turn) counter-clockwise from +x.
+        size: Its width and depth [m]; None for the middle of what is usual.
+        name: Its name; empty to be numbered by type.
+        blocks: What can't pass; None for what is usual.
+
+    Raises:
+        FloorPlanError: There is no such type.
+
+    Example:
+        >>> bed = stand_furniture("single_bed", (2.0, 3.0), size=(1.0, 2.0))
+        >>> bed.footprint.bounds, [use.posture for use in bed.uses]
+        ((1.5, 2.0, 2.5, 4.0), ['lie', 'stand', 'stand'])
+    """
+    model = furniture_type(kind)
+    width, depth = size if size is not None else (sum(model.width) / 2, sum(model.depth) / 2)
+    # The unit vectors are from a table: the same place on every machine.
+    forward = (cosine(heading) / UNIT, sine(heading) / UNIT)
+
+    def moved(ahead: float, left: float) -> Point:
+        return (
+            at[0] + ahead * forward[0] - left * forward[1],
+            at[1] + ahead * forward[1] + left * forward[0],
+        )
+
+    ahead, left = depth / 2, width / 2
+    corners = [moved(-ahead, left), moved(-ahead, -left), moved(ahead, -left), moved(ahead, left)]
+    uses = []
+    for use in model.uses:
+        x, y = moved(use.ahead * depth + use.ahead_m, use.left * width + use.left_m)
+        facing = float(in_radians((heading + use.facing) % TURN))
+        uses.append(UsePlace(x, y, facing, use.posture))
+    return PlacedObject(
+        name=name,
+        type=kind,
+        footprint=Polygon(corners),
+        blocks=model.blocks if blocks is None else blocks,
+        uses=tuple(uses),
+        heading=float(in_radians(heading % TURN)),
+    )

@@ -1,0 +1,267 @@
+"""Layers: named arrays with a value for each cell, which entities and algorithms read and write."""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from datetime import timedelta
+from typing import Any, Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.errors import ComponentError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.problems import did_you_mean, problem_at
+from fleet2d.units import PositiveDuration
+
+LayerType = Literal[
+    "bool", "int", "float", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
+    "float32", "float64",
+]  # fmt: skip
+
+SEEN_LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")
+"""Layers that a run keeps for each robot with a camera, as NAME.ROBOT."""
+COSTMAP = "costmap"
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*(\.[A-Za-z][A-Za-z0-9_-]*)?")
+
+
+class LayerSettings(Settings):
+    """A layer of the floor plan: what its cells hold, and when it is stored."""
+
+    dtype: LayerType = Field(default="float", description="what a cell holds")
+    fill: float = Field(default=0.0, description="what every cell holds at first")
+    unit: str = Field(default="", description="unit of the values")
+    description: str = Field(default="", description="one line for a reader of the file")
+    store: bool = Field(default=True, description="whether a run stores it at its end")
+    every: PositiveDuration | None = Field(
+        default=None, description="how often it is stored besides; null: only at the end"
+    )
+
+    @model_validator(mode="after")
+    def _fill_fits(self) -> Self:
+        if not holds(np.dtype(self.dtype), self.fill):
+            raise problem_at(("fill",), f"found {self.fill:g}, which no {self.dtype} can be")
+        if self.every is not None and not self.store:
+            raise problem_at(("every",), "the layer isn't stored: leave out 'every' or 'store'")
+        return self
+
+
+def check_layers(layers: dict[str, LayerSettings]) -> dict[str, LayerSettings]:
+    """Refuse names that no layer can have, and settings that a layer of the run's own has not."""
+    for name, settings in layers.items():
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
+            raise problem_at(
+                (name,), f"the name {name!r} must be letters, digits, '_' and '-', a letter first"
+            )
+        if name in (*SEEN_LAYERS, COSTMAP):
+            for key, value in LayerSettings():
+                if key in ("store", "every") or getattr(settings, key) == value:
+                    continue  # a stored scenario has all keys
+                raise problem_at(
+                    (name, key), f"{name} is a layer that the run keeps itself: leave out {key!r}"
+                )
+    return layers
+
+
+def holds(dtype: np.dtype[Any], value: float) -> bool:
+    """Return whether an array of a type can hold a number exactly (floats: about)."""
+    if dtype.kind == "f":
+        return math.isnan(value) or abs(value) <= float(np.finfo(dtype).max)
+    if not math.isfinite(value) or value != int(value):
+        return False
+    if dtype.kind == "b":
+        return value in (0, 1)
+    info = np.iinfo(dtype)
+    return int(info.min) <= value <= int(info.max)
+
+
+class Layer:
+    """A value for each cell of a floor plan.
+
+    Attributes:
+        name: Its name.
+        fill: What cells hold that nobody wrote to.
+        unit: Unit of the values.
+        description: What it is, in a line.
+        store: Whether a run stores it at its end.
+        every: How often it is stored besides; None for never.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        plan: FloorPlan,
+        settings: LayerSettings,
+        source: Callable[[], NDArray[Any]] | None = None,
+    ) -> None:
+        """Make a layer whose cells all hold the fill; one with a source has its values from it."""
+        self.name, self.settings = name, settings
+        self.fill: float = settings.fill
+        self.unit, self.description = settings.unit, settings.description
+        self.store, self.every = settings.store, settings.every
+        self.dtype: np.dtype[Any] = np.dtype(settings.dtype)
+        self._plan, self._source = plan, source
+        shape = (plan.lattice.rows, plan.lattice.columns)
+        if source is None:
+            self._values: NDArray[Any] = np.full(shape, settings.fill, self.dtype)
+
+    def __repr__(self) -> str:
+        """Say what it is."""
+        return f"<Layer {self.name}: {self.dtype}{f' [{self.unit}]' if self.unit else ''}>"
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return the values, for NumPy functions."""
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The values, (rows, columns); write to the array, or assign another.
+
+        Those of a layer that the run keeps itself are a copy, worked out when asked for.
+        """
+        return self._values if self._source is None else self._source()
+
+    @values.setter
+    def values(self, values: object) -> None:
+        self._check_writable()
+        self._values[...] = values
+
+    def at(self, x: float, y: float) -> Any:
+        """Return the value of the cell that holds a place [m].
+
+        Raises:
+            ComponentError: The place is outside the floor plan's grid.
+        """
+        return self.values[self._cell(x, y)].item()
+
+    def set_at(self, x: float, y: float, value: float) -> None:
+        """Change the value of the cell that holds a place [m].
+
+        Raises:
+            ComponentError: The place is outside the grid, or the run keeps the layer itself.
+        """
+        self._check_writable()
+        self._values[self._cell(x, y)] = value
+
+    def _check_writable(self) -> None:
+        if self._source is not None:
+            raise ComponentError(f"the layer {self.name} is kept by the run itself: only read it")
+
+    def _cell(self, x: float, y: float) -> tuple[int, int]:
+        lattice = self._plan.lattice
+        row, column = lattice.cell_of(*lattice.to_lattice((x, y)).tolist())
+        if not (0 <= row < lattice.rows and 0 <= column < lattice.columns):
+            raise ComponentError(f"({x:g}, {y:g}) m is outside the grid of {self._plan.name}")
+        return row, column
+
+
+class Layers(Mapping[str, Layer]):
+    """The layers of a home in a run, by name; copied with it.
+
+    Example:
+        >>> import fleet2d
+        >>> home = fleet2d.Home(fleet2d.load_floorplan())
+        >>> dust = home.layers.add("dust", "float32", unit="g", description="on the floor")
+        >>> dust.values[home.plan.free] += 0.5
+        >>> float(home.layers["dust"].at(*home.rooms[0].anchor_xy))
+        0.5
+    """
+
+    def __init__(self, plan: FloorPlan) -> None:
+        """Begin without any."""
+        self._plan = plan
+        self._layers: dict[str, Layer] = {}
+
+    def __getitem__(self, name: str) -> Layer:
+        """Return a layer.
+
+        Raises:
+            ComponentError: There is none of that name; says which there are, and how to get one.
+        """
+        if name not in self._layers:
+            kept = name.partition(".")[0]
+            how = (
+                f"to have it kept, write floorplan.layers.{kept}: {{}} in the scenario, or"
+                f" needs = {{{kept!r}}} in an algorithm"
+                if kept in SEEN_LAYERS
+                else "add it by home.layers.add(), or in the scenario under floorplan.layers"
+            )
+            known = ", ".join(self._layers) or "none"
+            raise ComponentError(
+                f"there is no layer {name!r}{did_you_mean(name, self._layers)} There are: {known};"
+                f" {how}"
+            )
+        return self._layers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names."""
+        return iter(self._layers)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._layers)
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a layer of that name."""
+        return name in self._layers
+
+    def add(
+        self,
+        name: str,
+        dtype: LayerType = "float",
+        fill: float = 0.0,
+        unit: str = "",
+        description: str = "",
+        *,
+        store: bool = True,
+        every: timedelta | None = None,
+    ) -> Layer:
+        """Add a layer, and return it; one that is there already with the same cells is returned.
+
+        Args:
+            name: Its name: letters, digits, '_' and '-'.
+            dtype: What a cell holds.
+            fill: What every cell holds at first.
+            unit: Unit of the values.
+            description: What it is, in a line.
+            store: Whether the run stores it at its end.
+            every: How often it is stored besides.
+
+        Raises:
+            ComponentError: The name is taken by another layer, or something is wrong with it.
+        """
+        if dtype not in get_args(LayerType):
+            known = ", ".join(get_args(LayerType))
+            raise ComponentError(f"layer {name!r}: there is no dtype {dtype!r}; there are: {known}")
+        if not holds(np.dtype(dtype), fill):
+            raise ComponentError(f"layer {name!r}: no {dtype} can be {fill:g}, its fill")
+        if name.partition(".")[0] in (*SEEN_LAYERS, COSTMAP):
+            raise ComponentError(f"layer {name!r} is one that the run keeps itself: rename yours")
+        settings = LayerSettings.model_construct(
+            dtype=dtype, fill=fill, unit=unit, description=description, store=store, every=every
+        )
+        return self.add_layer(name, settings)
+
+    def add_layer(
+        self,
+        name: str,
+        settings: LayerSettings,
+        source: Callable[[], NDArray[Any]] | None = None,
+    ) -> Layer:
+        """Add a layer as a scenario describes it; see `add`."""
+        if not _NAME.fullmatch(name):
+            raise ComponentError(
+                f"a layer can't be named {name!r}: use letters, digits, '_' and '-', a letter first"
+            )
+        known = self._layers.get(name)
+        if known is None:
+            known = self._layers[name] = Layer(name, self._plan, settings, source)
+        elif (known.dtype, known.unit) != (np.dtype(settings.dtype), settings.unit):
+            raise ComponentError(
+                f"there is a layer {name!r} of {known.dtype} [{known.unit}] already: name yours"
+                " otherwise"
+            )
+        return known

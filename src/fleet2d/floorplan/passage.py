@@ -1,0 +1,188 @@
+"""Where rooms touch, and where a door leads through the wall between them; in metres."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+Place = tuple[float, float]
+Vector = NDArray[np.float64]
+
+TOUCH_M = 0.02
+"""Outlines no further apart than this touch: coordinates are rounded, to 1 cm in degrees."""
+REACH_M = 0.6
+"""No wall is thicker."""
+NEAR_M = 0.25
+"""A door is no further than this from the wall that it is in."""
+
+# Where along a door's width the wall's thickness is looked at; first the middle, which decides.
+_ALONG = (0.5, 0.1, 0.9)
+_OVER = 1e-3  # an opening reaches so far into the space on either side, to be joined to it
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A way through a wall.
+
+    Attributes:
+        start: One end of the door as drawn (x, y) [m].
+        end: The other end [m].
+        low: Where the wall begins, across from the door as drawn [m]; negative on its right.
+        high: Where the wall ends [m].
+        through: Whether there is free space on both sides; if not, only beyond `low` or, where
+            that is minus infinity, beyond `high`.
+    """
+
+    start: Place
+    end: Place
+    low: float
+    high: float
+    through: bool
+
+    @property
+    def line(self) -> tuple[Place, Place]:
+        """The door, moved into the middle of the wall."""
+        return self._beside((self.low + self.high) / 2)
+
+    @property
+    def opening(self) -> Polygon:
+        """What of the wall is opened."""
+        return self._between(self.low - _OVER, self.high + _OVER)
+
+    @property
+    def halves(self) -> tuple[Polygon, ...]:
+        """The parts of the wall on either side of its middle; none where there is no wall."""
+        middle = (self.low + self.high) / 2
+        if self.high - self.low < _OVER:
+            return ()
+        return self._between(self.low, middle), self._between(middle, self.high)
+
+    def inside(self, depth: float) -> Place:
+        """Return the place so far inside a door that leads outside [m]."""
+        at = self.high + depth if self.low == -np.inf else self.low - depth
+        (x0, y0), (x1, y1) = self._beside(at)
+        return (x0 + x1) / 2, (y0 + y1) / 2
+
+    def _between(self, low: float, high: float) -> Polygon:
+        (a, b), (d, c) = self._beside(low), self._beside(high)
+        return Polygon([a, b, c, d])
+
+    def _beside(self, offset: float) -> tuple[Place, Place]:
+        start, end = np.array(self.start), np.array(self.end)
+        shift = offset * _normal(start, end)
+        (x0, y0), (x1, y1) = (start + shift).tolist(), (end + shift).tolist()
+        return (x0, y0), (x1, y1)
+
+
+def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Place, Place]]]:
+    """Yield for each door in a shape the lines that it may be: of an area the longer axis first."""
+    for part in shapely.get_parts(shape).tolist():
+        corners = shapely.get_coordinates(part)
+        if part.geom_type == "LineString":
+            yield [_ends(corners[0], corners[-1])]
+        elif part.geom_type == "Polygon":
+            sides = np.diff(corners, axis=0)
+            along = sides[np.argmax((sides**2).sum(axis=1))]
+            along = along / np.sqrt(along @ along)
+            yield _middle_lines(corners, along)
+
+
+def find_passage(free: MultiPolygon, start: Place, end: Place) -> Passage | None:
+    """Return the way through the wall beside a door, or None where no wall is near.
+
+    Where the space is open already, the way through is of no length.
+    """
+    first, last = np.array(start), np.array(end)
+    if not ((last - first) ** 2).sum() > 0:
+        return None
+    normal = _normal(first, last)
+    found: list[tuple[float, float]] = []
+    for share in _ALONG:
+        walls = _walls_across(free, first + share * (last - first), normal)
+        near = [wall for wall in walls if max(wall[0], -wall[1]) <= NEAR_M]
+        inner = [wall for wall in near if np.isfinite(wall).all()]
+        if share == _ALONG[0]:
+            one_sided = [wall for wall in near if np.isfinite(wall).any()]
+            if not near:
+                return Passage(start, end, 0.0, 0.0, True)
+            if not inner:
+                return Passage(start, end, *one_sided[0], False) if one_sided else None
+        if inner:
+            found.append(min(inner, key=lambda wall: max(wall[0], -wall[1])))
+    low, high = min(low for low, _ in found), max(high for _, high in found)
+    return Passage(start, end, low, high, True)
+
+
+def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
+    """Return the lines along which rooms touch one another, side by side."""
+    borders: list[BaseGeometry] = []
+    tree = shapely.STRtree(rooms)
+    pairs = tree.query(rooms, predicate="dwithin", distance=TOUCH_M)
+    for one, other in sorted((int(i), int(k)) for i, k in pairs.T if i < k):
+        near = (
+            rooms[other]
+            .buffer(TOUCH_M, join_style="mitre")
+            .difference(rooms[other].buffer(-TOUCH_M, join_style="mitre"))
+        )
+        sides = _sides(rooms[one])
+        pieces = shapely.intersection(sides, near)
+        lengths, most = shapely.length(pieces), 2 * TOUCH_M
+        # Where a side only leads away from the border, its first centimetres are near, too.
+        along = (lengths > most) | ((lengths > 0) & (lengths >= shapely.length(sides) / 2))
+        kept = shapely.get_parts(pieces[along])
+        lines = kept[shapely.get_type_id(kept) == shapely.GeometryType.LINESTRING]
+        borders += shapely.get_parts(shapely.line_merge(shapely.multilinestrings(lines))).tolist()
+    return [line for line in borders if isinstance(line, LineString) and line.length > 0]
+
+
+def _sides(area: MultiPolygon) -> NDArray[np.object_]:
+    """Return the sides of an area, each a line."""
+    rings = shapely.get_parts(shapely.boundary(area)).tolist()
+    found = [shapely.get_coordinates(ring) for ring in rings]
+    starts, ends = (
+        np.concatenate([ring[s] for ring in found]) for s in (slice(-1), slice(1, None))
+    )
+    return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
+
+
+def _walls_across(free: MultiPolygon, at: Vector, normal: Vector) -> list[tuple[float, float]]:
+    """Return what is not free on a line across a door, from and to [m]; infinite at its ends."""
+    across = LineString([at - REACH_M * normal, at + REACH_M * normal])
+    walls = []
+    for part in shapely.get_parts(across.difference(free)).tolist():
+        if part.is_empty:
+            continue
+        offsets = (shapely.get_coordinates(part) - at) @ normal
+        low, high = float(offsets.min()), float(offsets.max())
+        low = -np.inf if low < _OVER - REACH_M else low
+        high = np.inf if high > REACH_M - _OVER else high
+        if high > low:
+            walls.append((low, high))
+    return walls
+
+
+def _middle_lines(corners: Vector, along: Vector) -> list[tuple[Place, Place]]:
+    """Return the middle lines of an area along a direction and across it, the longer first."""
+    middle_lines = []
+    axes = (along, np.array([-along[1], along[0]]))
+    spans = [(float((corners @ axis).min()), float((corners @ axis).max())) for axis in axes]
+    for number, axis in enumerate(axes):
+        (low, high), (left, right) = spans[number], spans[1 - number]
+        aside = (left + right) / 2 * axes[1 - number]
+        middle_lines.append((high - low, _ends(low * axis + aside, high * axis + aside)))
+    return [line for _, line in sorted(middle_lines, key=lambda found: -found[0])]
+
+
+def _normal(start: Vector, end: Vector) -> Vector:
+    along = end - start
+    unit: Vector = np.array([-along[1], along[0]]) / np.sqrt(along @ along)
+    return unit
+
+
+def _ends(start: Vector, end: Vector) -> tuple[Place, Place]:
+    (x0, y0), (x1, y1) = start.tolist(), end.tolist()
+    return (x0, y0), (x1, y1)

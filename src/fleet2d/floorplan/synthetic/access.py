@@ -1,0 +1,282 @@
+"""Who opens to whom: doors and openings by what rooms are for, until all can be reached."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fleet2d.floorplan.synthetic.draws import Choices
+from fleet2d.floorplan.synthetic.geometry import Box, Wall
+from fleet2d.floorplan.synthetic.program import Brief
+
+JAMB = 2  # units from a door to the corner of a room, at least
+
+
+class Gap(NamedTuple):
+    """A passage through a wall.
+
+    Attributes:
+        wall: The wall.
+        low: Its first jamb along the wall [units].
+        high: Its other jamb [units].
+        leaf: Whether a door hangs in it; None where the two sides are one room.
+    """
+
+    wall: Wall
+    low: int
+    high: int
+    leaf: bool | None
+
+
+# How bad it is that two kinds of rooms open to each other, where it is done at all.
+_COSTS: dict[tuple[str, str], float] = {
+    ("entryway", "hallway"): 0,
+    ("entryway", "living_room"): 0,
+    ("entryway", "dining_room"): 1.5,
+    ("entryway", "kitchen"): 3,
+    ("hallway", "living_room"): 0.2,
+    ("hallway", "dining_room"): 1.2,
+    ("hallway", "kitchen"): 2.5,
+    ("hallway", "hallway"): 0,
+    ("living_room", "dining_room"): 0,
+    ("living_room", "kitchen"): 0.6,
+    ("dining_room", "kitchen"): 0,
+    ("bedroom", "hallway"): 0,
+    ("bedroom", "entryway"): 0.8,
+    ("bedroom", "living_room"): 0.8,
+    ("bedroom", "dining_room"): 3,
+    ("bathroom", "hallway"): 0,
+    ("bathroom", "entryway"): 0.6,
+    ("bathroom", "living_room"): 1.2,
+    ("bathroom", "laundry"): 3,
+    ("bathroom", "dining_room"): 4,
+    ("toilet", "hallway"): 0,
+    ("toilet", "entryway"): 0,
+    ("toilet", "laundry"): 1,
+    ("toilet", "living_room"): 2.5,
+    ("office", "hallway"): 0,
+    ("office", "entryway"): 0,
+    ("office", "living_room"): 0.8,
+    ("office", "dining_room"): 1.5,
+    ("gym", "hallway"): 0,
+    ("gym", "living_room"): 1.5,
+    ("gym", "garage"): 1.5,
+    ("gym", "laundry"): 2.5,
+    ("gym", "dining_room"): 2,
+    ("laundry", "kitchen"): 0,
+    ("laundry", "hallway"): 0.2,
+    ("laundry", "garage"): 0.5,
+    ("laundry", "entryway"): 1,
+    ("laundry", "dining_room"): 2,
+    ("laundry", "living_room"): 3,
+    ("storage", "hallway"): 0,
+    ("storage", "kitchen"): 0.2,
+    ("storage", "entryway"): 0.2,
+    ("storage", "laundry"): 0.3,
+    ("storage", "garage"): 0.5,
+    ("storage", "dining_room"): 2,
+    ("storage", "living_room"): 2.5,
+    ("garage", "laundry"): 0,
+    ("garage", "entryway"): 0.3,
+    ("garage", "hallway"): 0.3,
+    ("garage", "storage"): 1,
+    ("garage", "kitchen"): 0.8,
+    ("garage", "dining_room"): 2.5,
+    ("garage", "living_room"): 3,
+}
+COSTS: Mapping[tuple[str, str], float] = {
+    **_COSTS,
+    **{(b, a): cost for (a, b), cost in _COSTS.items()},
+}
+# Rooms that lead on to others.
+_PASSED = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
+# A corridor of 1 m may end in a door of 0.9 m.
+_SHARED = {"hallway", "entryway", "living_room", "dining_room", "kitchen"}
+_SOCIAL = ("living_room", "dining_room", "kitchen")
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Widths of passages [units].
+
+    Attributes:
+        door: Between rooms.
+        bath: To bathrooms, toilets and small rooms.
+        open_plan: Whether living, dining and kitchen are open to each other.
+    """
+
+    door: int
+    bath: int
+    open_plan: bool
+
+    def of(self, kinds: set[str]) -> int:
+        """Return the width of a door between rooms of two kinds."""
+        small = kinds & {"bathroom", "toilet", "wardrobe", "storage", "laundry"}
+        return self.bath if small and "garage" not in kinds else self.door
+
+
+@dataclass
+class Access:
+    """Links between rooms.
+
+    Attributes:
+        links: The walls with a passage, in the order found: a tree first, then loops.
+        cost: How bad the tree is.
+    """
+
+    links: list[Wall]
+    cost: float
+
+
+def linked(
+    briefs: Sequence[Brief], boxes: Sequence[Box], walls: Sequence[Wall], widths: Widths
+) -> Access | None:
+    """Return a tree of links that reaches every room at the least cost, or None.
+
+    Prim's algorithm from the entryway, else the living room; private rooms are never passed
+    through, except by what belongs to them.
+    """
+    best = _best_links(briefs, boxes, walls, widths)
+    start = min(
+        range(len(briefs)),
+        key=lambda i: (
+            ("entryway", "living_room").index(briefs[i].kind)
+            if briefs[i].kind in ("entryway", "living_room")
+            else 9
+        ),
+    )
+    reached, links, cost = {start}, [], 0.0
+    while len(reached) < len(briefs):
+        open_links = [
+            (price, pair, wall)
+            for pair, (price, wall) in best.items()
+            if (pair[0] in reached) != (pair[1] in reached)
+            and _passable(briefs, *(pair if pair[0] in reached else pair[::-1]))
+        ]
+        if not open_links:
+            return None
+        price, pair, wall = min(open_links, key=lambda link: link[:2])
+        reached.update(pair)
+        links.append(wall)
+        cost += price
+    return Access(links, cost)
+
+
+def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
+    """Tell whether one may have to pass through a room to get to another."""
+    if briefs[to].kind in ("kitchen", "dining_room"):  # they belong together
+        return briefs[through].kind in _SOCIAL
+    return briefs[through].kind in _PASSED or briefs[to].partner == through
+
+
+def _best_links(
+    briefs: Sequence[Brief], boxes: Sequence[Box], walls: Sequence[Wall], widths: Widths
+) -> dict[tuple[int, int], tuple[float, Wall]]:
+    """Return for each pair of rooms that may open to each other the cost, and the longest wall."""
+    best: dict[tuple[int, int], tuple[float, Wall]] = {}
+    for wall in walls:
+        a, b = sorted((boxes[wall.first].room, boxes[wall.second].room))
+        if a == b:
+            continue
+        price = _price(briefs, a, b)
+        kinds = {briefs[a].kind, briefs[b].kind}
+        needed = widths.of(kinds) + (0 if kinds <= _SHARED else 2 * JAMB)
+        if price is None or wall.length < needed:
+            continue
+        if (a, b) not in best or wall.length > best[a, b][1].length:
+            best[a, b] = (price, wall)
+    return best
+
+
+def _price(briefs: Sequence[Brief], a: int, b: int) -> float | None:
+    owners = {briefs[a].partner, briefs[b].partner} - {None}
+    if owners:
+        return 0.0 if briefs[a].partner == b or briefs[b].partner == a else None
+    return COSTS.get((briefs[a].kind, briefs[b].kind))
+
+
+def with_loops(
+    access: Access,
+    briefs: Sequence[Brief],
+    boxes: Sequence[Box],
+    walls: Sequence[Wall],
+    widths: Widths,
+    choices: Choices,
+) -> list[Wall]:
+    """Return the tree's links and some more, as homes have a way round.
+
+    In an open plan two of the three borders between living, dining and kitchen are open: three
+    would leave a post in the middle.
+    """
+    links = list(access.links)
+    taken = {_rooms(boxes, wall) for wall in links}
+    for pair, (price, wall) in _best_links(briefs, boxes, walls, widths).items():
+        kinds = {briefs[pair[0]].kind, briefs[pair[1]].kind}
+        likely = 0
+        if kinds <= set(_SOCIAL):
+            likely = 45 if not widths.open_plan else 0
+        elif kinds <= {*_SOCIAL, "hallway", "entryway"}:
+            likely = 60 if price < 1 else 20
+        elif kinds & {"laundry", "garage", "storage"} and price <= 0.3:
+            likely = 30
+        if pair not in taken and choices.chance(likely):
+            links.append(wall)
+            taken.add(pair)
+    return links
+
+
+def _rooms(boxes: Sequence[Box], wall: Wall) -> tuple[int, int]:
+    a, b = sorted((boxes[wall.first].room, boxes[wall.second].room))
+    return a, b
+
+
+def gaps_for(
+    links: Sequence[Wall],
+    briefs: Sequence[Brief],
+    boxes: Sequence[Box],
+    walls: Sequence[Wall],
+    widths: Widths,
+    choices: Choices,
+) -> list[Gap]:
+    """Return the passages: openings between living spaces, doors elsewhere, near a corner."""
+    gaps = [
+        Gap(wall, wall.low, wall.high, None)
+        for wall in walls
+        if boxes[wall.first].room == boxes[wall.second].room
+    ]
+    for wall in links:
+        kinds = {briefs[room].kind for room in _rooms(boxes, wall)}
+        opening = _opening(kinds, wall, widths, choices)
+        if opening:
+            gaps.append(Gap(wall, *opening, False))
+            continue
+        width = widths.of(kinds)
+        spare = wall.length - width
+        # A door stands near a corner, so that the rest of the wall is of use.
+        aside = min(choices.between(JAMB, 5), spare // 2)
+        at = wall.low + (aside if choices.chance(50) else spare - aside)
+        gaps.append(Gap(wall, at, at + width, True))
+    return gaps
+
+
+def _opening(
+    kinds: set[str], wall: Wall, widths: Widths, choices: Choices
+) -> tuple[int, int] | None:
+    """Return the jambs of an opening without a door, or None for a door."""
+    if kinds <= set(_SOCIAL):
+        if widths.open_plan:
+            return wall.low, wall.high
+        if choices.chance(30):
+            return None
+        wide = min(choices.between(28, 56), wall.length - 8)
+    elif kinds <= {"hallway", "entryway"}:
+        wide = min(wall.length - 8, choices.between(24, 40))
+    elif kinds in ({"hallway", "living_room"}, {"hallway", "dining_room"}) and wall.length < 40:
+        return (wall.low, wall.high) if choices.chance(60) else None
+    elif kinds <= {"hallway", "entryway", *_SOCIAL} and choices.chance(60):
+        wide = min(wall.length - 8, choices.between(24, 40))
+    else:
+        return None
+    if wide < widths.door:
+        return None
+    low = wall.low + (wall.length - wide) // 2
+    return low, low + wide

@@ -1,0 +1,263 @@
+"""What rooms a home has and how large they should be, before anything is placed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import fsum
+from typing import NamedTuple
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.synthetic.draws import Choices
+
+# What corridors and door gaps add to the rooms, as a rule.
+USUAL_EXTRA = 1.10
+MAX_ROOMS_OF_A_KIND = 8
+SMALLEST_M2 = 30.0
+LARGEST_M2 = 450.0
+
+# Deciles and tails of the area of HouseExpo's plans [%, m2]; between them it is linear.
+AREA_QUANTILES = (
+    (0, 38), (10, 69), (25, 89), (40, 113), (50, 141), (60, 163), (75, 206), (90, 285), (97, 360),
+    (100, 420),
+)  # fmt: skip
+
+
+class Size(NamedTuple):
+    """How large rooms of a kind are: area [m²] at least, as a rule, at most; shortest side [m]."""
+
+    least: float
+    usual: float
+    most: float
+    side: float
+    slender: float
+
+
+SIZES = {
+    "living_room": Size(10, 25, 90, 3.0, 2.2),
+    "dining_room": Size(6.5, 13, 44, 2.4, 2.2),
+    "kitchen": Size(4.5, 14, 44, 1.8, 2.3),
+    "bedroom": Size(7.5, 16, 44, 2.5, 2.1),
+    "bathroom": Size(3.2, 7, 18, 1.5, 3.0),
+    "toilet": Size(1.6, 2.8, 5, 1.0, 3.0),
+    "wardrobe": Size(2.2, 5, 12, 1.2, 3.0),
+    "office": Size(6.5, 13, 32, 2.3, 2.1),
+    "laundry": Size(2.8, 6.5, 14, 1.4, 3.0),
+    "storage": Size(1.8, 5, 14, 1.1, 3.2),
+    "entryway": Size(2.6, 7.5, 18, 1.3, 3.0),
+    "garage": Size(16, 26, 64, 2.9, 2.4),
+    "gym": Size(11, 21, 44, 2.8, 2.1),
+    "hallway": Size(0, 0, 1e9, 0.9, 1e9),
+}
+
+
+# How far areas are from the usual [%], least and most.
+SPREAD = {
+    "kitchen": (70, 185),
+    "bathroom": (50, 165),
+    "living_room": (75, 140),
+    "garage": (75, 125),
+}
+USUAL_SPREAD = (78, 130)
+
+
+@dataclass(frozen=True)
+class Brief:
+    """A room that is asked for.
+
+    Attributes:
+        kind: Its type.
+        area: How large it should be [m²].
+        partner: Index of the one room that it opens from (a bedroom), or None.
+    """
+
+    kind: str
+    area: float
+    partner: int | None = None
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a user asked for; None where it is left to the generator.
+
+    Attributes:
+        area_m2: Area of the free space.
+        bedrooms: How many.
+        bathrooms: How many.
+        garage: Whether there is one.
+    """
+
+    area_m2: float | None = None
+    bedrooms: int | None = None
+    bathrooms: int | None = None
+    garage: bool | None = None
+
+
+def least_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
+    """Return the least area [m²] of a home with so many rooms."""
+    kinds = [*_base(bedrooms, bathrooms), *["garage"] * garage]
+    # A corridor is needed, and room to fit walls to each other, but in the smallest of homes.
+    spare = 1.15 if bedrooms == bathrooms == 1 else min(1.5 + 0.05 * (bedrooms + bathrooms), 1.8)
+    return round(spare * fsum(SIZES[kind].least for kind in kinds), 1)
+
+
+def most_area(bedrooms: int, bathrooms: int) -> float:
+    """Return the greatest area [m²] of a home with so many rooms, all others added."""
+    kinds = [*_base(bedrooms, bathrooms), "garage", *(kind for kind, _, _ in OPTIONAL)]
+    return round(0.56 * fsum(SIZES[kind].most for kind in kinds), 1)
+
+
+# What else a home may have: its type, from which area [m²], and how often [%].
+OPTIONAL = (
+    ("dining_room", 62, 70),
+    ("entryway", 70, 62),
+    ("wardrobe", 110, 40),
+    ("laundry", 100, 42),
+    ("office", 100, 45),
+    ("toilet", 120, 38),
+    ("storage", 90, 35),
+    ("gym", 200, 30),
+    ("office", 240, 30),
+    ("storage", 240, 30),
+)
+
+
+def settle(wishes: Wishes, choices: Choices) -> Wishes:
+    """Return the wishes with everything decided.
+
+    Raises:
+        FloorPlanError: They contradict each other.
+    """
+    baths = wishes.bathrooms or 1
+    beds = wishes.bedrooms or max(baths - 2, 1)
+    garage = bool(wishes.garage)
+    area = wishes.area_m2
+    if area is None:
+        area = _drawn_area(choices)
+        most = most_area(wishes.bedrooms or MAX_ROOMS_OF_A_KIND, baths)
+        area = round(min(max(area, 1.25 * least_area(beds, baths, garage)), most), 1)
+    _check(area, wishes)
+    if wishes.bedrooms is None:
+        few = beds
+        beds = min(max((round(area) + choices.between(-36, 36) + 38) // 66, few), 6)
+        while beds > few and least_area(beds, baths, garage) > 0.8 * area:
+            beds -= 1
+        while beds < MAX_ROOMS_OF_A_KIND and most_area(beds, baths) < area:
+            beds += 1
+    if wishes.bathrooms is None:
+        baths = min(max((45 * beds + round(area) // 3 + choices.between(-45, 45)) // 100, 1), 4)
+        while baths > 1 and least_area(beds, baths, garage) > 0.8 * area:
+            baths -= 1
+    if wishes.garage is None:
+        garage = area > 95 and choices.chance(42) and least_area(beds, baths, True) < 0.8 * area
+    return Wishes(area, beds, baths, garage)
+
+
+def _drawn_area(choices: Choices) -> float:
+    """Draw an area [m²] as HouseExpo's plans have it."""
+    share = choices.below(1000) / 10
+    for (low, least), (high, most) in pairwise(AREA_QUANTILES):
+        if share <= high:
+            return least + (most - least) * (share - low) / (high - low)
+    return float(AREA_QUANTILES[-1][1])
+
+
+def _check(area: float, wishes: Wishes) -> None:
+    baths, garage = wishes.bathrooms or 1, bool(wishes.garage)
+    beds = wishes.bedrooms or max(baths - 2, 1)
+    if baths > beds + 2:
+        raise FloorPlanError(
+            f"a synthetic home with {_count(beds, 'bedroom')} has at most {beds + 2} bathrooms, not"
+            f" {baths}: give it more bedrooms (floorplan.bedrooms) or fewer bathrooms"
+        )
+    least, most = least_area(beds, baths, garage), most_area(beds, baths)
+    asked = f"{_count(beds, 'bedroom')} and {_count(baths, 'bathroom')}"
+    if garage:
+        asked += " and a garage"
+    if area < least:
+        fits = [n for n in range(1, beds) if least_area(n, 1, garage=False) <= area]
+        at_most = f"; {area:g} m2 fits {_count(max(fits), 'bedroom')}" if fits else ""
+        raise FloorPlanError(
+            f"a synthetic home of {area:g} m2 can't have {asked}: they need at least {least:g} m2"
+            f"{at_most}. Change floorplan.area_m2, or the rooms"
+        )
+    if area > most and wishes.bedrooms is not None:
+        raise FloorPlanError(
+            f"a synthetic home with {asked} has at most {most:g} m2, not {area:g} m2: its rooms"
+            " would be halls. Give it more bedrooms (floorplan.bedrooms), or less area"
+        )
+
+
+def _count(number: int, kind: str) -> str:
+    return f"{number} {kind}{'s' * (number != 1)}"
+
+
+def _base(bedrooms: int, bathrooms: int) -> list[str]:
+    return ["living_room", "kitchen", *["bedroom"] * bedrooms, *["bathroom"] * bathrooms]
+
+
+def rooms_for(wishes: Wishes, choices: Choices, porch: bool = False) -> list[Brief]:
+    """Return the rooms of a home, largest uses first, with areas that add up.
+
+    Args:
+        wishes: Settled wishes.
+        choices: The stream to draw from.
+        porch: Whether there must be an entryway.
+    """
+    area, beds, baths = wishes.area_m2 or 0.0, wishes.bedrooms or 1, wishes.bathrooms or 1
+    kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
+    room = area / USUAL_EXTRA
+    # Rooms are usual in size or up to so much larger before there is one more of them.
+    fill = choices.between(80, 112) / 100
+    for kind, from_area, often in OPTIONAL:
+        if porch and kind == "entryway":
+            kinds.append(kind)
+            continue
+        wanted = area >= from_area and choices.chance(often)
+        if wanted and fsum(SIZES[k].usual for k in [*kinds, kind]) <= fill * room:
+            kinds.append(kind)
+    for kind, _, _ in OPTIONAL:  # only what is very large has not yet enough
+        if 0.85 * fsum(SIZES[k].most for k in kinds) < room and kinds.count(kind) < 2:
+            kinds.append(kind)
+    briefs = [Brief(kind, SIZES[kind].usual) for kind in kinds]
+    return scaled(_paired(briefs), room, choices)
+
+
+def _paired(briefs: Sequence[Brief]) -> list[Brief]:
+    """Return the rooms where bathrooms beyond the first, and wardrobes, belong to bedrooms."""
+    found = list(briefs)
+    beds = [i for i, brief in enumerate(found) if brief.kind == "bedroom"]
+    baths = [i for i, brief in enumerate(found) if brief.kind == "bathroom"]
+    wardrobes = [i for i, brief in enumerate(found) if brief.kind == "wardrobe"]
+    found[beds[0]] = replace(found[beds[0]], area=SIZES["bedroom"].usual * 1.25)
+    # A home with many bathrooms has a second shared one.
+    shared = 1 + (len(baths) > 3)
+    for bath, bed in zip(baths[shared:], beds, strict=False):
+        found[bath] = replace(found[bath], partner=bed)
+    for wardrobe in wardrobes:
+        found[wardrobe] = replace(found[wardrobe], partner=beds[0])
+    return found
+
+
+def scaled(briefs: Sequence[Brief], total: float, choices: Choices) -> list[Brief]:
+    """Return the rooms with areas that add up to `total` [m²], as large as their kinds can be."""
+    spreads = [SPREAD.get(brief.kind, USUAL_SPREAD) for brief in briefs]
+    usual = [
+        brief.area * choices.between(*spread) / 100
+        for brief, spread in zip(briefs, spreads, strict=True)
+    ]
+    sizes = [SIZES[brief.kind] for brief in briefs]
+
+    def areas(factor: float) -> list[float]:
+        return [
+            min(max(area * factor, size.least), size.most)
+            for area, size in zip(usual, sizes, strict=True)
+        ]
+
+    low, high = 0.1, 10.0
+    for _ in range(24):
+        middle = (low + high) / 2
+        if fsum(areas(middle)) < total:
+            low = middle
+        else:
+            high = middle
+    return [replace(b, area=area) for b, area in zip(briefs, areas(low), strict=True)]

@@ -1,0 +1,93 @@
+"""The `synthetic` floor plan: a seed and what the home should be like."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import register
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.floorplan.synthetic.convert import floor_plan
+from fleet2d.floorplan.synthetic.generator import Style, generate
+from fleet2d.floorplan.synthetic.geometry import PER_M
+from fleet2d.floorplan.synthetic.program import (
+    LARGEST_M2,
+    MAX_ROOMS_OF_A_KIND,
+    SMALLEST_M2,
+    Wishes,
+)
+from fleet2d.problems import problem
+from fleet2d.units import Length
+
+
+@register("floorplan", "synthetic")
+class Synthetic(FloorPlanSource):
+    """A generated home; the same configuration is the same home on every machine.
+
+    Attributes:
+        seed: Which of the homes.
+        area_m2: Area of its free space, 30 to 600 m².
+        bedrooms: How many, 1 to 8.
+        bathrooms: How many, 1 to 6.
+        garage: Whether it has one.
+        outline: The shape of the home.
+        open_plan: Whether living room, dining room and kitchen are open to each other.
+        corridor_width: Clear width of hallways, 0.9 m to 2 m.
+        door_width: Width of doors between rooms, 0.7 m to 1.2 m.
+
+    Example:
+        >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()
+        >>> len(plan.rooms_of_type("bedroom")), plan.room("kitchen_0").type
+        (3, 'kitchen')
+    """
+
+    seed: int = Field(default=0, ge=0, description="which of the homes")
+    area_m2: float | None = Field(
+        default=None, ge=SMALLEST_M2, le=LARGEST_M2, description="free space, 30 to 600 m2"
+    )
+    bedrooms: int | None = Field(
+        default=None, ge=1, le=MAX_ROOMS_OF_A_KIND, description="how many, 1 to 8"
+    )
+    bathrooms: int | None = Field(default=None, ge=1, le=6, description="how many, 1 to 6")
+    garage: bool | None = Field(default=None, description="whether it has one")
+    outline: Literal["rectangle", "L", "T", "U"] | None = Field(
+        default=None, description="the shape of the home"
+    )
+    open_plan: bool | None = Field(
+        default=None, description="whether living, dining and kitchen are open to each other"
+    )
+    corridor_width: Length | None = Field(
+        default=None, description="clear width of hallways, 0.9 m to 2 m, rounded to 5 cm"
+    )
+    door_width: Length | None = Field(
+        default=None, description="of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name, low, high in (("corridor_width", 0.9, 2.0), ("door_width", 0.7, 1.2)):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise problem(f"{name} is {value:g} m; {low:g} m to {high:g} m is possible")
+        return self
+
+    def load(self) -> FloorPlan:
+        """Generate the home.
+
+        Raises:
+            FloorPlanError: The numbers contradict each other.
+        """
+        wishes = Wishes(self.area_m2, self.bedrooms, self.bathrooms, self.garage)
+        style = Style(
+            self.outline,
+            self.open_plan,
+            _units(self.corridor_width),
+            _units(self.door_width),
+        )
+        house = generate(self.seed, wishes, style)
+        name = f"synthetic_{self.seed}"
+        return floor_plan(house, name, self.cell, f"synthetic home, seed {self.seed}")
+
+
+def _units(length: float | None) -> int | None:
+    return None if length is None else int(length * PER_M + 0.5)

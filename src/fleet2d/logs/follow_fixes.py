@@ -1,0 +1,207 @@
+"""From position fixes to a plan: the body is at each fix when the log says so."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.kernels.headings import TURN, heading_of
+from fleet2d.kernels.mesh import locate
+from fleet2d.kernels.motion import time_route
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.logs.nearest import Nearest
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.plan import Plan
+
+I64 = NDArray[np.int64]
+
+# Nothing of a home is farther away than that [m].
+FAR = 1e6
+# A move shorter than this says nothing about where somebody looks [m].
+STIR = 0.1
+
+
+@dataclass(frozen=True)
+class Fixes:
+    """Fixes as the body can follow them.
+
+    Attributes:
+        time_us: When [us since the start of the run], rising, int64 (n,).
+        xy: Where, free places that the body can get to [lattice], int64 (n, 2).
+        heading: 0 to 4095, or -1 where the log has none, int64 (n,).
+        snapped: How many were moved off a wall.
+        outside: How many were too far from any free place, and left out.
+    """
+
+    time_us: I64
+    xy: I64
+    heading: I64
+    snapped: int
+    outside: int
+
+
+def place_fixes(
+    actor: "Actor",
+    time_us: I64,
+    xy: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    reach: float,
+) -> Fixes:
+    """Return fixes moved to the nearest place where the body can be.
+
+    Args:
+        actor: The body.
+        time_us: When [us since the start of the run], rising, int64 (n,).
+        xy: Where, in the plan [m], float64 (n, 2).
+        turns: Headings in the plan [turns], NaN where there is none.
+        reach: A fix farther than this from any such place is left out [m].
+    """
+    lattice, space = actor.home.plan.lattice, actor.space
+    size = 1 << 20  # beyond any home, and safe to round
+    points: I64 = np.clip(lattice.to_lattice(np.clip(xy, -FAR, FAR)), -size, size)
+    fits = [
+        0 <= x < size and 0 <= y < size and space.part_at(x, y) == actor.part
+        for x, y in points.tolist()
+    ]
+    off = np.flatnonzero(~np.array(fits, bool))
+    near = Nearest(actor).of(points[off])
+    away: I64 = near - points[off]
+    far = (away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2
+    points[off] = near
+    kept = np.ones(len(points), bool)
+    kept[off[far]] = False
+    known = np.isfinite(turns)
+    heading = np.full(len(turns), -1, np.int64)
+    heading[known] = np.floor(turns[known] * TURN + 0.5).astype(np.int64) % TURN
+    outside = int(np.count_nonzero(~kept))
+    return Fixes(time_us[kept], points[kept], heading[kept], len(off) - outside, outside)
+
+
+class FixFollower:
+    """Lays a plan through fixes: straight from each to the next where that is free, else around.
+
+    Args:
+        actor: The body.
+        fixes: Where it is when.
+        gap_us: Between two fixes farther apart in time than this, nobody knows where it is.
+        gaps: What is done then: "unknown"; "hold": stay, and leave in time to be at the next fix;
+            "walk": take all that time for the way.
+        fastest: A leg faster than this is counted as implausible [m/s].
+    """
+
+    def __init__(
+        self, actor: "Actor", fixes: Fixes, gap_us: int, gaps: str, fastest: float
+    ) -> None:
+        self.actor = actor
+        self.fixes = fixes
+        self.gap_us, self.gaps = gap_us, gaps
+        self.fastest = fastest * actor.home.plan.lattice.units_per_m
+        self.unknown_us = self.gap_count = self.implausible = self.around = 0
+        self.top_speed = 0.0
+        self.heading = self._headings()
+
+    def follow(self, plan: "Plan") -> "Plan":
+        """Lay a plan from its beginning to the last fix; the body is put there where it must."""
+        time = self.fixes.time_us
+        end_us = self.actor.clock.steps * self.actor.clock.step_us
+        i = int(np.searchsorted(time, plan.time_us, side="right")) - 1
+        if i < 0 or plan.time_us - time[i] > self.gap_us:
+            self._vanish(plan, plan.time_us)
+        else:
+            plan.follow(self._row(i, plan.time_us, 0))
+        for j in range(i + 1, len(time)):
+            if time[j] >= end_us:
+                break
+            if plan.away:
+                self._appear(plan, j)
+            elif time[j] - time[j - 1] <= self.gap_us:
+                self._leg(plan, j - 1, j, plan.time_us)
+            elif self.gaps == "unknown":
+                self._vanish(plan, plan.time_us + 1)  # at the fix itself it is there
+                self.gap_count += 1
+                self.unknown_us += int(time[j] - time[j - 1])
+                self._appear(plan, j)
+            else:
+                leave = plan.time_us
+                if self.gaps == "hold":
+                    leave = max(leave, int(time[j]) - self._takes(j - 1, j))
+                self._leg(plan, j - 1, j, leave)
+        left = end_us - plan.time_us
+        if len(time) and not plan.away and left > self.gap_us:
+            self._vanish(plan, plan.time_us + 1)
+        return plan.stay()
+
+    def _headings(self) -> I64:
+        """Return the heading at each fix: the log's, else where it goes next."""
+        xy, heading = self.fixes.xy, self.fixes.heading.copy()
+        stir = STIR * self.actor.home.plan.lattice.units_per_m
+        last = 0
+        moves = np.diff(xy, axis=0, append=xy[-1:])
+        for i, (dx, dy) in enumerate(moves.tolist()):
+            if heading[i] < 0:
+                far = dx * dx + dy * dy >= stir * stir
+                heading[i] = heading_of(dx, dy) if far else last
+            last = int(heading[i])
+        return heading
+
+    def _row(self, i: int, at_us: int, away: int) -> I64:
+        x, y = self.fixes.xy[i].tolist()
+        return np.array([[at_us, x, y, self.heading[i], away]], np.int64)
+
+    def _vanish(self, plan: "Plan", at_us: int) -> None:
+        still = [plan.x, plan.y, plan.heading]
+        plan.follow(np.array([[at_us, *still, plan.away], [at_us, *still, 1]], np.int64))
+        plan.note("unknown")
+
+    def _appear(self, plan: "Plan", i: int) -> None:
+        at_us = int(self.fixes.time_us[i])
+        before = np.array([[at_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
+        plan.follow(np.concatenate([before, self._row(i, at_us, 0)]))
+        plan.note("known")
+
+    def _route(self, i: int, j: int) -> I64:
+        """Return the way from a fix to another: straight if that is free."""
+        (ax, ay), (bx, by) = self.fixes.xy[i].tolist(), self.fixes.xy[j].tolist()
+        space = self.actor.space
+        straight = np.array([[ax, ay], [bx, by]], np.int64)
+        if (ax, ay) == (bx, by):
+            return straight
+        if line_of_sight(space.mesh, ax, ay, locate(space.mesh, ax, ay), bx, by):
+            return straight
+        route = space.route((ax, ay), (bx, by))
+        return straight if route is None else route
+
+    def _takes(self, i: int, j: int) -> int:
+        """Return how long the body takes from one fix to another [us]."""
+        route = self._route(i, j)
+        rows = np.empty((2 * len(route), 4), np.int64)
+        actor = self.actor
+        count = time_route(route, 0, int(self.heading[i]), actor.speed, actor.turn_rate, rows)
+        return int(rows[count - 1, 0])
+
+    def _leg(self, plan: "Plan", i: int, j: int, leave_us: int) -> None:
+        """Go from fix i, left at a moment, to fix j, at an even speed all the way."""
+        route = self._route(i, j)
+        arrive_us = int(self.fixes.time_us[j])
+        moves = np.diff(route, axis=0)
+        lengths = np.sqrt((moves * moves).sum(axis=1).astype(np.float64))
+        total = float(lengths.sum())
+        speed = total * 1e6 / max(arrive_us - leave_us, 1)
+        self.top_speed = max(self.top_speed, speed)
+        self.implausible += speed > self.fastest
+        self.around += len(route) > 2
+        rows = []
+        if leave_us > plan.time_us:
+            rows.append([leave_us, plan.x, plan.y, plan.heading, 0])
+        done = 0.0
+        for (x, y), length, (dx, dy) in zip(
+            route[1:-1].tolist(), lengths[:-1].tolist(), moves[1:].tolist(), strict=True
+        ):
+            done += length
+            at_us = leave_us + int((arrive_us - leave_us) * (done / total))
+            rows.append([at_us, x, y, int(heading_of(dx, dy)), 0])
+        last = self._row(j, arrive_us, 0)
+        plan.follow(np.concatenate([np.array(rows, np.int64).reshape(-1, 5), last]))

@@ -1,0 +1,119 @@
+"""From the frame of coordinates of a log to that of the floor plan: a similarity."""
+
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.problems import problem
+from fleet2d.units import AngleDeg, Length
+
+Pair = tuple[float, float]
+
+
+class Match(Settings):
+    """One place in both frames."""
+
+    log: Pair = Field(description="where the log has it, in the log's units")
+    plan: Pair = Field(description="where the floor plan has it [m]")
+
+
+class Frame(Settings):
+    """How the positions of a log lie in the floor plan: mirrored, scaled, turned, then moved.
+
+    Example:
+        >>> feet = Frame(scale=0.3048, rotation_deg=90, origin=(1, 2))
+        >>> feet.to_plan(np.array([[10.0, 0.0]])).round(3).tolist()
+        [[1.0, 5.048]]
+        >>> corners = [{"log": (0, 0), "plan": (1, 2)}, {"log": (10, 0), "plan": (1, 5.048)}]
+        >>> Frame(matches=corners).to_plan(np.array([[10.0, 10.0]])).round(3).tolist()
+        [[-2.048, 5.048]]
+    """
+
+    scale: float = Field(default=1.0, gt=0, description="metres in one unit of the log")
+    rotation_deg: AngleDeg = Field(
+        default=0.0, description="direction of the log's x axis in the plan, counter-clockwise"
+    )
+    flip_y: bool = Field(
+        default=False, description="whether the log's y axis is the other way, as in pictures"
+    )
+    origin: tuple[Length, Length] = Field(
+        default=(0.0, 0.0), description="where the log's (0, 0) is in the plan [m]"
+    )
+    matches: tuple[Match, ...] = Field(
+        default=(),
+        description="places in both frames, two or more, instead of scale, rotation and origin:"
+        " the best fit to them in the least squares",
+    )
+
+    @model_validator(mode="after")
+    def _is_told_once(self) -> Self:
+        if self.matches and {"scale", "rotation_deg", "origin"} & self.model_fields_set:
+            raise problem("give matches, or scale, rotation_deg and origin, and not both")
+        if self.matches and len({match.log for match in self.matches}) < 2:
+            raise problem("matches: two different places are needed at least")
+        return self
+
+    def to_plan(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return positions (n, 2) of the log as positions in the plan [m]."""
+        (ax, ay), (bx, by) = self._factor()
+        x, y = xy[:, 0], -xy[:, 1] if self.flip_y else xy[:, 1]
+        return np.stack([ax * x - ay * y + bx, ay * x + ax * y + by], 1)
+
+    def turned(self, heading: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return headings of the log [turns, any] as headings in the plan [turns]."""
+        ax, ay = self._factor()[0]
+        turn = np.arctan2(ay, ax) / (2 * np.pi)  # rounded to 1/4096 later
+        flipped = -heading if self.flip_y else heading
+        return np.asarray(flipped + turn)
+
+    def errors(self) -> NDArray[np.float64]:
+        """Return how far each match is off after the fit [m]."""
+        log = np.array([match.log for match in self.matches], np.float64).reshape(-1, 2)
+        plan = np.array([match.plan for match in self.matches], np.float64).reshape(-1, 2)
+        off = self.to_plan(log) - plan
+        return np.sqrt(off[:, 0] ** 2 + off[:, 1] ** 2)
+
+    def _factor(self) -> tuple[Pair, Pair]:
+        """Return a and b of plan = a * log + b, complex numbers as pairs."""
+        if not self.matches:
+            cosine, sine = _direction(self.rotation_deg)
+            return (self.scale * cosine, self.scale * sine), self.origin
+        sign = -1.0 if self.flip_y else 1.0
+        log = [(match.log[0], sign * match.log[1]) for match in self.matches]
+        plan = [match.plan for match in self.matches]
+        (lx, ly), (px, py) = _mean(log), _mean(plan)
+        ax = ay = size = 0.0
+        for (x, y), (u, v) in zip(log, plan, strict=True):
+            x, y, u, v = x - lx, y - ly, u - px, v - py
+            ax += x * u + y * v
+            ay += x * v - y * u
+            size += x * x + y * y
+        ax, ay = ax / size, ay / size
+        return (ax, ay), (px - (ax * lx - ay * ly), py - (ay * lx + ax * ly))
+
+
+def _mean(points: list[Pair]) -> Pair:
+    return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
+
+
+def _direction(degrees: float) -> Pair:
+    """Return the cosine and sine of an angle, the same on every machine.
+
+    By their series: the sines of C libraries differ in the last digit.
+    """
+    quarters, rest = divmod(degrees, 90.0)
+    angle = rest * (3.141592653589793 / 180.0)
+    cosine = sine = 0.0
+    term = 1.0
+    for n in range(24):  # the terms are below 1e-18 from there on
+        if n % 2 == 0:
+            cosine += term if n % 4 == 0 else -term
+        else:
+            sine += term if n % 4 == 1 else -term
+        term = term * angle / (n + 1)
+    for _ in range(int(quarters) % 4):
+        cosine, sine = -sine, cosine
+    return cosine, sine

@@ -1,0 +1,135 @@
+"""What a log says, in one form for all layouts: readings of rooms and activities, or fixes."""
+
+from collections import Counter
+from dataclasses import dataclass
+from datetime import date
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.errors import InputError
+
+DAY_US = 86_400_000_000
+AWAY = "away"
+"""The room label of who is out of the home."""
+
+
+class LogError(InputError):
+    """A log can't be read, or contradicts itself; the message says where and what to do."""
+
+
+class Reading(NamedTuple):
+    """Somebody is in a room, at an instant or for a while.
+
+    Attributes:
+        begin_us: Local time since the midnight that begins the log's first day [us].
+        end_us: When the log last says so; equal to `begin_us` for an instant.
+        room: The room's label in the log, or `AWAY`.
+        activity: What is done there, "" where the log doesn't say.
+        line: Line of the file, from 1.
+    """
+
+    begin_us: int
+    end_us: int
+    room: str
+    activity: str
+    line: int
+
+
+@dataclass(frozen=True)
+class ActivityLog:
+    """The readings of a log of rooms and activities, in the order in which they begin.
+
+    Attributes:
+        path: The file, or the folder of files, that it was read from.
+        layout: The layout it is written in: casas, uci_adl or homer.
+        first_day: The date of its first day; None where the log has no dates.
+        readings: What it says.
+        notes: What was odd in it and what was made of that.
+    """
+
+    path: Path
+    layout: str
+    first_day: date | None
+    readings: tuple[Reading, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def days(self) -> int:
+        """The number of calendar days from its first to its last reading."""
+        return max((r.begin_us for r in self.readings), default=-1) // DAY_US + 1
+
+    @property
+    def rooms(self) -> Counter[str]:
+        """How many readings name each room label."""
+        return Counter(reading.room for reading in self.readings)
+
+
+@dataclass(frozen=True)
+class PositionLog:
+    """The position fixes of one tag, in order of time.
+
+    Attributes:
+        path: The file that it was read from.
+        layout: "positions".
+        first_day: The date of its first day; None where the log has no dates.
+        time_us: Local time since the midnight that begins the first day, int64 (n,) [us].
+        xy: Positions in the log's own frame, float64 (n, 2).
+        heading: Headings in the log's own frame, float64 (n,) [rad]; NaN where it has none.
+        notes: What was odd in it and what was made of that.
+    """
+
+    path: Path
+    layout: str
+    first_day: date | None
+    time_us: NDArray[np.int64]
+    xy: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def days(self) -> int:
+        """The number of calendar days from its first to its last fix."""
+        return int(self.time_us[-1]) // DAY_US + 1
+
+
+def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[Reading], list[str]]:
+    """Return readings in the order in which they begin, and notes about what was amiss.
+
+    An end that lies before the begin isn't believed: the reading counts as an instant then.
+
+    Raises:
+        LogError: There are none, times run backwards and `sort` is off, or one lasts longer than a
+            day.
+    """
+    if not readings:
+        raise LogError(f"{path} holds no reading: is it the right file?")
+    backwards = [b for a, b in pairwise(readings) if b.begin_us < a.begin_us]
+    if backwards and not sort:
+        raise LogError(
+            f"{path}, line {backwards[0].line}: the time runs backwards there"
+            f" ({_counted(len(backwards), 'such line')}); check the clock of the log, or put its"
+            " lines in order of time by 'sort: true'"
+        )
+    for reading in readings:
+        lasts = reading.end_us - reading.begin_us
+        if lasts > DAY_US:
+            raise LogError(
+                f"{path}, line {reading.line}: it lasts {lasts / 3.6e9:.1f} h; a reading lasts a"
+                " day at most: check its end"
+            )
+    notes = []
+    ended = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
+    if ended:
+        notes.append(f"an end before the begin isn't believed, in line {', '.join(ended)}")
+    if backwards:
+        readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable
+        notes.append(f"{_counted(len(backwards), 'line')} ran backwards in time and were sorted in")
+    return [r._replace(end_us=max(r.end_us, r.begin_us)) for r in readings], notes
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"

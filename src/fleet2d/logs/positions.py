@@ -1,0 +1,264 @@
+"""Position fixes of a real-time location system: CSV or Parquet with time, id, x, y and heading."""
+
+from collections.abc import Mapping
+from datetime import UTC, date, datetime, timedelta
+from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo, available_timezones
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from fleet2d.logs.log import DAY_US, LogError, PositionLog
+from fleet2d.logs.times import parse_time
+from fleet2d.problems import did_you_mean
+
+NAMES = {
+    "time": ("time", "timestamp", "t", "datetime", "time_s"),
+    "id": ("id", "tag", "tag_id", "name", "entity"),
+    "x": ("x", "x_m", "pos_x", "position_x"),
+    "y": ("y", "y_m", "pos_y", "position_y"),
+    "heading": ("heading", "heading_deg", "theta", "yaw"),
+}
+"""The names that a column may have, if the user gives none."""
+
+QUARTER_HOUR_US = 900_000_000
+I64 = NDArray[np.int64]
+
+
+def read_positions(
+    path: Path,
+    *,
+    id: str | None = None,  # noqa: A002 - the name of the column
+    columns: Mapping[str, str] | None = None,
+    time_zone: str | None = None,
+    sort: bool = False,
+) -> PositionLog:
+    """Read the fixes of one tag.
+
+    Times are text or timestamps, or numbers of s, ms, us or ns since 1970 (which one, by their
+    size), or of seconds since the log began if they are below 10⁸. With a time zone of their own
+    they are turned into the local time of `time_zone`. A heading is in radians; in degrees, if its
+    column is called …_deg.
+
+    Args:
+        path: The file, .csv or .parquet.
+        id: The tag, where the file holds several.
+        columns: What its columns are called, where that is none of `NAMES`: {"x": "east"}.
+        time_zone: Of the home, like "Europe/Berlin"; needed if the log's times have a zone or are
+            numbers since 1970.
+        sort: Put fixes in order of time instead of refusing times that run backwards.
+
+    Raises:
+        LogError: A column or the tag is missing, a value is no number, or times run backwards.
+    """
+    table = _table(path)
+    named = _columns(table, columns or {}, path)
+    table, line, notes = _of_tag(table, named.get("id"), id, path)
+    x, y = (_numbers(table, named[axis], path, line) for axis in ("x", "y"))
+    heading = np.full(len(x), np.nan)
+    if "heading" in named:
+        heading = _numbers(table, named["heading"], path, line)
+        if named["heading"].endswith("_deg"):
+            heading = heading / 180 * np.pi
+    time_us, dated, repeated = _local(table[named["time"]], time_zone, path, line)
+    kept = np.isfinite(x) & np.isfinite(y)
+    if not kept.all():
+        notes.append(f"{np.count_nonzero(~kept)} fixes without a position were left out")
+    if repeated.any():
+        notes.append(
+            f"{np.count_nonzero(repeated)} fixes of the hour that the end of summer time repeats"
+            " were left out: a simulated day has 24 hours"
+        )
+    kept &= ~repeated
+    fixes = [time_us[kept], x[kept], y[kept], heading[kept], line[kept]]
+    fixes = _in_order(fixes, path, notes, sort=sort)
+    time_us, x, y, heading, _ = fixes
+    first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if dated else None
+    if first_day:
+        time_us = time_us - time_us[0] // DAY_US * DAY_US
+    return PositionLog(
+        path, "positions", first_day, time_us, np.stack([x, y], 1), heading, tuple(notes)
+    )
+
+
+def _table(path: Path) -> pa.Table:
+    try:
+        if path.suffix.lower() in (".parquet", ".pq"):
+            return pq.read_table(path)
+        return pacsv.read_csv(path)
+    except (pa.ArrowException, OSError) as error:
+        raise LogError(f"{path} can't be read: {' '.join(str(error).split())}") from error
+
+
+def _columns(table: pa.Table, given: Mapping[str, str], path: Path) -> dict[str, str]:
+    named = dict(given)
+    for what, name in named.items():
+        if what not in NAMES:
+            raise LogError(f"columns: {what!r} is none of {', '.join(NAMES)}")
+        if name not in table.column_names:
+            raise LogError(f"{path} has no column {name!r}{did_you_mean(name, table.column_names)}")
+    lower = {name.strip().lower(): name for name in reversed(table.column_names)}
+    for what, names in NAMES.items():
+        found = next((lower[name] for name in names if name in lower), None)
+        if what not in named and found is not None:
+            named[what] = found
+        if what not in named and what in ("time", "x", "y"):
+            raise LogError(
+                f"{path} has no column {what!r}; it has: {', '.join(table.column_names)}. Say which"
+                f" it is by columns: {{{what}: …}}"
+            )
+    return named
+
+
+def _of_tag(
+    table: pa.Table, column: str | None, tag: str | None, path: Path
+) -> tuple[pa.Table, I64, list[str]]:
+    """Return the rows of one tag, their lines in the file, and notes."""
+    line = np.arange(table.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
+    if not table.num_rows:
+        raise LogError(f"{path} holds no fix")
+    if column is None:
+        if tag is not None:
+            raise LogError(f"{path} has no column of ids: leave out 'id', or name it by columns")
+        return table, line, []
+    tags = pc.cast(table[column], pa.string())
+    known = sorted(str(name) for name in pc.unique(tags).to_pylist())
+    if tag is None and len(known) > 1:
+        raise LogError(f"{path} holds {len(known)} ids: {', '.join(known[:10])}; say which by 'id'")
+    wanted = known[0] if tag is None else tag
+    if wanted not in known:
+        raise LogError(
+            f"{path} has no id {wanted!r}{did_you_mean(wanted, known)}"
+            f" There are: {', '.join(known[:10])}"
+        )
+    mine = pc.fill_null(pc.equal(tags, wanted), False).combine_chunks()
+    keep = mine.to_numpy(zero_copy_only=False) if known != ["None"] else np.ones(len(line), bool)
+    others = len(line) - int(np.count_nonzero(keep))
+    notes = [f"{others} fixes of other ids were left out"] if others else []
+    return table.filter(pa.array(keep)), line[keep], notes
+
+
+def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.float64]:
+    column = table[name]
+    if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+        for at, text in zip(line.tolist(), column.to_pylist(), strict=True):
+            try:
+                float(text or "nan")
+            except ValueError:
+                raise LogError(
+                    f"{path}, line {at}: found {text!r} in column {name!r}, where a number is"
+                    " wanted"
+                ) from None
+        column = pc.cast(pc.if_else(pc.equal(column, ""), "nan", column), pa.float64())
+    try:
+        numbers = pc.fill_null(pc.cast(column, pa.float64()), float("nan"))
+    except pa.ArrowException:
+        raise LogError(f"{path}: column {name!r} holds {column.type}, not numbers") from None
+    out: NDArray[np.float64] = numbers.to_numpy().astype(np.float64)
+    return out
+
+
+def _local(
+    column: pa.ChunkedArray, time_zone: str | None, path: Path, line: I64
+) -> tuple[I64, bool, NDArray[np.bool_]]:
+    """Return local times [us since 1970, or since the log began], whether dated, and repeats."""
+    if column.null_count:
+        empty = np.flatnonzero(pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False))
+        raise LogError(f"{path}, line {line[empty[0]]}: it has no time")
+    kind: Any = column.type
+    zoned = False
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+        texts = column.to_pylist()
+        values, zoned = _parsed(texts, path, line)
+    elif pa.types.is_timestamp(kind):
+        values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
+        values = pc.cast(values, pa.int64()).to_numpy()
+        zoned = kind.tz is not None
+    elif pa.types.is_integer(kind) or pa.types.is_floating(kind):
+        values, zoned = _scaled(column.to_numpy())
+        if not zoned:
+            return values, False, np.zeros(len(values), bool)
+    else:
+        raise LogError(f"{path}: the times are {kind}; text, timestamps or numbers are wanted")
+    if not zoned:
+        return values, True, np.zeros(len(values), bool)
+    if time_zone is None:
+        raise LogError(
+            f"{path}: its times are of a time zone; say which local time the home has by"
+            " time_zone, like 'Europe/Berlin' or 'UTC'"
+        )
+    local, repeated = _in_zone(values, time_zone)
+    return local, True, repeated
+
+
+def _parsed(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
+    """Return times in text as [us since 1970], and whether they have a zone (all or none)."""
+    epoch = datetime(1970, 1, 1)
+    values, zones = [], set()
+    for at, text in zip(line.tolist(), texts, strict=True):
+        try:
+            moment = datetime.fromisoformat(text.strip())
+        except ValueError:
+            moment = parse_time(text, path, at)
+        zones.add(moment.tzinfo is not None)
+        if moment.tzinfo is not None:
+            moment = moment.astimezone(UTC).replace(tzinfo=None)
+        values.append((moment - epoch) // timedelta(microseconds=1))
+    if len(zones) > 1:
+        raise LogError(f"{path}: some of its times have a time zone and some have none")
+    return np.array(values, np.int64), zones == {True}
+
+
+def _scaled(numbers: NDArray[Any]) -> tuple[I64, bool]:
+    """Return numbers as microseconds, and whether they count from 1970."""
+    size = float(np.max(np.abs(numbers)))
+    if size >= 1e17:
+        return (numbers // 1000).astype(np.int64), True
+    if size >= 1e14:
+        return numbers.astype(np.int64), True
+    scale = 1000 if size >= 1e11 else 1_000_000
+    return np.round(numbers * scale).astype(np.int64), size >= 1e8
+
+
+def _in_zone(utc_us: I64, name: str) -> tuple[I64, NDArray[np.bool_]]:
+    """Return the wall times of a zone, and which of them are a second pass of the same hour."""
+    try:
+        zone = ZoneInfo(name)
+    except (KeyError, ValueError, OSError):
+        hint = did_you_mean(name, available_timezones())
+        raise LogError(f"there is no time zone {name!r}{hint}") from None
+    # Clocks change at whole quarters of an hour.
+    quarters, inverse = np.unique(utc_us // QUARTER_HOUR_US, return_inverse=True)
+    epoch = datetime(1970, 1, 1, tzinfo=UTC)
+    moments = [
+        (epoch + timedelta(microseconds=int(q) * QUARTER_HOUR_US)).astimezone(zone)
+        for q in quarters
+    ]
+    offsets = [(m.utcoffset() or timedelta(0)) // timedelta(microseconds=1) for m in moments]
+    folds = np.array([m.fold for m in moments], bool)
+    return utc_us + np.array(offsets, np.int64)[inverse], folds[inverse]
+
+
+def _in_order(fixes: list[Any], path: Path, notes: list[str], *, sort: bool) -> list[Any]:
+    time_us, line = fixes[0], fixes[-1]
+    if not len(time_us):
+        raise LogError(f"{path} holds no fix with a position")
+    back = np.flatnonzero(np.diff(time_us) < 0)
+    if len(back) and not sort:
+        raise LogError(
+            f"{path}, line {line[back[0] + 1]}: the time runs backwards there ({len(back)} such"
+            " lines); check the clock of the log, or put its lines in order by 'sort: true'"
+        )
+    if len(back):
+        order = np.argsort(time_us, kind="stable")
+        fixes = [values[order] for values in fixes]
+        notes.append(f"{len(back)} lines ran backwards in time and were sorted in")
+    last = np.append(np.diff(fixes[0]) > 0, True)
+    if not last.all():
+        notes.append(f"of {np.count_nonzero(~last)} fixes at equal times the last counts")
+    return [values[last] for values in fixes]

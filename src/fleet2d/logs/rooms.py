@@ -1,0 +1,108 @@
+"""Which room of a home each room label of a log stands for."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+from fleet2d.floorplan.plan import Room
+from fleet2d.floorplan.vocabulary import room_type
+from fleet2d.logs.log import AWAY, LogError
+from fleet2d.problems import did_you_mean
+
+RoomChoice = tuple[str, ...]
+
+DOOR = "door"
+"""The front door: who is there may be about to leave."""
+
+USUAL: dict[str, RoomChoice] = {
+    "away": (AWAY,),
+    "outsidedoor": (DOOR,),
+    "outside_door": (DOOR,),
+    "maindoor": (DOOR,),
+    "frontdoor": (DOOR,),
+    "front_door": (DOOR,),
+    "entrance": (DOOR,),
+    "livingroom": ("living_room",),
+    "living": ("living_room",),
+    "lounge": ("living_room",),
+    "loungechair": ("living_room",),
+    "diningroom": ("dining_room", "kitchen"),
+    "dining_room": ("dining_room", "kitchen"),
+    "dining": ("dining_room", "kitchen"),
+    "workarea": ("office", "living_room"),
+    "home_office": ("office", "living_room"),
+    "office": ("office", "living_room"),
+    "toilet": ("toilet", "bathroom"),
+    "bathroom": ("bathroom", "toilet"),
+    "hallway": ("hallway", "hall"),
+    "hall": ("hall", "hallway"),
+    # activities of a log that tells no rooms
+    "sleeping": ("bedroom",),
+    "toileting": ("bathroom", "toilet"),
+    "showering": ("bathroom",),
+    "grooming": ("bathroom",),
+    "breakfast": ("kitchen",),
+    "lunch": ("kitchen",),
+    "dinner": ("kitchen",),
+    "snack": ("kitchen",),
+    "spare_time_tv": ("living_room",),
+}
+"""What labels of the known data sets mean, as tried in turn, where the user doesn't say."""
+
+
+def map_rooms(
+    labels: Mapping[str, int], given: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
+) -> dict[str, RoomChoice | None]:
+    """Return the rooms that each label of a log stands for, to be tried in turn.
+
+    `("away",)` is out of the home and `("door",)` its front door; None leaves the readings out.
+
+    Args:
+        labels: How many readings each label has.
+        given: What the user says about some of them.
+        rooms: The rooms of the home.
+
+    Raises:
+        LogError: A label is unknown, or stands for no room of this home.
+    """
+    for label, choice in given.items():
+        if label not in labels:
+            raise LogError(
+                f"rooms: the log has no room {label!r}{did_you_mean(label, labels)}"
+                f" It has: {', '.join(sorted(labels))}"
+            )
+        if choice is not None and _first_fit(choice, rooms) is None:
+            names = _names(rooms)
+            raise LogError(
+                f"rooms: {label!r} is to be {' or '.join(choice)}, but there is no such room"
+                f"{did_you_mean(choice[0], names)} There are: {', '.join(names)}, away, door"
+            )
+    mapped: dict[str, RoomChoice | None] = {}
+    for label, count in labels.items():
+        if label in given:
+            mapped[label] = given[label]
+            continue
+        choice = _usual(label, rooms)
+        if choice is None:
+            raise LogError(
+                f"no room of this home stands for {label!r}, which {count} readings of the log"
+                f" name; say which does by rooms: {{{label}: …}}, one of"
+                f" {', '.join(_names(rooms))}, away, door, or null to leave them out"
+            )
+        mapped[label] = choice
+    return mapped
+
+
+def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
+    if any(room.name == label for room in rooms):
+        return (label,)
+    kind = room_type(label)
+    return _first_fit(USUAL.get(kind, (kind,)), rooms)
+
+
+def _first_fit(choice: RoomChoice, rooms: Sequence[Room]) -> RoomChoice | None:
+    """Return the first of some names that is a room, a kind of room, away or the door."""
+    names = {AWAY, DOOR, "any", *(room.name for room in rooms), *(room.type for room in rooms)}
+    return next(((name,) for name in choice if name in names), None)
+
+
+def _names(rooms: Collection[Room]) -> list[str]:
+    return [room.name for room in rooms] + sorted({room.type for room in rooms})

@@ -1,0 +1,111 @@
+"""The layout of the UCI ADL data sets: intervals of sensors with their place, and of activities.
+
+::
+
+    2011-11-28 10:21:44    2011-11-28 10:23:31    Basin    PIR    Bathroom      (…_Sensors.txt)
+    2011-11-28 10:21:24    2011-11-28 10:23:36    Toileting                     (…_ADLs.txt)
+
+The two files of a home belong together and are read together, whichever is named: the sensors say
+in which room somebody is, the activities what is done there and when the home is left. Of a file
+of activities alone, each activity stands for the room it is done in.
+"""
+
+import re
+from bisect import bisect_right
+from datetime import date, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order
+from fleet2d.logs.times import parse_time, since
+
+_TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
+LINE = re.compile(rf"{_TIME}\s+{_TIME}\s+(.*)")
+HEAD = re.compile(r"(Start time\s+End time.*|[-\s]+)")
+LEAVING = frozenset({"leaving", "leave_home", "away", "out"})
+
+
+class _Row(NamedTuple):
+    begin: datetime
+    end: datetime
+    what: str
+    line: int
+
+
+def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
+    """Read a home's sensors and activities.
+
+    Raises:
+        LogError: A line is damaged, or times run backwards.
+    """
+    rows = {what: (file, _rows(file)) for what, file in _pair(path).items()}
+    first_day = min(row.begin.date() for _, found in rows.values() for row in found)
+    notes: list[str] = []
+    parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
+    for what, (file, found) in rows.items():
+        parts[what], amiss = in_order([_reading(r, first_day) for r in found], file, sort=sort)
+        notes += [f"{file.name}: {note}" for note in amiss]
+    readings = parts["activities"]
+    if parts["sensors"]:
+        readings = _joined(parts["sensors"], readings)
+    return ActivityLog(path, "uci_adl", first_day, tuple(readings), tuple(notes))
+
+
+def _pair(path: Path) -> dict[str, Path]:
+    """Return the files of a home: of sensors, of activities, or both."""
+    if path.is_dir():
+        found = {
+            "sensors": sorted(path.glob("*_Sensors.txt")),
+            "activities": sorted(path.glob("*_ADLs.txt")),
+        }
+        for what, files in found.items():
+            if len(files) > 1:
+                raise LogError(f"{path} holds {len(files)} files of {what}: name the one to read")
+        return {what: files[0] for what, files in found.items() if files}
+    is_sensors = len(_rows(path)[0].what.split()) >= 3
+    parts = ("_Sensors", "_ADLs") if is_sensors else ("_ADLs", "_Sensors")
+    twin = path.with_name(path.name.replace(*parts))
+    pair = {"sensors" if is_sensors else "activities": path}
+    if twin != path and twin.is_file():
+        pair["activities" if is_sensors else "sensors"] = twin
+    return pair
+
+
+def _rows(path: Path) -> list[_Row]:
+    rows = []
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for number, text in enumerate(lines, 1):
+            if not text.strip() or HEAD.fullmatch(text.strip()):
+                continue
+            match = LINE.fullmatch(text.strip())
+            if match is None:
+                raise LogError(
+                    f"{path}, line {number}: found {text.strip()[:60]!r} where a start time, an end"
+                    " time and an activity, or a sensor, its type and its place, are wanted"
+                )
+            begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
+            rows.append(_Row(begin, end, match[3].strip(), number))
+    if not rows:
+        raise LogError(f"{path} holds no reading: is it the right file?")
+    return rows
+
+
+def _reading(row: _Row, first_day: date) -> Reading:
+    begin, end, what, number = row
+    words = what.split()
+    label = words[-1]
+    activity = label if len(words) == 1 else ""
+    room = AWAY if activity.lower() in LEAVING else label
+    return Reading(since(first_day, begin), since(first_day, end), room, activity, number)
+
+
+def _joined(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
+    """Return the sensors' readings with the activity they are part of, and those of being out."""
+    begins = [activity.begin_us for activity in activities]
+    readings = [reading for reading in activities if reading.room == AWAY]
+    for sensor in sensors:
+        during = bisect_right(begins, sensor.begin_us) - 1
+        inside = during >= 0 and sensor.begin_us <= activities[during].end_us
+        readings.append(sensor._replace(activity=activities[during].activity if inside else ""))
+    # Of what begins at one time the door comes first, so that being out is what holds.
+    return sorted(readings, key=lambda reading: (reading.begin_us, reading.room == AWAY))

@@ -1,0 +1,1 @@
+"""How people spend their days: activities, personas, the planner, households, the survey."""

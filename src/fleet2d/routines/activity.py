@@ -1,0 +1,158 @@
+"""Activities: where people do what, for how long, and how still they keep at it."""
+
+from datetime import timedelta
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.problems import did_you_mean, problem
+from fleet2d.routines import laws
+from fleet2d.routines.written import NUMBER, PAIR, TEXT, OrWritten
+from fleet2d.scenario.document import read_document
+from fleet2d.units import Duration, PositiveDuration, format_duration
+
+HERE = Path(__file__).parent
+SECOND = timedelta(seconds=1)
+# Of a duration of which only the mean is given: how wide it spreads about it.
+USUAL_SPREAD = 0.3
+
+
+def seconds(duration: timedelta) -> int:
+    """Return a duration in whole seconds."""
+    return duration // SECOND
+
+
+class Takes(Settings):
+    """How long something takes: a law of durations.
+
+    Short forms: ``30 min`` is a lognormal law of that mean, ``[20 min, 40 min]`` is anything
+    between, as likely as any other.
+    """
+
+    law: Literal["lognormal", "gamma", "normal", "uniform", "fixed", "measured"] = Field(
+        default="lognormal", description="its shape"
+    )
+    mean: PositiveDuration = Field(
+        default=timedelta(minutes=30), description="its mean, before it is cut"
+    )
+    std: Duration | None = Field(
+        default=None, description="its standard deviation; left out: 30 % of the mean"
+    )
+    at_least: Duration | None = Field(default=None, description="nothing shorter is drawn")
+    at_most: Duration | None = Field(default=None, description="nothing longer is drawn")
+    quantiles: tuple[Duration, ...] = Field(
+        default=(),
+        description="of law measured: quantiles at evenly spaced probabilities from 0 to 1",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_short_forms(cls, data: Any) -> Any:
+        if isinstance(data, str | int | float | timedelta):
+            return {"mean": data}
+        if isinstance(data, list | tuple):
+            if len(data) != 2:
+                raise problem(f"found {data}; a range of durations is wanted, [20 min, 40 min]")
+            return {"law": "uniform", "at_least": data[0], "at_most": data[1]}
+        return data
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> Self:
+        if self.law == "uniform" and (self.at_least is None or self.at_most is None):
+            raise problem("law uniform needs at_least and at_most")
+        if self.law == "measured" and (
+            len(self.quantiles) < 2 or list(self.quantiles) != sorted(self.quantiles)
+        ):
+            raise problem("law measured needs 'quantiles': two durations or more, rising")
+        if self.at_least and self.at_most and self.at_least > self.at_most:
+            raise problem(
+                f"at_least {format_duration(self.at_least)} is longer than at_most"
+                f" {format_duration(self.at_most)}"
+            )
+        if (self.at_most or self.mean) < SECOND:
+            raise problem("what is done takes a second or more")
+        return self
+
+    def table(self) -> laws.Law:
+        """Return the law as a table of quantiles [s]."""
+        mean = seconds(self.mean)
+        std = seconds(self.std) if self.std is not None else int(mean * USUAL_SPREAD)
+        low = None if self.at_least is None else seconds(self.at_least)
+        high = None if self.at_most is None else seconds(self.at_most)
+        if self.law == "fixed" or (std == 0 and self.law != "measured" and self.law != "uniform"):
+            return laws.uniform(mean, mean)
+        if self.law == "uniform":
+            return laws.uniform(low or 0, high or 0)
+        if self.law == "measured":
+            return laws.empirical([seconds(d) for d in self.quantiles]).within(low, high)
+        make = {"lognormal": laws.lognormal, "gamma": laws.gamma, "normal": laws.normal}[self.law]
+        return make(mean, std).within(low, high)
+
+
+AnyTakes = Annotated[Takes, OrWritten(TEXT, NUMBER, PAIR)]
+"""A law of durations, in any form."""
+
+
+class Activity(Settings):
+    """Something that people do: where, how, how long, and how still they keep."""
+
+    rooms: tuple[str, ...] = Field(
+        default=("any",), description="rooms or kinds of rooms to try, in turn"
+    )
+    objects: tuple[str, ...] = Field(
+        default=(), description="kinds of furniture that it uses, to try in turn; else a spot"
+    )
+    posture: Literal["stand", "sit", "lie"] = Field(
+        default="stand", description="how one does it where there is no such furniture"
+    )
+    away: bool = Field(default=False, description="out of the home")
+    exclusive: bool = Field(
+        default=False, description="one member of a household at a time, as a bathroom is used"
+    )
+    takes: AnyTakes = Field(default=Takes(), description="how long it takes")
+    shifts: PositiveDuration | None = Field(
+        default=None, description="mean time between turns on the spot; left out: never"
+    )
+    moves: PositiveDuration | None = Field(
+        default=None, description="mean time between walks to another spot of the room"
+    )
+    fetches: PositiveDuration | None = Field(
+        default=None, description="mean time between short ways elsewhere and back"
+    )
+    fetches_from: tuple[str, ...] = Field(
+        default=("kitchen", "any"), description="rooms to try for that, in turn"
+    )
+    fetch_takes: AnyTakes = Field(
+        default=Takes(mean=timedelta(minutes=2)), description="how long one stays there"
+    )
+
+
+@cache
+def catalogue() -> dict[str, Activity]:
+    """Return the activities that come with Fleet2D, by name.
+
+    >>> catalogue()["cook"].rooms, catalogue()["work"].away
+    (('kitchen', 'any'), True)
+    """
+    data = read_document(HERE / "activities.yaml").data
+    return {name: Activity.model_validate(fields) for name, fields in data.items()}
+
+
+def find_activity(name: str, own: dict[str, Activity]) -> Activity:
+    """Return an activity by its name, own ones first.
+
+    Raises:
+        PydanticCustomError: There is none of that name.
+    """
+    if name in own:
+        return own[name]
+    if name in catalogue():
+        return catalogue()[name]
+    known = sorted({*own, *catalogue()})
+    raise problem(
+        f"there is no activity {name!r}{did_you_mean(name, known)} There are: {', '.join(known)};"
+        " a new one is described under 'activities'"
+    )

@@ -1,0 +1,197 @@
+"""Laws of durations and times of day, as tables of quantiles: exact on every machine.
+
+A law is kept as its quantiles at (i + 1/2) / KNOTS, in whole seconds, joined by straight lines. A
+draw within bounds inverts that curve between them: no rejection, and a law that is cut stays the
+same law, conditioned. The tables come from + - * / and sqrt alone.
+"""
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+from fleet2d.streams import Draws
+
+KNOTS = 128
+_BITS = 24
+_ONE = 1 << _BITS
+_LN2 = 0.6931471805599453
+
+# Quantiles of the normal law at (64.5, 65.5, … 127.5) / 128, in 1e-5 standard deviations.
+_BELL = (
+    979, 2938, 4898, 6859, 8824, 10792, 12764, 14740, 16723, 18713, 20709, 22714, 24729, 26753,
+    28788, 30835, 32896, 34970, 37060, 39166, 41289, 43431, 45593, 47777, 49984, 52215, 54473,
+    56759, 59075, 61423, 63806, 66225, 68683, 71184, 73730, 76325, 78973, 81677, 84442, 87273,
+    90175, 93156, 96222, 99382, 102643, 106018, 109518, 113158, 116954, 120926, 125099, 129502,
+    134172, 139154, 144507, 150310, 156669, 163733, 171723, 180989, 192135, 206353, 226623,
+    266007,
+)  # fmt: skip
+NORMAL = tuple(-z / 1e5 for z in reversed(_BELL)) + tuple(z / 1e5 for z in _BELL)
+"""Standard normal quantiles, -2.66 to 2.66: a normal law is cut there."""
+
+
+class Law(NamedTuple):
+    """A distribution over whole seconds.
+
+    Attributes:
+        knots: Quantiles at evenly spaced probabilities, rising [s].
+        shortest: Nothing below is drawn [s].
+        longest: Nothing above is drawn [s].
+
+    Example:
+        >>> from fleet2d.streams import Draws, stream_key
+        >>> law = lognormal(1800, 600)
+        >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
+        >>> [law.draw(draws) for _ in range(4)], law.draw(draws, 0, 900)
+        ([1997, 1522, 2191, 1736], 812)
+    """
+
+    knots: tuple[int, ...]
+    shortest: int
+    longest: int
+
+    def draw(self, draws: Draws, low: int | None = None, high: int | None = None) -> int:
+        """Return a value of the law given that it is from `low` to `high` [s].
+
+        Where the law has nothing between them, the end nearer to it.
+        """
+        low = self.shortest if low is None or low < self.shortest else low
+        high = self.longest if high is None or high > self.longest else high
+        if low >= high:
+            return min(low, high) if high < self.shortest else low
+        first, last = position(self.knots, low), position(self.knots, high)
+        if first >= last:
+            return low if low >= self.knots[-1] else high
+        at = first + draws.below(last - first)
+        i = at >> _BITS
+        below, above = self.knots[i], self.knots[i + 1]
+        value = below + ((above - below) * (at & (_ONE - 1)) >> _BITS)
+        return min(max(value, low), high)
+
+    def mean(self) -> float:
+        """Return the mean of the law between its bounds [s]."""
+        inside = [min(max(knot, self.shortest), self.longest) for knot in self.knots]
+        return sum((a + b) / 2 for a, b in pairwise(inside)) / (len(inside) - 1)
+
+    def within(self, shortest: int | None, longest: int | None) -> "Law":
+        """Return the law cut to bounds [s]."""
+        return Law(
+            self.knots,
+            self.shortest if shortest is None else shortest,
+            self.longest if longest is None else longest,
+        )
+
+
+def position(knots: Sequence[int], value: int) -> int:
+    """Return how far along the knots a value is, in 2**-24 of the way from one to the next."""
+    i = bisect_right(knots, value) - 1
+    if i < 0:
+        return 0
+    if i >= len(knots) - 1:
+        return (len(knots) - 1) << _BITS
+    return (i << _BITS) + ((value - knots[i]) << _BITS) // (knots[i + 1] - knots[i])
+
+
+def _law(quantile: Callable[[float], float]) -> Law:
+    """Make a law of the value that belongs to each standard normal quantile."""
+    knots: list[int] = []
+    for z in NORMAL:
+        value = int(quantile(z) + 0.5)
+        knots.append(max(value, knots[-1] if knots else 0))
+    return Law(tuple(knots), knots[0], knots[-1])
+
+
+@lru_cache(None)
+def lognormal(mean_s: float, std_s: float) -> Law:
+    """Return the lognormal law of a mean and a standard deviation [s]."""
+    ratio = std_s / mean_s
+    variance = log(1 + ratio * ratio)
+    sigma, middle = math.sqrt(variance), mean_s / math.sqrt(1 + ratio * ratio)
+    return _law(lambda z: middle * exp(sigma * z))
+
+
+@lru_cache(None)
+def gamma(mean_s: float, std_s: float) -> Law:
+    """Return the gamma law of a mean and a standard deviation [s], after Wilson and Hilferty."""
+    ninth = (std_s / mean_s) * (std_s / mean_s) / 9  # 1 / (9 k), k the shape
+
+    def quantile(z: float) -> float:
+        root = max(1 - ninth + z * math.sqrt(ninth), 0.0)
+        return mean_s * root * root * root
+
+    return _law(quantile)
+
+
+@lru_cache(None)
+def normal(mean_s: float, std_s: float) -> Law:
+    """Return the normal law of a mean and a standard deviation [s], cut at 0."""
+    return _law(lambda z: max(mean_s + std_s * z, 0.0))
+
+
+@lru_cache(None)
+def exponential(mean_s: float) -> Law:
+    """Return the exponential law of a mean [s]: the time to the next event of a Poisson process."""
+    knots = [int(-mean_s * log((KNOTS - i - 0.5) / KNOTS) + 0.5) for i in range(KNOTS)]
+    return Law(tuple(knots), knots[0], knots[-1])
+
+
+def uniform(low_s: int, high_s: int) -> Law:
+    """Return the law under which every second from `low_s` to `high_s` is as likely."""
+    return Law((low_s, high_s), low_s, high_s)
+
+
+def empirical(quantiles: Sequence[int]) -> Law:
+    """Return the law of measured quantiles at evenly spaced probabilities from 0 to 1 [s]."""
+    return Law(tuple(quantiles), quantiles[0], quantiles[-1])
+
+
+def weighted(draws: Draws, weights: Sequence[int]) -> int:
+    """Return a number from 0 to len(weights) - 1, each as likely as its weight says.
+
+    >>> from fleet2d.streams import Draws, stream_key
+    >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
+    >>> [weighted(draws, [0, 8, 0]) for _ in range(8)]
+    [1, 1, 1, 1, 1, 1, 1, 1]
+    """
+    at = draws.below(sum(weights))
+    for i, weight in enumerate(weights):
+        at -= weight
+        if at < 0:
+            return i
+    raise ValueError("weights are 0 or more")
+
+
+def exp(x: float) -> float:
+    """Return e**x for |x| < 40 by + * / alone, the same on every machine.
+
+    >>> round(exp(1.0), 12), round(exp(-2.5), 12)
+    (2.718281828459, 0.082084998624)
+    """
+    small, total, term = x / 64, 1.0, 1.0
+    for n in range(1, 16):
+        term = term * small / n
+        total += term
+    for _ in range(6):
+        total *= total
+    return total
+
+
+def log(x: float) -> float:
+    """Return the natural logarithm of x > 0 by + - * / alone, the same on every machine.
+
+    >>> round(log(10.0), 12), round(log(0.05), 12)
+    (2.302585092994, -2.995732273554)
+    """
+    halvings = 0
+    while x > 1.5:
+        x, halvings = x / 2, halvings + 1
+    while x < 0.75:
+        x, halvings = x * 2, halvings - 1
+    ratio = (x - 1) / (x + 1)
+    square, power, total = ratio * ratio, ratio, 0.0
+    for n in range(1, 40, 2):
+        total += power / n
+        power *= square
+    return 2 * total + halvings * _LN2

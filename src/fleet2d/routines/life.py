@@ -1,0 +1,59 @@
+"""The life of somebody: one drawn day after another, each a function of its date alone."""
+
+from collections.abc import Sequence
+from datetime import date
+
+from fleet2d.routines.persona import Persona
+from fleet2d.routines.planner import DAY_S, DayPlan, Doing, plan_day
+from fleet2d.streams import Draws, stream_key
+
+# So many days are remembered, of those that were asked for.
+REMEMBERED = 8
+
+
+class Life:
+    """The days that a persona lives.
+
+    A day is known by the ordinal of its date, and drawn from it: no day depends on when a run
+    begins, nor on which days were asked for before.
+
+    Example:
+        >>> from fleet2d.routines.persona import bundled_persona
+        >>> life = Life(bundled_persona("retired"), seed=4, path="users.ana")
+        >>> day = life.day(date(2026, 1, 5).toordinal())
+        >>> [doing.activity for doing in day[:3]], day[-1].activity
+        (['wash', 'dress', 'breakfast'], 'sleep')
+    """
+
+    def __init__(self, persona: Persona, seed: int, path: str) -> None:
+        self.persona = persona
+        self._wake = stream_key(seed, path, "wake")
+        self._day = stream_key(seed, path, "day")
+        self._known: dict[int, Sequence[Doing]] = {}
+
+    def template(self, ordinal: int) -> DayPlan:
+        """Return what a day is drawn from."""
+        return self.persona.plans[self.persona.day(date.fromordinal(ordinal))]
+
+    def wake(self, ordinal: int) -> int:
+        """Return when a day begins [s since its midnight]."""
+        return self.template(ordinal).wake.draw(Draws(self._wake, ordinal))
+
+    def draws(self, ordinal: int) -> Draws:
+        """Return the random draws of a day."""
+        return Draws(self._day, ordinal)
+
+    def day(self, ordinal: int) -> Sequence[Doing]:
+        """Return what is done on a day, from waking to the next waking [s since its midnight]."""
+        if ordinal not in self._known:
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            self._known[ordinal] = self.draw_day(ordinal, self.template(ordinal))
+        return self._known[ordinal]
+
+    def draw_day(
+        self, ordinal: int, plan: DayPlan, busy: Sequence[tuple[int, int]] = ()
+    ) -> Sequence[Doing]:
+        """Draw a day from a template that may differ from its own."""
+        next_wake = self.wake(ordinal + 1) + DAY_S
+        return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, busy)

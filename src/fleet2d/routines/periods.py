@@ -1,0 +1,88 @@
+"""Periods: when somebody isn't there at all, whatever their days would be."""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.problems import problem
+from fleet2d.routines.planner import Doing
+from fleet2d.routines.written import PAIR, OrWritten
+
+SECOND = timedelta(seconds=1)
+AWAY = "holiday"
+
+
+def _moment(value: Any) -> Any:
+    """Read a date as its first moment."""
+    if isinstance(value, str) and len(value) == 10:
+        return f"{value}T00:00"
+    if hasattr(value, "year") and not isinstance(value, datetime):
+        return datetime(value.year, value.month, value.day)
+    return value
+
+
+Moment = Annotated[datetime, BeforeValidator(_moment)]
+
+
+class Period(Settings):
+    """A stretch of time; short form: ``[2026-02-14, 2026-02-21T18:00]``."""
+
+    begins: Moment = Field(description="when it begins, local time")
+    ends: Moment = Field(description="when it is over")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_short_form(cls, data: Any) -> Any:
+        if isinstance(data, list | tuple) and len(data) == 2:
+            return {"begins": data[0], "ends": data[1]}
+        return data
+
+    @model_validator(mode="after")
+    def _goes_forward(self) -> "Period":
+        if self.begins.tzinfo or self.ends.tzinfo:
+            raise problem("times of a scenario are local: leave out the time zone")
+        if self.ends <= self.begins:
+            raise problem(f"it begins at {self.begins} and is over at {self.ends}: that is no time")
+        return self
+
+    def within(self, midnight: datetime) -> tuple[int, int]:
+        """Return its beginning and end [s since a midnight]."""
+        return (self.begins - midnight) // SECOND, (self.ends - midnight) // SECOND
+
+
+AnyPeriod = Annotated[Period, OrWritten(PAIR)]
+"""A period, in any form."""
+
+
+def without(
+    day: Sequence[Doing], midnight: datetime, away: Sequence[Period], visits: Sequence[Period]
+) -> list[Doing]:
+    """Return a day in which one is out of the home in some periods, or except in some.
+
+    Args:
+        day: What would be done, without a gap.
+        midnight: Of the day's date.
+        away: When one isn't there.
+        visits: When one is there, and at no other time; empty: always.
+    """
+    begin, end = day[0].begin, day[-1].end
+    absent = [period.within(midnight) for period in away]
+    if visits:
+        here = sorted(period.within(midnight) for period in visits)
+        lasts, firsts = [begin, *(b for _, b in here)], [*(a for a, _ in here), end]
+        absent += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
+    for first, last in absent:
+        day = _cut(day, max(first, begin), min(last, end))
+    return list(day)
+
+
+def _cut(day: Sequence[Doing], first: int, last: int) -> list[Doing]:
+    """Return a day in which one is away from `first` to `last`."""
+    if first >= last:
+        return list(day)
+    before = [doing._replace(end=min(doing.end, first)) for doing in day if doing.begin < first]
+    after = [doing._replace(begin=max(doing.begin, last)) for doing in day if doing.end > last]
+    return [*before, Doing(AWAY, first, last), *after]

@@ -1,0 +1,239 @@
+"""From the templates of a persona to what the planner uses, and whether their days are possible."""
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fleet2d.problems import problem_at
+from fleet2d.routines.activity import seconds
+from fleet2d.routines.laws import Law, normal, uniform
+from fleet2d.routines.planner import (
+    DAY_S,
+    MILLION,
+    NEVER,
+    Chain,
+    DayPlan,
+    Fill,
+    Job,
+    draw_chain,
+    fits,
+)
+from fleet2d.streams import Draws
+
+if TYPE_CHECKING:
+    from datetime import timedelta
+
+    from fleet2d.routines.persona import DayTemplate, Pastime, Persona, Task, Timing
+
+# A window that isn't given reaches this many standard deviations to both sides.
+REACH = 2.5
+# Orders tried before a template is called impossible.
+TRIALS = 60
+
+
+def clock(time_s: int) -> str:
+    """Write a time since midnight, as 'HH:MM', and that of the next day as such.
+
+    >>> clock(27_000), clock(90_000)
+    ('07:30', '01:00 on the next day')
+    """
+    days, rest = divmod(time_s, DAY_S)
+    text = f"{rest // 3600:02}:{rest // 60 % 60:02}"
+    return f"{text} on the next day" if days == 1 else f"{text} {days} days on" if days else text
+
+
+def span(time_s: int) -> str:
+    """Write a length of time.
+
+    >>> span(5400), span(300)
+    ('1 h 30 min', '5 min')
+    """
+    hours, minutes = divmod(-(-time_s // 60), 60)
+    return " ".join([f"{hours} h"] * (hours > 0) + [f"{minutes} min"] * (minutes > 0 or not hours))
+
+
+def day_plans(persona: "Persona") -> dict[str, DayPlan]:
+    """Return what the planner uses of each template, by its name."""
+    return {name: _day_plan(persona, name, day) for name, day in persona.days.items()}
+
+
+def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
+    wake = starts(day.wake, 0)
+    assert wake is not None
+    dawn = wake.shortest
+    sleep = starts(day.sleep, dawn)
+    assert sleep is not None
+    order = _in_order(day.do)
+    jobs = tuple(_job(persona, task, day.do[task], order, dawn) for task in order)
+    leisure = persona.leisure if day.leisure is None else day.leisure
+    fills = tuple(_fill(persona, activity, p, dawn) for activity, p in leisure.items())
+    return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, fills)
+
+
+def _in_order(tasks: dict[str, "Task"]) -> list[str]:
+    """Return the tasks' names, each behind those that come before it."""
+    order: list[str] = []
+    while len(order) < len(tasks):
+        order += [n for n, t in tasks.items() if n not in order and set(t.after) <= set(order)]
+    return order
+
+
+def _job(persona: "Persona", name: str, task: "Task", order: list[str], dawn: int) -> Job:
+    activity = persona.activity(task.activity or name)
+    place = int(task.before_bed) - int(task.on_waking)
+    law = None if place or (task.after and not _timed(task)) else starts(task, dawn)
+    if task.fixed and task.at is not None:
+        law = uniform(of_day(task.at, dawn), of_day(task.at, dawn))
+    return Job(
+        task=name,
+        activity=task.activity or name,
+        starts=law,
+        takes=(task.takes or activity.takes).table(),
+        until=NEVER if task.until is None else of_day(task.until, dawn),
+        after=tuple(sorted(order.index(other) for other in task.after)),
+        chance=round(task.probability * MILLION),
+        needed=task.fixed or task.probability == 1,
+        exclusive=activity.exclusive,
+        place=place,
+    )
+
+
+def _timed(timing: "Timing") -> bool:
+    return timing.at is not None or timing.between is not None
+
+
+def _fill(persona: "Persona", activity: str, pastime: "Pastime", dawn: int) -> Fill:
+    first, last = 0, NEVER
+    if pastime.between is not None:
+        first, last = window(pastime.between, dawn)
+    takes = persona.activity(activity).takes.table()
+    return Fill(activity, max(1, round(pastime.weight * 1000)), takes, first, last)
+
+
+def starts(timing: "Timing", dawn: int) -> Law:
+    """Return the law of when something begins [s], in a day that begins at `dawn` the earliest."""
+    if timing.at is None:
+        if timing.between is None:
+            return uniform(dawn, dawn + DAY_S)
+        return uniform(*window(timing.between, dawn))
+    spread = seconds(timing.spread)
+    if timing.between is not None:
+        first, last = window(timing.between, dawn)
+        at = of_day(timing.at, first)
+    else:
+        at = of_day(timing.at, dawn)
+        reach = int(REACH * spread)
+        first, last = max(at - reach, 0), at + reach
+    law = normal(at, spread) if spread else uniform(at, at)
+    return law.within(first, last)
+
+
+def window(between: "tuple[timedelta, timedelta]", dawn: int) -> tuple[int, int]:
+    """Return a window of times of day in seconds; one that ends before it begins goes on."""
+    first = of_day(between[0], dawn)
+    return first, first + seconds(between[1] - between[0]) % DAY_S
+
+
+def of_day(time: "timedelta", dawn: int) -> int:
+    """Return a time of day in seconds; before the day begins, it is that of the next date."""
+    at = seconds(time)
+    return at + DAY_S if at < dawn else at
+
+
+def check(persona: "Persona") -> None:
+    """Check that whatever is drawn, the days of a persona are possible.
+
+    The worst day wakes as late as it can and is followed by one that wakes as early as it can.
+
+    Raises:
+        ValidationError: A template can't be kept; says which tasks are in each other's way.
+    """
+    plans = persona.plans
+    for name, plan in plans.items():
+        _check_appointments(name, plan)
+        next_wake = DAY_S + min(plans[n].wake.shortest for n in _days_after(persona, name))
+        where = ("days", name)
+        if next_wake - plan.least_sleep < plan.sleep.shortest:
+            raise problem_at(
+                (*where, "sleep"),
+                f"sleep begins at {clock(plan.sleep.shortest)} at the earliest, lasts"
+                f" {span(plan.least_sleep)} at least, and the next day may begin at"
+                f" {clock(next_wake)}: that is too short a night",
+            )
+        _check_room(name, plan, next_wake)
+
+
+def _days_after(persona: "Persona", name: str) -> set[str]:
+    """Return the templates that may follow one: by weekday, and all if it has dates."""
+    days = persona.days
+    if any(day.dates for day in days.values()):
+        return set(days)
+    of_week = [next(n for n in reversed(days) if i in days[n].weekdays) for i in range(7)]
+    after = {of_week[(i + 1) % 7] for i in range(7) if of_week[i] == name}
+    return after or {name}
+
+
+def _check_appointments(name: str, plan: DayPlan) -> None:
+    """Refuse fixed appointments that overlap."""
+    fixed = sorted(
+        (job.starts.shortest, job.task, job.takes.shortest)
+        for job in plan.jobs
+        if job.starts is not None and job.needed and job.starts.shortest == job.starts.longest
+    )
+    for (begin, task, takes), (after, other, _) in pairwise(fixed):
+        if begin + takes > after:
+            raise problem_at(
+                ("days", name, "do", other),
+                f"it begins at {clock(after)}, but {task!r} begins at {clock(begin)} and takes"
+                f" {span(takes)} at least: they overlap",
+            )
+
+
+def _check_room(name: str, plan: DayPlan, next_wake: int) -> None:
+    """Refuse a template of which the needed tasks don't fit in the shortest day."""
+    needed = {i for i, job in enumerate(plan.jobs) if job.needed}
+    wake = plan.wake.longest
+    key = np.uint64(0)
+    trials = (
+        draw_chain(plan, Draws(key, trial), needed, wake, next_wake, by_deadline=trial == 0)
+        for trial in range(TRIALS)
+    )
+    first = next(trials)
+    if fits(plan, first, wake) or any(fits(plan, chain, wake) for chain in trials):
+        return
+    key_path, message = _conflict(first, wake)
+    raise problem_at(("days", name, *key_path), message)
+
+
+def _conflict(chain: Chain, wake: int) -> tuple[tuple[str, ...], str]:
+    """Return the key of the first job of a chain that can't be kept, and why, in words."""
+    names = [*(job.task for job in chain.jobs), "sleep"]
+    now = wake
+    for i, job in enumerate(chain.jobs):
+        now = now if job.starts is None else max(now, job.starts.shortest)
+        if now > chain.latest[i]:
+            until, takes = i, 0  # the first one from here on that can't wait for its own sake
+            while chain.latest[until] == chain.latest[until + 1] - chain.jobs[until].takes.shortest:
+                takes += chain.jobs[until].takes.shortest
+                until += 1
+                if until == len(chain.jobs):
+                    break
+            path = ("do", job.task)
+            day = f"on a day that begins at {clock(wake)}"
+            if until == i:
+                return path, (
+                    f"it has to begin by {clock(chain.latest[i])}, but what comes before it is over"
+                    f" at {clock(now)} at the earliest, {day}"
+                )
+            return path, (
+                f"{day} it can begin at {clock(now)} at the earliest and lasts {span(takes)} at"
+                f" least{' with what follows' * (until > i + 1)}, but {names[until]!r} has to begin"
+                f" by {clock(chain.latest[until])}: widen a window, shorten what is done, or give a"
+                " task a probability below 1"
+            )
+        now += job.takes.shortest
+    return ("sleep",), (
+        f"what has to be done in the day takes until {clock(now)}, but sleep begins at"
+        f" {clock(chain.latest[-1])} at the latest"
+    )

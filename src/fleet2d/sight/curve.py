@@ -1,0 +1,158 @@
+"""Curves: how a probability depends on a distance, an angle or the time of day."""
+
+from collections.abc import Mapping, Sequence
+from decimal import Decimal, localcontext
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, GetJsonSchemaHandler, model_serializer, model_validator
+from pydantic_core import CoreSchema
+
+from fleet2d.component import Settings
+from fleet2d.kernels.perception import ONE
+from fleet2d.problems import problem, problem_at
+from fleet2d.units import Share
+
+EXACT = 20  # digits: far more than a probability of 2**-31 needs
+
+
+class Curve(Settings):
+    """A probability along a quantity: a table with straight lines between its rows, or a logistic.
+
+    In a scenario: ``0.9`` (the same everywhere), ``[[0, 1], [3, 0.9], [5, 0.2]]`` (before the first
+    row and behind the last it goes on level), or ``{midpoint: 4, width: 0.5}``:
+    top / (1 + exp((x - midpoint) / width)).
+
+    Example:
+        >>> curve = Curve.model_validate([[0, 1], [4, 0.5]])
+        >>> [curve.at(x) for x in (-1, 0, 1, 9)]
+        [1.0, 1.0, 0.875, 0.5]
+        >>> Curve(midpoint=3, width=0.5, top=0.9).at(3)
+        0.45
+    """
+
+    points: tuple[tuple[float, Share], ...] = Field(
+        default=(),
+        description="rows [where, probability], ascending",
+        examples=[[[0, 1], [4, 0.6]]],
+    )
+    midpoint: float | None = Field(
+        default=None, description="logistic: where it is at half its top"
+    )
+    width: float | None = Field(
+        default=None, gt=0, description="logistic: how slowly it falls, e.g. to 27 % in one width"
+    )
+    top: Share = Field(default=1.0, description="logistic: the probability far before the midpoint")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_forms(cls, data: Any) -> Any:
+        if isinstance(data, Sequence) and not isinstance(data, str):
+            return {"points": data}
+        if isinstance(data, str | int | float) and not isinstance(data, bool):
+            return {"points": [[0.0, data]]}
+        return data
+
+    @model_validator(mode="after")
+    def _is_one_of_both(self) -> Self:
+        logistic = self.midpoint is not None and self.width is not None
+        if logistic == bool(self.points) or (self.midpoint is None) != (self.width is None):
+            raise problem(
+                "a curve is a number, rows like [[0, 1], [4, 0.6]], or {midpoint: …, width: …}"
+            )
+        for (one, _), (other, _) in pairwise(self.points):
+            if not one < other:
+                raise problem_at(("points",), f"{other:g} stands behind {one:g}: rows must ascend")
+        return self
+
+    @model_serializer(mode="plain")
+    def _shortest(self) -> Any:
+        """Write it as it is read: rows, or a logistic; so that one merges onto the other."""
+        if self.points:
+            return [list(row) for row in self.points]
+        return {"midpoint": self.midpoint, "width": self.width, "top": self.top}
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Tell editors of the short forms, too."""
+        row = {"type": "array", "minItems": 2, "maxItems": 2}
+        short = [{"type": "number"}, {"type": "string"}, {"type": "array", "items": row}]
+        return {"anyOf": [*short, handler(schema)]}
+
+    @property
+    def reaches_below_zero(self) -> bool:
+        """Whether it tells of negative values."""
+        return bool(self.points) and self.points[0][0] < 0
+
+    def at(self, x: float) -> float:
+        """Return the probability at one place."""
+        return float(self._shares(np.array([x], np.float64))[0])
+
+    def chances(self, places: Sequence[float]) -> NDArray[np.int64]:
+        """Return the probabilities at many places [2**-31]."""
+        return np.rint(self._shares(np.array(places, np.float64)) * ONE).astype(np.int64)
+
+    def _shares(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the probabilities at many places, the same on every machine."""
+        if self.midpoint is not None and self.width is not None:
+            with localcontext(prec=EXACT):
+                top, middle, width = map(Decimal, (self.top, self.midpoint, self.width))
+                steps = [(Decimal(x) - middle) / width for x in places.tolist()]
+                # Not math.exp, which differs between machines in the last bit.
+                return np.array([float(top / (1 + _exp(step))) for step in steps])
+        x, y = np.array(self.points).T
+        behind = np.minimum(np.searchsorted(x, places, side="right"), len(x) - 1)
+        before = np.maximum(behind - 1, 0)
+        run = np.where(behind > before, x[behind] - x[before], 1.0)
+        along = np.clip((places - x[before]) / run, 0.0, 1.0)
+        shares: NDArray[np.float64] = y[before] + (y[behind] - y[before]) * along
+        return shares
+
+    def around_the_clock(self) -> "Curve":
+        """Return the same over hours from -24 to 48, so that the day's end meets its beginning."""
+        if len(self.points) < 2:
+            return self
+        days = [(hour + day, p) for day in (-24, 0, 24) for hour, p in self.points]
+        return Curve(points=tuple(days))
+
+
+def chance(share: float) -> int:
+    """Return a probability [2**-31].
+
+    >>> chance(0.5) == 2**30
+    True
+    """
+    return round(share * ONE)
+
+
+def decay(steps: Decimal) -> float:
+    """Return exp(-steps), the same on every machine.
+
+    >>> decay(Decimal(1))
+    0.36787944117144233
+    """
+    with localcontext(prec=EXACT):
+        return float(_exp(-steps))
+
+
+def _exp(x: Decimal) -> Decimal:
+    """Return exp(x), cut where a probability would be 0 or 1."""
+    limit = Decimal(200)
+    return (limit if x > limit else -limit if x < -limit else x).exp()
+
+
+def cumulative(weights: Mapping[Any, float], order: Sequence[Any]) -> list[int]:
+    """Return the cumulative probabilities [2**-31] of outcomes, in an order; unnamed ones have 0.
+
+    >>> [x / 2**31 for x in cumulative({"a": 0.25, "c": 0.5}, "abc")]
+    [0.25, 0.25, 0.75]
+    """
+    total, sums = 0.0, []
+    for name in order:
+        total += weights.get(name, 0.0)
+        sums.append(chance(total))
+    return sums

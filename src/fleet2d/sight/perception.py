@@ -1,0 +1,158 @@
+"""Perception: how what a robot makes of its camera's pictures differs from what is there.
+
+Every part is perfect unless the scenario says otherwise.
+"""
+
+from datetime import timedelta
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.problems import problem_at
+from fleet2d.sight.curve import Curve
+from fleet2d.units import AngleDeg, Duration, Length, Share
+
+Posture = Literal["stand", "sit", "lie"]
+POSTURES: tuple[Posture, ...] = ("stand", "sit", "lie")
+ALWAYS = Curve(points=((0.0, 1.0),))
+NEVER = Curve(points=((0.0, 0.0),))
+# Shares that should make a whole may miss it by so much, as 1/3 in decimals does.
+NEARLY = 1e-6
+
+
+def _check_sum(location: tuple[str, ...], total: float) -> None:
+    if total > 1 + NEARLY:
+        raise problem_at(location, f"the shares add up to {total:g}, more than 1")
+
+
+class Detection(Settings):
+    """How surely a user in view is noticed: the camera's `detection`, times all these.
+
+    A curve of `bearing` that tells of no negative angle holds for both sides.
+    """
+
+    distance: Curve = Field(default=ALWAYS, description="by the distance of the user's centre [m]")
+    bearing: Curve = Field(
+        default=ALWAYS, description="by the angle off the optical axis, left is positive [deg]"
+    )
+    orientation: Curve = Field(
+        default=ALWAYS,
+        description="by the angle between where the user faces and the camera: 0 shows the face, 90"
+        " a side, 180 the back [deg]",
+    )
+    posture: dict[Posture, Share] = Field(
+        default={}, description="by posture: stand, sit, lie; 1 for those left out"
+    )
+    visible_share: Curve = Field(
+        default=ALWAYS,
+        description="by the share of the body's points in view; needs the camera's `body_points`",
+    )
+    light: Curve = Field(default=ALWAYS, description="by the time of day [hours], day after day")
+    memory: Duration = Field(
+        default=timedelta(0),
+        description="time constant of misses: after it, a draw is still the last one with"
+        " probability 1/e; 0: each look is drawn anew",
+    )
+
+
+class Spot(Settings):
+    """A place that is now and then taken for a person: a coat rack, a screen, a mirror."""
+
+    at: tuple[Length, Length] = Field(description="where it is [m]", examples=[[2.5, 1.0]])
+    per_hour: float = Field(ge=0, description="false positives per hour in which it is in view")
+    spread: Length = Field(
+        default=0.0,
+        ge=0,
+        le=10,
+        description="standard deviation of where they appear, per axis [m]",
+    )
+
+
+class FalsePositives(Settings):
+    """People that are noticed, but aren't there: independent looks with a rate per time in view."""
+
+    per_hour: float = Field(
+        default=0.0, ge=0, description="per hour of looking, uniform over what is in view"
+    )
+    spots: tuple[Spot, ...] = Field(
+        default=(), max_length=64, description="places with rates of their own"
+    )
+    looks_like: dict[str, Share] = Field(
+        default={}, description="for which user one is taken; the rest is not recognized"
+    )
+
+    @model_validator(mode="after")
+    def _is_a_share(self) -> Self:
+        _check_sum(("looks_like",), sum(self.looks_like.values()))
+        return self
+
+
+class Identity(Settings):
+    """Whom a noticed user is taken for: recognized, taken for another one, or not recognized."""
+
+    right: Curve | None = Field(
+        default=None, description="recognized, by distance [m]; null: whenever not mistaken"
+    )
+    mistaken: Curve = Field(
+        default=NEVER, description="taken for another user, by distance [m]; the rest is unknown"
+    )
+    confusion: dict[str, dict[str, Share]] = Field(
+        default={},
+        description="for whom each user is mistaken, when mistaken; left out: anyone else alike",
+    )
+    per_track: bool = Field(
+        default=False,
+        description="an identity stays until the user isn't noticed for `lost_after`; otherwise"
+        " each look decides anew",
+    )
+
+    @model_validator(mode="after")
+    def _are_distributions(self) -> Self:
+        for user, others in self.confusion.items():
+            if user in others:
+                raise problem_at(
+                    ("confusion", user), f"{user!r} can't be mistaken for {user!r}: that is right"
+                )
+            total = sum(others.values())
+            if abs(total - 1) > NEARLY:
+                raise problem_at(("confusion", user), f"the shares add up to {total:g}, not to 1")
+        return self
+
+
+class Attributes(Settings):
+    """How wrong the rest is; noise is bell-shaped, with these standard deviations."""
+
+    range_noise: Length = Field(
+        default=0.0, ge=0, le=100, description="of the distance, whatever the distance [m]"
+    )
+    range_noise_share: Share = Field(
+        default=0.0, description="of the distance, as a share of it; both are added"
+    )
+    bearing_noise_deg: AngleDeg = Field(default=0.0, ge=0, le=90, description="of the bearing")
+    heading_noise_deg: AngleDeg = Field(
+        default=0.0, ge=0, le=180, description="of where the user is perceived to face"
+    )
+    posture: dict[Posture, dict[Posture, Share]] = Field(
+        default={},
+        description="what a posture is taken for, with which probability; the rest is right",
+    )
+
+    @model_validator(mode="after")
+    def _are_distributions(self) -> Self:
+        for posture, others in self.posture.items():
+            if posture in others:
+                raise problem_at(
+                    ("posture", posture), f"what isn't confused is {posture!r}: leave it out"
+                )
+            _check_sum(("posture", posture), sum(others.values()))
+        return self
+
+
+class Perception(Settings):
+    """How a robot's perception errs; perfect where nothing is said."""
+
+    detection: Detection = Field(default=Detection(), description="who is noticed")
+    false_positives: FalsePositives = Field(default=FalsePositives(), description="who isn't there")
+    identity: Identity = Field(default=Identity(), description="who it is taken for")
+    attributes: Attributes = Field(default=Attributes(), description="where, and how")

@@ -1,0 +1,25 @@
+"""The `sight` section of a scenario."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from fleet2d.component import OneOf, Settings
+from fleet2d.sight.fov import FieldOfView
+from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.units import PositiveDuration
+
+
+class SightSettings(Settings):
+    """How a run works out what is in view."""
+
+    method: Annotated[FieldOfView, OneOf("sight")] = Field(
+        default=LineOfSight(),
+        description="how it is told whether somebody is in view: line_of_sight,"
+        " visibility_polygon, flashlight, or your own",
+    )
+    seen_every: PositiveDuration | None = Field(
+        default=None,
+        description="how often the seen area is worked out, for the layers of what robots have seen"
+        " and the exposure of rooms; null: in every step",
+    )

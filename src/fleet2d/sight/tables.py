@@ -1,0 +1,261 @@
+"""Perception in the integers of the kernels: tables of probabilities, made once at set-up."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels.headings import HALF_TURN, TURN
+from fleet2d.kernels.lens import Lenses
+from fleet2d.kernels.perception import (
+    DOUBLINGS,
+    GHOST_PURPOSES,
+    MINUTES,
+    MOST_GHOSTS,
+    ONE,
+    POSTURES,
+    PURPOSES,
+    ErrorTables,
+)
+from fleet2d.kernels.random import BELL_STD
+from fleet2d.problems import did_you_mean
+from fleet2d.sight.camera import Lens
+from fleet2d.sight.curve import chance, cumulative, decay
+from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
+from fleet2d.sight.perception import FalsePositives, Identity, Perception
+
+I64 = NDArray[np.int64]
+
+# A table by distance has at most so many entries, each for 2**shift lattice units.
+BINS = 512
+NEARLY = 1e-6
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What tables depend on besides the cameras.
+
+    Attributes:
+        users: Names of the users.
+        radii: Their radii [lattice units].
+        lattice: The home's lattice.
+        step_us: Length of a step.
+        path: The robot's path in the scenario, for errors.
+    """
+
+    users: Sequence[str]
+    radii: Sequence[float]
+    lattice: Lattice
+    step_us: int
+    path: str
+
+
+def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], scene: Scene) -> Lenses:
+    """Return the cameras of a robot as the kernel's arrays."""
+    shape = (len(lenses), len(scene.users))
+    bodies = np.zeros((*shape, max(lens.points for lens in lenses) + 1, 2), np.int64)
+    reach, widest = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    for c, lens in enumerate(lenses):
+        for u, radius in enumerate(scene.radii):
+            body = lens.body(radius)
+            bodies[c, u, : len(body)] = body
+            reach[c, u] = round(radius) + 1 if lens.points else 0
+            widest[c, u] = (lens.far + reach[c, u]) ** 2
+    pans = np.zeros((len(lenses), max(1, *(len(lens.pans) for lens in lenses), 0)), np.int64)
+    for c, lens in enumerate(lenses):
+        pans[c, : len(lens.pans)] = lens.pans
+    return Lenses(
+        near_squared=_row(lens.near**2 for lens in lenses),
+        far_squared=_row(lens.far**2 for lens in lenses),
+        half_angle=_row(lens.half_angle for lens in lenses),
+        chance=_row(lens.chance for lens in lenses),
+        moves=_row(bool(lens.forward or lens.left or lens.heading or lens.pans) for lens in lenses),
+        forward=_row(lens.forward for lens in lenses),
+        left=_row(lens.left for lens in lenses),
+        heading=_row(lens.heading for lens in lenses),
+        pans=pans,
+        pan_count=_row(len(lens.pans) for lens in lenses),
+        pan_us=_row(lens.pan_us for lens in lenses),
+        period=_row(lens.period for lens in lenses),
+        latency=_row(lens.latency for lens in lenses),
+        errs=_row(errs),
+        points=_row(lens.points for lens in lenses),
+        bodies=bodies,
+        reach=reach,
+        widest=widest,
+    )
+
+
+def _row(values: object) -> I64:
+    return np.array([int(value) for value in values], np.int64)  # type: ignore[attr-defined]
+
+
+def error_tables(
+    lenses: Sequence[Lens], perceptions: Sequence[Perception | None], scene: Scene
+) -> ErrorTables:
+    """Return how each camera of a robot errs; the streams are left to the caller.
+
+    Raises:
+        ScenarioError: It names a user who isn't there, probabilities add up to more than 1, or a
+            rate is above one false positive per look.
+    """
+    cameras, users = len(lenses), len(scene.users)
+    given = [perception or Perception() for perception in perceptions]
+    sources = 1 + max(len(perception.false_positives.spots) for perception in given)
+    # Where no camera errs, nothing of all this is ever read.
+    errs = any(perception is not None for perception in perceptions)
+    bins = BINS if errs else 1
+    points = 2 + max(lens.points for lens in lenses)
+    tables = ErrorTables(
+        shift=np.zeros(cameras, np.int64),
+        distance=np.zeros((cameras, bins), np.int64),
+        bearing=np.zeros((cameras, TURN if errs else 1), np.int64),
+        facing=np.zeros((cameras, HALF_TURN + 1 if errs else 1), np.int64),
+        posture=np.full((cameras, POSTURES), ONE, np.int64),
+        shown=np.zeros((cameras, points), np.int64),
+        light=np.zeros((cameras, MINUTES if errs else 1), np.int64),
+        stay=np.zeros((cameras, DOUBLINGS), np.int64),
+        right=np.zeros((cameras, bins), np.int64),
+        mistaken=np.zeros((cameras, bins), np.int64),
+        whom=np.zeros((cameras, users, users), np.int64),
+        keeps=np.zeros(cameras, np.int64),
+        range_noise=np.zeros(cameras, np.int64),
+        range_share=np.zeros(cameras, np.int64),
+        bearing_noise=np.zeros(cameras, np.int64),
+        heading_noise=np.zeros(cameras, np.int64),
+        seems=np.full((cameras, POSTURES, POSTURES), ONE, np.int64),
+        sources=np.zeros(cameras, np.int64),
+        ghosts=np.full((cameras, sources, MOST_GHOSTS), ONE, np.int64),
+        spot=np.zeros((cameras, sources, 3), np.int64),
+        looks_like=np.zeros((cameras, users + 1), np.int64),
+        keys=np.zeros((cameras, users, PURPOSES), np.uint64),
+        ghost_keys=np.zeros((cameras, sources, GHOST_PURPOSES), np.uint64),
+    )
+    for c, (lens, perception) in enumerate(zip(lenses, perceptions, strict=True)):
+        if perception is not None:
+            reach = lens.far + max((round(radius) + 2 for radius in scene.radii), default=0)
+            tables.shift[c] = max(0, reach.bit_length() - (BINS - 1).bit_length())
+            _fill_detection(tables, c, lens, perception, scene)
+            _fill_identity(tables, c, perception.identity, scene)
+            _fill_attributes(tables, c, perception, scene)
+            _fill_false_positives(tables, c, lens, perception.false_positives, scene)
+    return tables
+
+
+def _distances(tables: ErrorTables, camera: int, scene: Scene) -> list[float]:
+    """Return the distance in the middle of each entry of the tables by distance [m]."""
+    width = 1 << int(tables.shift[camera])
+    return [(i + 0.5) * width / scene.lattice.units_per_m for i in range(BINS)]
+
+
+def _fill_detection(
+    tables: ErrorTables, camera: int, lens: Lens, perception: Perception, scene: Scene
+) -> None:
+    model = perception.detection
+    tables.distance[camera] = model.distance.chances(_distances(tables, camera, scene))
+    angles = [360 * i / TURN for i in range(-HALF_TURN, HALF_TURN)]
+    if not model.bearing.reaches_below_zero:
+        angles = [abs(angle) for angle in angles]
+    tables.bearing[camera] = model.bearing.chances(angles)
+    turns = range(HALF_TURN + 1)
+    tables.facing[camera] = model.orientation.chances([360 * i / TURN for i in turns])
+    tables.posture[camera] = [chance(model.posture.get(name, 1.0)) for name in POSTURE_NAMES]
+    count = lens.points + 1
+    tables.shown[camera, : count + 1] = model.visible_share.chances(
+        [i / count for i in range(count + 1)]
+    )
+    hours = [(minute + 0.5) / 60 for minute in range(MINUTES)]
+    tables.light[camera] = model.light.around_the_clock().chances(hours)
+    if model.memory:
+        steps = Decimal(scene.step_us) / Decimal(round(model.memory.total_seconds() * 10**6))
+        tables.stay[camera] = [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)]
+
+
+def _fill_identity(tables: ErrorTables, camera: int, model: Identity, scene: Scene) -> None:
+    distances = _distances(tables, camera, scene)
+    mistaken = model.mistaken.chances(distances)
+    right = ONE - mistaken if model.right is None else model.right.chances(distances)
+    over = np.flatnonzero(right + mistaken > ONE + chance(NEARLY))
+    if len(over):
+        i = int(over[0])
+        raise ScenarioError(
+            f"{scene.path}: perception.identity: at {distances[i]:.2f} m, right"
+            f" ({right[i] / ONE:.3g}) and mistaken ({mistaken[i] / ONE:.3g}) add up to more than 1"
+        )
+    tables.right[camera], tables.mistaken[camera] = right, mistaken
+    tables.keeps[camera] = model.per_track
+    _check_users(model.confusion, "confusion", scene)
+    for u, user in enumerate(scene.users):
+        others = model.confusion.get(user)
+        if others is None:
+            rest = [name for name in scene.users if name != user]
+            others = {name: 1 / len(rest) for name in rest}
+        _check_users(others, f"confusion.{user}", scene)
+        tables.whom[camera, u] = _whole(cumulative(others, scene.users), others, scene.users)
+
+
+def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
+    """Let cumulative probabilities that should end at 1 do so, from the last outcome there is."""
+    last = max((i for i, name in enumerate(order) if shares.get(name)), default=len(order))
+    return [*sums[:last], *[ONE] * (len(sums) - last)]
+
+
+def _check_users(names: Mapping[str, object], key: str, scene: Scene) -> None:
+    for name in names:
+        if name not in scene.users:
+            raise ScenarioError(
+                f"{scene.path}: perception: {key} names {name!r}, who is no user"
+                f"{did_you_mean(name, scene.users)} There are: {', '.join(scene.users)}"
+            )
+
+
+def _fill_attributes(
+    tables: ErrorTables, camera: int, perception: Perception, scene: Scene
+) -> None:
+    model, per_bell = perception.attributes, 65536 / BELL_STD
+    tables.range_noise[camera] = round(model.range_noise * scene.lattice.units_per_m * per_bell)
+    tables.range_share[camera] = round(model.range_noise_share * per_bell * 65536)
+    tables.bearing_noise[camera] = round(model.bearing_noise_deg / 360 * 2 * TURN * per_bell)
+    tables.heading_noise[camera] = round(model.heading_noise_deg / 360 * TURN * per_bell)
+    for i, posture in enumerate(POSTURE_NAMES):
+        others: dict[str, float] = dict(model.posture.get(posture, {}).items())
+        others[posture] = 1 - sum(others.values())
+        tables.seems[camera, i] = _whole(cumulative(others, POSTURE_NAMES), others, POSTURE_NAMES)
+
+
+def _fill_false_positives(
+    tables: ErrorTables, camera: int, lens: Lens, model: FalsePositives, scene: Scene
+) -> None:
+    _check_users(model.looks_like, "looks_like", scene)
+    tables.looks_like[camera] = cumulative(model.looks_like, [*scene.users, None])
+    tables.looks_like[camera, -1] = ONE
+    rates = [model.per_hour, *(spot.per_hour for spot in model.spots)]
+    if not any(rates):
+        return
+    tables.sources[camera] = len(rates)
+    hours = Decimal(lens.period * scene.step_us) / (3600 * 10**6)
+    for i, rate in enumerate(rates):
+        mean = Decimal(rate) * hours
+        if mean > 1:
+            raise ScenarioError(
+                f"{scene.path}: perception.false_positives: {rate:g} per hour is more than one in"
+                f" each look, {float(1 / hours):g} per hour"
+            )
+        term, total = decay(mean), 0.0
+        for count in range(MOST_GHOSTS):
+            total += term
+            tables.ghosts[camera, i, count] = chance(min(total, 1.0))
+            term *= float(mean) / (count + 1)
+    for i, spot in enumerate(model.spots, 1):
+        x, y = scene.lattice.to_lattice(spot.at).tolist()
+        noise = round(spot.spread * scene.lattice.units_per_m * 65536 / BELL_STD)
+        tables.spot[camera, i] = x, y, noise
+
+
+def is_perfect(perception: Perception | None) -> bool:
+    """Return whether a perception never errs, so that nothing need be drawn."""
+    return perception is None or perception == Perception()

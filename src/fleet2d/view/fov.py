@@ -1,0 +1,170 @@
+"""Draw what is in view of a pose: as a region, and as the set of cells, by each method."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon, Wedge
+
+from fleet2d.errors import InputError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.seen import Reach
+from fleet2d.sight.flashlight import Flashlight
+from fleet2d.sight.fov import FieldOfView
+from fleet2d.sight.region import VisibleRegion
+from fleet2d.view.floorplan import (
+    DPI,
+    TEXT_COLOR,
+    drawing_style,
+    figure_size,
+    floorplan_axes,
+    save_figure,
+)
+from fleet2d.view.layers import check_ending, layer_on_axes
+from fleet2d.view.life import field_of_view
+from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
+
+ROBOT_COLOR = "#22344f"
+RADIUS_M = 0.17
+
+
+class Pose(NamedTuple):
+    """Where a camera is, and what it could see.
+
+    Attributes:
+        x: [m].
+        y: [m].
+        heading_deg: Counter-clockwise from +x.
+        far: Its range [m].
+        angle_deg: Width of its field of view, at most 360.
+    """
+
+    x: float
+    y: float
+    heading_deg: float
+    far: float = 4.5
+    angle_deg: float = 108.0
+
+    def reach(self, plan: FloorPlan) -> Reach:
+        """Return its range and angle in the integers of the kernels."""
+        far = round(self.far * plan.lattice.units_per_m)
+        return Reach(0, far * far, max(1, round(self.angle_deg / 360 * TURN)))
+
+
+def parse_pose(text: str) -> Pose:
+    """Return the pose that a text of three to five numbers says.
+
+    Raises:
+        InputError: It doesn't.
+
+    Example:
+        >>> parse_pose("2.5, 1, 90")
+        Pose(x=2.5, y=1.0, heading_deg=90.0, far=4.5, angle_deg=108.0)
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+        pose = Pose(*numbers)
+        right = 0 < pose.far <= 1000 and 0 < pose.angle_deg <= 360 and np.isfinite(numbers).all()
+    except (ValueError, TypeError):
+        right = False
+    if not right:
+        raise InputError(
+            f"--fov {text}: x,y,heading is wanted [m, m, degrees], and if you like a range [m] and"
+            " an angle up to 360 degrees: --fov 2.5,1,90,4.5,108"
+        )
+    return pose
+
+
+def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
+    """Draw the field of view of a pose in a floor plan to a PNG or SVG file, by each method.
+
+    Left the region of lines of sight and visibility polygons, right the cells of the flashlight.
+
+    Args:
+        plan: The floor plan.
+        pose: The camera.
+        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
+
+    Raises:
+        PlacementError: The pose is in a wall or outside the home.
+        InputError: The name ends otherwise, or the file can't be written.
+    """
+    check_ending(path)
+    VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)  # or says what is wrong with the place
+    with drawing_style():
+        width, height = figure_size(plan)
+        figure = Figure(figsize=(2 * width, height), dpi=DPI)
+        FigureCanvasAgg(figure)
+        left = figure.add_axes((0, 0, 0.5, 1))
+        right = figure.add_axes((0.5, 0, 0.5, 1))
+        region_panel(plan, pose, left, "visibility_polygon, line_of_sight")
+        cells_panel(plan, pose, right, Flashlight(), "flashlight")
+        save_figure(figure, path)
+
+
+def draw_fov_alone(plan: FloorPlan, pose: Pose, path: Path) -> None:
+    """Draw a robot in its home, and its field of view; arguments as for `draw_fov`."""
+    check_ending(path)
+    VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)
+    with drawing_style():
+        figure = Figure(figsize=figure_size(plan), dpi=DPI)
+        FigureCanvasAgg(figure)
+        axes = figure.add_axes((0, 0, 1, 1))
+        region_panel(plan, pose, axes, "")
+        save_figure(figure, path)
+
+
+def region_panel(plan: FloorPlan, pose: Pose, axes: Axes, title: str) -> None:
+    """Draw the exact region in view of a pose, and the sector that it is cut from."""
+    _ground(plan, axes, title)
+    half = pose.angle_deg / 2
+    ends = (pose.heading_deg - half, pose.heading_deg + half)
+    sector = Wedge((pose.x, pose.y), pose.far, *ends, fill=False, ec=VIEW_EDGE, lw=0.8, ls=":")
+    sector.set_zorder(3)
+    axes.add_patch(sector)
+    camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
+    heading = float(np.deg2rad(pose.heading_deg))
+    seen = field_of_view(_Standing(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
+    for part in shapely.get_parts(seen):
+        outline = shapely.get_coordinates(part.exterior)
+        axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.5, ec="none", zorder=2.2))
+        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=1.0, zorder=3.1))
+    _robot(pose, axes)
+
+
+def cells_panel(plan: FloorPlan, pose: Pose, axes: Axes, method: FieldOfView, title: str) -> None:
+    """Draw the cells in view of a pose by a method."""
+    _ground(plan, axes, title)
+    x, y = plan.lattice.to_lattice((pose.x, pose.y)).tolist()
+    heading = round(pose.heading_deg / 360 * TURN) % TURN
+    mask = method.cells(Home(plan), x, y, heading, pose.reach(plan))
+    layer_on_axes(plan, mask, axes)
+    _robot(pose, axes)
+
+
+class _Standing:
+    """A home as sight meets it: tall furniture counts as walls."""
+
+    def __init__(self, home: Home) -> None:
+        self.mesh, self.lattice = home.walls, home.plan.lattice
+
+
+def _ground(plan: FloorPlan, axes: Axes, title: str) -> None:
+    floorplan_axes(plan, axes, names=False, title=False)
+    x0, _, _, y1 = plan.bounds
+    axes.text(x0, y1 + 0.3, title, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
+
+
+def _robot(pose: Pose, axes: Axes) -> None:
+    body = Circle((pose.x, pose.y), RADIUS_M, facecolor=ROBOT_COLOR, edgecolor="white", lw=0.9)
+    body.set_zorder(4.3)
+    axes.add_patch(body)
+    turned = np.deg2rad(pose.heading_deg)
+    nose = (pose.x + RADIUS_M * np.cos(turned), pose.y + RADIUS_M * np.sin(turned))
+    axes.plot([pose.x, nose[0]], [pose.y, nose[1]], color="white", lw=1.2, zorder=4.4)

@@ -1,0 +1,147 @@
+"""Draw what stands in a floor plan: doorways, furniture, and where robots are not to go."""
+
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.path import Path as Outline
+from numpy.typing import NDArray
+
+from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.plan import FloorPlan
+
+EDGE_COLOR = "#6d737c"
+FILL_COLORS = MappingProxyType({"nothing": "none", "path": "#fbfaf7", "sight": "#c9c6bf"})
+LABEL_COLOR = "#6d737c"
+DOOR_COLOR = "#8a5a2b"
+NO_GO_COLOR = "#c8452f"
+
+LABEL_PT = (2.6, 5.0)
+# Width of a letter of the font in parts of its size.
+LETTER = 0.62
+# Corners of a circle, and of a door's quarter of one.
+CIRCLE = 24
+SWING = 12
+
+# Symbols inside a footprint as plans show them, in shares of its width (-0.5 is the right side, 0.5
+# the left) and of its depth (-0.5 is the back): boxes (x0, y0, x1, y1), and circles (x, y, radius)
+# with the radius a share of the smaller of both.
+_BED = ((-0.5, -0.14, 0.5, -0.14),)
+_FRONT = ((-0.5, 0.3, 0.5, 0.3),)
+SYMBOLS: MappingProxyType[str, tuple[tuple[float, ...], ...]] = MappingProxyType(
+    {
+        "bed": (*_BED, (-0.45, -0.46, -0.05, -0.22), (0.05, -0.46, 0.45, -0.22)),
+        "single_bed": (*_BED, (-0.38, -0.46, 0.38, -0.24)),
+        "sofa": ((-0.42, -0.22, 0.42, 0.5), (0.0, -0.22, 0.0, 0.5)),
+        "armchair": ((-0.3, -0.22, 0.3, 0.5),),
+        "chair": ((-0.5, -0.3, 0.5, -0.3),),
+        "stove": tuple((x, y, 0.17) for x in (-0.24, 0.24) for y in (-0.24, 0.24)),
+        "sink": ((-0.35, -0.3, 0.35, 0.35), (0.0, 0.0, 0.06)),
+        "washbasin": ((-0.35, -0.25, 0.35, 0.38), (0.0, 0.0, 0.08)),
+        "toilet": ((-0.5, -0.2, 0.5, -0.2), (0.0, 0.12, 0.4)),
+        "shower": ((-0.5, -0.5, 0.5, 0.5), (0.0, 0.0, 0.08)),
+        "bathtub": ((-0.44, -0.36, 0.44, 0.36),),
+        "washing_machine": ((0.0, 0.0, 0.34),),
+        "wardrobe": (_FRONT[0], (0.0, -0.5, 0.0, 0.3)),
+        "fridge": _FRONT,
+        "bookshelf": tuple((x, -0.5, x, 0.5) for x in (-0.25, 0.0, 0.25)),
+        "shelf": ((0.0, -0.5, 0.0, 0.5),),
+        "tv": ((-0.4, -0.1, 0.4, 0.2),),
+        "desk": ((-0.2, -0.3, 0.2, -0.15),),
+        "nightstand": ((0.0, 0.0, 0.2),),
+        "charger": ((-0.3, -0.1, 0.3, 0.5),),
+        "treadmill": ((-0.35, -0.3, 0.35, 0.45),),
+    }
+)
+
+# Their symbols are known from any plan, and leave no room for words.
+UNLABELLED = frozenset(
+    ("chair", "nightstand", "toilet", "washbasin", "sink", "stove", "shower", "charger")
+)
+
+
+def draw_objects(plan: FloorPlan, axes: Axes) -> None:
+    """Draw furniture with its symbols, doorways, and areas that robots keep out of, in metres."""
+    for blocks, fill in FILL_COLORS.items():
+        shown = [
+            Outline(shapely.get_coordinates(ring), closed=True)
+            for thing in plan.objects
+            if thing.blocks == blocks
+            for ring in (thing.footprint.exterior,)
+        ]
+        dashes = "--" if blocks == "nothing" else "-"
+        style: dict[str, Any] = {"facecolor": fill, "edgecolor": EDGE_COLOR, "zorder": 1.6}
+        axes.add_collection(PathCollection(shown, linewidths=0.6, linestyles=dashes, **style))
+    lines = [line for thing in plan.objects for line in _symbol(thing)]
+    axes.add_collection(LineCollection(lines, lw=0.4, color=EDGE_COLOR, zorder=1.65))
+    _draw_no_go(plan, axes)
+    _draw_doorways(plan, axes)
+
+
+def label_objects(plan: FloorPlan, axes: Axes) -> None:
+    """Write the type of each object on it, where it is large enough."""
+    axes.apply_aspect()  # only now does the transform to pixels hold
+    pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
+    points_per_m = float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
+    for thing in plan.objects:
+        x0, y0, x1, y1 = thing.footprint.bounds
+        words = thing.type.replace("_", " ")
+        across, up = x1 - x0, y1 - y0
+        flat = min(across / (LETTER * len(words)), up / 1.2) * points_per_m
+        upright = min(up / (LETTER * len(words)), across / 1.2) * points_per_m
+        size = min(max(flat, upright), LABEL_PT[1])
+        if size < LABEL_PT[0] or thing.type in UNLABELLED:
+            continue
+        middle = thing.footprint.centroid
+        style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
+        turn = 90 * (upright > flat)
+        axes.text(middle.x, middle.y, words, fontsize=size, rotation=turn, zorder=4, **style)
+
+
+def _symbol(thing: PlacedObject) -> list[NDArray[np.float64]]:
+    """Return the lines inside a footprint [m]."""
+    forward = np.array([np.cos(thing.heading), np.sin(thing.heading)])
+    left = np.array([-forward[1], forward[0]])
+    corners = shapely.get_coordinates(thing.footprint)
+    along, across = corners @ forward, corners @ left
+    width, depth = float(np.ptp(across)), float(np.ptp(along))
+    middle = (across.min() + width / 2) * left + (along.min() + depth / 2) * forward
+    lines = []
+    for shape in SYMBOLS.get(thing.type, ()):
+        if len(shape) == 4:
+            x0, y0, x1, y1 = shape
+            points = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]) * (width, depth)
+        else:
+            angles = np.linspace(0, 2 * np.pi, CIRCLE + 1)
+            ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            points = np.array(shape[:2]) * (width, depth) + ring * shape[2] * min(width, depth)
+        lines.append(middle + points[:, :1] * left + points[:, 1:] * forward)
+    return lines
+
+
+def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
+    """Draw doors open, with their swing, as plans do; mere openings as a dotted line."""
+    leaves, swings, openings = [], [], []
+    for door in plan.doorways:
+        start, end = np.array(door.start), np.array(door.end)
+        if not door.leaf:
+            openings.append(np.stack([start, end]))
+            continue
+        across = end - start
+        left = np.array([-across[1], across[0]])
+        angles = np.linspace(0, np.pi / 2, SWING)[:, None]
+        swings.append(start + across * np.cos(angles) + left * np.sin(angles))
+        leaves.append(np.stack([start, start + left]))
+    style: dict[str, Any] = {"color": DOOR_COLOR, "zorder": 1.7}
+    axes.add_collection(LineCollection(leaves, lw=1.2, **style))
+    axes.add_collection(LineCollection(swings, lw=0.4, **style))
+    axes.add_collection(LineCollection(openings, lw=0.9, ls=(0, (1, 2)), **style))
+
+
+def _draw_no_go(plan: FloorPlan, axes: Axes) -> None:
+    areas = [Outline(shapely.get_coordinates(area.exterior), closed=True) for area in plan.no_go]
+    style: dict[str, Any] = {"facecolor": "none", "edgecolor": NO_GO_COLOR, "zorder": 1.75}
+    axes.add_collection(PathCollection(areas, hatch="////", linewidths=0.5, **style))

@@ -1,0 +1,45 @@
+"""Readings as a text file that tools for CASAS data read."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.engine.test_sensors import household, plan  # noqa: F401  (a fixture)
+from tests.homes import needs_jit
+from tests.scenes import run, scenario
+
+from fleet2d.artifacts.casas import write_casas
+from fleet2d.errors import RunDirectoryError
+from fleet2d.logs.casas import read_casas
+
+pytestmark = needs_jit
+
+
+def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path: Path) -> None:  # noqa: F811
+    stored = run(household(plan))
+    path = tmp_path / "log.txt"
+    count = write_casas(stored, path)
+    lines = path.read_text().splitlines()
+    assert stored.tables["sensors"].num_rows == count == len(lines)
+    date, time, room, sensor, state, activity = lines[0].split(" ")
+    assert ("2026-01-05", "hallway_0") == (date, room)
+    assert sensor in {"hall", "contact"}
+    assert state in {"ON", "OPEN"}
+    assert time.startswith("00:0")
+    assert activity
+
+
+def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # noqa: F811
+    path = tmp_path / "log.txt"
+    write_casas(run(household(plan)), path)
+    assert read_casas(path)
+
+
+def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(RunDirectoryError, match="give its scenario objects that sense"):
+        write_casas(run(scenario("1 min")), tmp_path / "log.txt")
+
+
+def test_file_that_can_not_be_written_is_named(plan: str, tmp_path: Any) -> None:  # noqa: F811
+    with pytest.raises(RunDirectoryError, match=r"no/log\.txt can't be written"):
+        write_casas(run(household(plan)), tmp_path / "no" / "log.txt")

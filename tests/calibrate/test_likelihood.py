@@ -1,0 +1,112 @@
+"""Maximum likelihood recovers what was put in, and its intervals cover it as often as they claim."""
+
+import numpy as np
+import pytest
+from tests.calibrate.logs import TRUE, shares, simulated
+
+from fleet2d.calibrate.factors import Constant, Falling, Turned
+from fleet2d.calibrate.likelihood import Likelihood, chi_square_tail, wilson
+
+
+def test_derivatives_of_the_factors_are_those_of_finite_differences() -> None:
+    x = np.linspace(0, 7, 50)
+    for factor, theta in (
+        (Constant("top", 50), [1.3]),
+        (Falling("distance", x), [3.0, np.log(0.7)]),
+        (Turned(np.linspace(0, 180, 50)), [0.4, -1.0]),
+    ):
+        at = np.array(theta)
+        _, slopes = factor.shares(at)
+        for i in range(len(at)):
+            step = np.zeros(len(at))
+            step[i] = 1e-6
+            rise = (factor.shares(at + step)[0] - factor.shares(at - step)[0]) / 2e-6
+            assert rise == pytest.approx(slopes[:, i], abs=1e-6)
+
+
+def test_the_fit_is_a_maximum() -> None:
+    log = simulated(1, 3000)
+    likelihood = Likelihood(
+        [Constant("top", 3000), Falling("distance", log.distance)], log.detected
+    )
+    best = likelihood.fit()
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        theta = best.theta + rng.normal(0, 0.05, 3)
+        assert likelihood._value(likelihood._model(theta)[0]) <= best.log_likelihood
+
+
+def test_the_fit_of_a_constant_is_the_share() -> None:
+    outcomes = np.arange(100) < 37
+    likelihood = Likelihood([Constant("top", 100)], outcomes)
+    best = likelihood.fit()
+    found = likelihood.estimates(best)["top"]
+    assert 0.37 == pytest.approx(found.value, abs=1e-6)
+    # The likelihood-ratio interval of 37 of 100, from its definition.
+    p = np.linspace(0.2, 0.6, 400_001)
+    fall = 2 * (37 * np.log(0.37 / p) + 63 * np.log(0.63 / (1 - p)))
+    inside = p[fall <= 3.8414588]
+    assert (found.low, found.high) == pytest.approx((inside[0], inside[-1]), abs=1e-4)
+
+
+def test_large_logs_give_the_true_parameters() -> None:
+    log = simulated(3, 80_000, bearing=True, turned=True)
+    assert log.bearing is not None
+    assert log.orientation is not None
+    factors = [
+        Constant("top", len(log)),
+        Falling("distance", log.distance),
+        Falling("bearing", log.bearing),
+        Turned(log.orientation),
+    ]
+    likelihood = Likelihood(factors, log.detected)
+    best = likelihood.fit()
+    index = 0
+    for factor in factors:
+        for i, name in enumerate(factor.names):
+            assert TRUE[name] == pytest.approx(factor.natural(i, best.theta[index]), rel=0.05), name
+            index += 1
+    assert best.shares == pytest.approx(
+        shares(log.distance, log.bearing, log.orientation), abs=0.02
+    )
+
+
+@pytest.mark.parametrize(("rows", "repeats"), [(600, 250)])
+def test_intervals_cover_the_truth_as_often_as_they_claim(rows: int, repeats: int) -> None:
+    """Of 250 logs, 95 % intervals miss the truth in 12.5 +- 3.4; 3.7 deviations are allowed."""
+    missed = dict.fromkeys(("top", "distance midpoint", "distance width"), 0)
+    for seed in range(repeats):
+        log = simulated(100 + seed, rows)
+        factors = [Constant("top", rows), Falling("distance", log.distance)]
+        likelihood = Likelihood(factors, log.detected)
+        for name, found in likelihood.estimates(likelihood.fit()).items():
+            low = -np.inf if found.low is None else found.low
+            high = np.inf if found.high is None else found.high
+            assert low <= found.value <= high
+            missed[name] += not low <= TRUE[name] <= high
+    for name, count in missed.items():
+        assert 1 <= count <= 25, (name, count)
+
+
+def test_an_interval_that_the_log_does_not_bound_is_open() -> None:
+    rng = np.random.default_rng(5)
+    outcomes = rng.random(300) < 0.999999
+    found = Likelihood([Constant("top", 300)], outcomes)
+    top = found.estimates(found.fit())["top"]
+    assert top.high is None
+    assert 0.98 < (top.low or 0) < 0.995  # 300 of 300: exp(-1.92 / 300)
+
+
+@pytest.mark.parametrize(
+    ("value", "freedom", "expected"),
+    [(3.8415, 1, 0.05), (5.9915, 2, 0.05), (18.307, 10, 0.05), (0.0, 3, 1.0), (24.725, 11, 0.01)],
+)
+def test_chi_square_tails_are_those_of_tables(value: float, freedom: int, expected: float) -> None:
+    assert expected == pytest.approx(chi_square_tail(value, freedom), abs=2e-5)
+
+
+def test_wilson_intervals_stay_within_0_and_1() -> None:
+    none, every = wilson(0, 20), wilson(20, 20)
+    assert (0.0, 1.0) == (none.low, every.high)
+    assert none.high == pytest.approx(1 - (every.low or 0))
+    assert 0.1611 == pytest.approx(none.high, abs=1e-4)

@@ -1,0 +1,271 @@
+"""Runs in which perception errs: spans never show, truth stands beside it, algorithms don't see it."""
+
+import json
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import digests, everything, process, run, scenario, table
+
+import fleet2d
+from fleet2d import Algorithm, History, Metric, Present
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import ComponentError, InputError, ScenarioError
+
+pytestmark = needs_jit
+
+PERCEPTION: dict[str, Any] = {
+    "detection": {
+        "distance": {"midpoint": 3, "width": 0.5, "top": 0.9},
+        "bearing": [[0, 1], [60, 0.5]],
+        "orientation": [[0, 1], [180, 0.6]],
+        "posture": {"lie": 0.3},
+        "visible_share": [[0, 0], [1, 1]],
+        "light": [[6, 0.5], [8, 1]],
+        "memory": "10 s",
+    },
+    "false_positives": {
+        "per_hour": 60,
+        "spots": [{"at": [1.5, 2.5], "per_hour": 200, "spread": "20 cm"}],
+        "looks_like": {"ben": 0.3},
+    },
+    "identity": {
+        "right": [[0, 0.8], [4, 0.4]],
+        "mistaken": 0.2,
+        "confusion": {"ana": {"ben": 1}},
+        "per_track": True,
+    },
+    "attributes": {
+        "range_noise": "5 cm",
+        "range_noise_share": "3 %",
+        "bearing_noise_deg": 2,
+        "heading_noise_deg": 10,
+        "posture": {"stand": {"sit": 0.1}},
+    },
+}
+CAMERAS: dict[str, Any] = {
+    "front": {"angle_deg": 100, "offset": [0.1, 0.02], "body_points": 6, "latency": "2 s"},
+    "rear": {"heading_deg": 180, "range": [0.2, 3], "period": "3 s", "perception": {}},
+    "mast": {"pan": {"headings_deg": [-60, 0, 60], "dwell": "4 s"}, "latency": "1 s"},
+}
+
+
+class Peek(Algorithm):
+    """Keeps what an algorithm is told, and tries to get at the truth."""
+
+    seen: ClassVar[list[Any]] = []
+
+    def update(self, history: History, state: Present) -> Any:
+        for name in ("truth", "looks"):
+            with pytest.raises(ComponentError, match="only metrics know"):
+                getattr(history, name)
+        self.seen.append(history.observations)
+
+
+class Both(Metric):
+    """Keeps observations beside the truth."""
+
+    seen: ClassVar[list[Any]] = []
+
+    def update(self, history: History, state: Present) -> Any:
+        self.seen.append((history.observations, history.truth, history.looks))
+
+
+def full(duration: str = "1 h", **changes: Any) -> dict[str, Any]:
+    """Every behavior, and robots of which two err, one of them with three cameras."""
+    content = everything(duration)
+    robots = content["robots"]
+    astro = {**robots["astro"], "cameras": CAMERAS, "perception": PERCEPTION}
+    del astro["camera"]
+    robots["astro"] = astro
+    robots["curio"] = {**robots["curio"], "perception": PERCEPTION}
+    content["metrics"]["detections"] = {"period": "11 min"}
+    return content | changes
+
+
+@pytest.fixture(scope="module")
+def whole() -> Run:
+    return run(full())
+
+
+@pytest.mark.parametrize("span", [3600, 7, 1])
+def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> None:
+    other = run(full(), max_span=span)
+    assert digests(whole) == digests(other)
+    assert whole.metrics == other.metrics
+
+
+def test_every_table_is_the_same_when_sightings_fill_the_block(
+    whole: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fleet2d.engine.buckets.BLOCK_VALUES", 1)
+    monkeypatch.setattr("fleet2d.engine.buckets.LEAST_STEPS", 50)
+    assert digests(whole) == digests(run(full()))
+
+
+def test_kernels_as_plain_python_give_the_same_run(tmp_path: Path) -> None:
+    file = tmp_path / "full.json"
+    file.write_text(json.dumps(full("40 s")))
+    code = f"import fleet2d, json; print(fleet2d.run(json.load(open({str(file)!r}))).digest)"
+    other = process("-c", code, NUMBA_DISABLE_JIT="1")
+    assert run(full("40 s")).digest == other.stdout.strip(), other.stderr
+
+
+def test_a_run_that_errs_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
+    fleet2d.run(full("5 min"), out=tmp_path / "run")
+    assert fleet2d.reproduce(tmp_path / "run").same
+
+
+def test_rows_tell_false_from_true_and_who_from_whom(whole: Run) -> None:
+    rows = table(whole, "observations")
+    astro = rows["robot"] == "astro"
+    assert {"front", "rear", "mast"} == set(rows["camera"][astro])
+    assert {"camera"} == set(rows["camera"][~astro])
+    false = np.array([user is None or user != user for user in rows["true_user"]])
+    unknown = np.array([user is None or user != user for user in rows["user"]])
+    assert false.any()
+    assert unknown.any()
+    assert np.isnan(rows["true_x"][false]).all()
+    assert not np.isnan(rows["true_x"][~false]).any()
+    assert (rows["user"] != rows["true_user"])[~false & ~unknown].any()
+    assert (np.diff(rows["step"]) >= 0).all()
+    sharp = np.isin(rows["robot"], ["bolt", "drift"]) | (rows["camera"] == "rear")
+    assert sharp.any()
+    for column in ("user", "x", "y", "heading", "posture"):
+        assert (rows[column] == rows[f"true_{column}"])[sharp].all()
+    off = np.hypot(rows["x"] - rows["true_x"], rows["y"] - rows["true_y"])[~sharp & ~false]
+    assert 0.02 < np.median(off) < 0.3
+
+
+def test_every_observation_is_in_a_room() -> None:
+    """Noise carries some into walls; the nearest room counts there."""
+    rows = table(run(full()), "observations")
+    assert not any(room is None or room != room for room in rows["room"])
+
+
+def test_the_truth_is_where_users_were_when_they_were_looked_at() -> None:
+    stored = run(full(), "artifacts.trajectories=every step")
+    rows = table(stored, "observations", robot="astro", true_user="ben")
+    truth = table(stored, "trajectories", entity="ben")
+    for camera, late in (("front", 2), ("rear", 0), ("mast", 1)):
+        mine = rows["camera"] == camera
+        assert mine.sum() > 10
+        at = rows["step"][mine] - late
+        assert truth["x"][at].tolist() == rows["true_x"][mine].tolist()
+        if camera == "rear":
+            assert (at % 3 == 0).all()
+
+
+def test_where_nothing_errs_no_column_is_added_and_no_row_changes() -> None:
+    plain, told = everything("20 min"), everything("20 min")
+    for robot in told["robots"].values():
+        robot["perception"] = {}
+    assert run(plain).digest == run(told).digest
+
+
+def test_events_are_about_whom_somebody_was_taken_for(whole: Run) -> None:
+    """Somebody unknown is seen, too; the event names nobody then."""
+    events = table(whole, "events", entity="curio")
+    who = {user if isinstance(user, str) else None for user in events["user"]}
+    assert {"ana", "ben", None} == who
+
+
+def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it() -> None:
+    content = full("30 min", algorithms={"peek": Peek(period="10 min")})
+    content["metrics"] = {"both": Both(period="10 min")}
+    Peek.seen.clear()
+    Both.seen.clear()
+    stored = run(content)
+    rows = table(stored, "observations")
+    told = [part for part, _, _ in Both.seen]
+    for column in ("step", "x", "y", "heading"):
+        expected = rows[column].tolist()
+        assert expected == np.concatenate([getattr(o, column) for o in told]).tolist()
+        assert expected == np.concatenate([getattr(o, column) for o in Peek.seen]).tolist()
+    assert rows["true_x"][~np.isnan(rows["true_x"])].tolist() == [
+        x for _, truth, _ in Both.seen for x, u in zip(truth.x, truth.user, strict=True) if u >= 0
+    ]
+
+
+def test_looks_and_rows_agree() -> None:
+    """Without latency, each look that noticed somebody is a row at its step."""
+    content = full("30 min")
+    del content["robots"]["astro"]
+    content["metrics"] = {"both": Both(period="7 min")}
+    Both.seen.clear()
+    run(content)
+    for observed, truth, looks in Both.seen:
+        assert (looks.detected <= looks.in_view).all()
+        for camera, robot in enumerate(looks.robot.tolist()):
+            for user in (0, 1):
+                rows = (observed.robot == robot) & (truth.user == user)
+                assert looks.detected[camera, user] == rows.sum()
+
+
+def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
+    content = scenario(
+        "1 min",
+        users={"ana": {"start": [1.0, 1.0]}},
+        robots={"r": {"start": [0.3, 1.0], "start_heading_deg": 180, "camera": {"angle_deg": 360}}},
+    )
+    assert table(run(content), "observations")["step"].size
+    content["robots"]["r"]["camera"]["offset"] = [0.4, 0]
+    assert not table(run(content), "observations")["step"].size
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"camera": {}, "cameras": {"a": {}}}, ["robots.r.cameras", "'camera' or 'cameras'"]),
+        ({"camera": {"period": "10 s"}}, ["period", "10 s is longer than lost_after"]),
+        ({"camera": {"period": "1.5 s"}}, ["robots.r", "no multiple of simulation.step"]),
+        ({"camera": {"pan": {"headings_deg": []}}}, ["pan.headings_deg"]),
+        (
+            {"perception": {"detection": {"distance": [[2, 1], [1, 0]]}}},
+            ["distance", "must ascend"],
+        ),
+        ({"perception": {"detection": {"distance": {"midpoint": 3}}}}, ["distance", "width"]),
+        ({"perception": {"detection": {"distance": 1.2}}}, ["distance", "0 to 1"]),
+        ({"perception": {"detection": {"range": 3}}}, ["unknown key 'range'"]),
+        (
+            {"perception": {"identity": {"confusion": {"ana": {"ana": 1}}}}},
+            ["confusion.ana", "right"],
+        ),
+        (
+            {"perception": {"identity": {"confusion": {"ana": {"bem": 1}}}}},
+            ["'bem'", "did you mean 'ben'"],
+        ),
+        ({"perception": {"identity": {"confusion": {"ana": {"ben": 0.4}}}}}, ["0.4", "not to 1"]),
+        ({"perception": {"identity": {"right": 0.9, "mistaken": 0.2}}}, ["0.9", "more than 1"]),
+        ({"perception": {"false_positives": {"looks_like": {"zoe": 1}}}}, ["'zoe'", "ana, ben"]),
+        ({"perception": {"false_positives": {"per_hour": 4000}}}, ["4000 per hour", "3600"]),
+        ({"perception": {"attributes": {"posture": {"sit": {"sit": 1}}}}}, ["posture.sit"]),
+    ],
+)
+def test_wrong_settings_are_errors_that_say_what_is_wanted(
+    change: dict[str, Any], words: list[str]
+) -> None:
+    content = scenario(users={"ana": {}, "ben": {}}, robots={"r": change})
+    with pytest.raises(InputError) as caught:
+        fleet2d.Simulation(content)
+    assert isinstance(caught.value, ScenarioError)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_list_of_cameras_is_numbered() -> None:
+    robot = fleet2d.load_scenario(
+        scenario(robots={"r": {"cameras": [{}, {"heading_deg": 180}]}})
+    ).robots["r"]
+    assert ["camera_00", "camera_01"] == list(robot.eyes)
+
+
+def test_a_behavior_can_wait_for_what_several_cameras_see() -> None:
+    content = everything("30 min")
+    robot = content["robots"]["bolt"]
+    robot["cameras"] = {"left": {"heading_deg": 60}, "right": {"heading_deg": -60}}
+    del robot["camera"]
+    events = table(run(content), "events", entity="bolt")
+    assert {"user_seen", "user_lost"} <= set(events["event"])

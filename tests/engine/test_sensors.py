@@ -1,0 +1,244 @@
+"""Sensors: on and off at the right step, past no wall, in any span, in a table of their own."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.engine.test_changes import flat, home, stands
+from tests.homes import needs_jit
+from tests.scenes import digests, run, table
+
+import fleet2d
+from fleet2d import Algorithm, InputError
+from fleet2d.entities.objects.sensor import Memory
+
+pytestmark = needs_jit
+
+
+@pytest.fixture
+def plan(tmp_path: Any) -> str:
+    content = flat()
+    content["objects"] += [
+        {
+            "name": "bed",
+            "type": "bed",
+            "footprint": [[9, 0], [11, 0], [11, 1.4], [9, 1.4]],
+            "uses": [
+                {"x": 10, "y": 0.7, "heading": 0, "posture": "lie", "approach": [10, 1.8]},
+            ],
+        },
+        {
+            "name": "stove",
+            "type": "stove",
+            "footprint": [[0, 2.4], [0.6, 2.4], [0.6, 3], [0, 3]],
+            "uses": [{"x": 0.3, "y": 2.1, "heading": 1.57, "posture": "stand"}],
+        },
+    ]
+    path = tmp_path / "flat.json"
+    path.write_text(json.dumps(content))
+    return str(path)
+
+
+def visits(*items: tuple[str, Any, str]) -> dict[str, Any]:
+    agenda = [{"at": at, "place": place, "activity": what} for at, place, what in items]
+    return {"type": "schedule", "days": [{"items": agenda}]}
+
+
+def readings(stored: fleet2d.Run, sensor: str) -> list[tuple[int, str]]:
+    rows = table(stored, "sensors", sensor=sensor)
+    return list(zip(rows["step"].tolist(), rows["state"].tolist(), strict=True))
+
+
+class Collector(Algorithm):
+    """Counts what the sensors said."""
+
+    def update(self, history: Any, state: Any) -> dict[str, int]:
+        return {"said": len(history.readings.step), "on": int(history.readings.on.sum())}
+
+
+def household(plan: str) -> dict[str, Any]:
+    day = visits(
+        ("00:05", [6, 1.45], "Step_Out"),
+        ("00:10", [9.5, 2.4], "Sleep"),
+        ("00:20", [0.3, 2.1], "Cook"),
+        ("00:40", [2, 1.45], "Relax"),
+    )
+    return home(
+        plan,
+        "1 h",
+        users={"ana": day},
+        objects={
+            "hall": {"type": "motion_sensor", "at": [6, 2.9], "range": "5 m", "hold": "10 s"},
+            "door": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "5 s"},
+            "contact": {"type": "contact_sensor", "of": "door"},
+            "plug": {"type": "smart_plug", "of": "stove", "hold": "30 s"},
+            "bed_sensor": {"type": "occupancy_sensor", "of": "bed"},
+        },
+        algorithms={"collector": {"type": f"{__name__}:Collector", "period": "10 min"}},
+    )
+
+
+def test_readings_are_the_same_for_every_span(plan: str) -> None:
+    whole = run(household(plan))
+    assert {"hall", "contact", "plug"} <= set(table(whole, "sensors")["sensor"])
+    for span in (1, 7, 100):
+        assert digests(whole) == digests(run(household(plan), max_span=span))
+
+
+def test_contact_sensor_follows_the_door(plan: str) -> None:
+    stored = run(household(plan))
+    events = table(stored, "events")
+    doors = [
+        (int(step), {"opened": "OPEN", "shut": "CLOSE"}[event])
+        for step, entity, event in zip(
+            events["step"], events["entity"], events["event"], strict=True
+        )
+        if entity == "door" and step > 0
+    ]
+    assert doors == readings(stored, "contact")
+    assert len(doors) >= 4
+
+
+def test_plug_is_on_while_somebody_stays_at_the_stove_and_a_little_after(plan: str) -> None:
+    stored = run(household(plan))
+    (on, began), (off, ended) = readings(stored, "plug")
+    where = table(stored, "trajectories", entity="ana")
+    there = np.flatnonzero((abs(where["x"] - 0.3) < 0.3) & (abs(where["y"] - 2.1) < 0.3))
+    assert ("ON", "OFF") == (began, ended)
+    assert there[0] < on <= there[0] + 2
+    assert there[-1] + 25 < off <= there[-1] + 32
+
+
+def test_motion_sensor_notices_who_walks_in_its_view_and_nobody_who_stands(plan: str) -> None:
+    stored = run(household(plan))
+    where = table(stored, "trajectories", entity="ana")
+    moved = np.flatnonzero((np.diff(where["x"]) != 0) | (np.diff(where["y"]) != 0)) + 1
+    hall = moved[(where["x"][moved] > 4.2) & (where["x"][moved] < 7.9)]
+    said = readings(stored, "hall")
+    ons = [step for step, state in said if state == "ON"]
+    assert all(min(abs(hall - on)) <= 1 for on in ons)
+    spans = [(a, b) for (a, _), (b, _) in zip(said[::2], said[1::2], strict=True)]
+    assert all(any(a <= step <= b for a, b in spans) for step in hall.tolist())
+    assert sum(b - a for a, b in spans) < 150
+
+
+def test_motion_sensor_does_not_see_past_a_shut_door(plan: str) -> None:
+    content = home(
+        plan,
+        "5 min",
+        users={"ana": {"type": "meander", "start": [2, 1.5]}},
+        objects={
+            "pir": {"type": "motion_sensor", "at": [6, 1.45], "range": "9 m"},
+            "door": {"type": "door", "doorway": "kitchen_0", "open": False},
+        },
+    )
+    assert [] == readings(run(content), "pir")
+    assert readings(run(content, "objects.door.open=true"), "pir")
+
+
+def test_motion_sensor_sees_only_what_it_faces(plan: str) -> None:
+    def said(heading: float) -> list[tuple[int, str]]:
+        return readings(
+            run(
+                home(
+                    plan,
+                    "5 min",
+                    users={"ana": {"type": "meander", "start": [2, 1.5]}},
+                    objects={
+                        "pir": {
+                            "type": "motion_sensor", "at": [2, 0.01], "heading_deg": heading,
+                            "angle_deg": 170,
+                        },
+                        "door": {"type": "door", "doorway": "kitchen_0", "open": False},
+                    },
+                )
+            ),
+            "pir",
+        )  # fmt: skip
+
+    assert said(90)
+    assert [] == said(-90)
+
+
+def test_bed_is_occupied_while_somebody_lies_in_it(plan: str) -> None:
+    from datetime import timedelta
+
+    simulation = fleet2d.Simulation(
+        home(
+            plan,
+            "10 min",
+            users={"ana": stands(9, 2.4)},
+            objects={"bed_sensor": {"type": "occupancy_sensor", "of": "bed"}},
+        )
+    )
+    simulation.advance(60)
+    ana = simulation.actors["ana"]
+
+    class Nap(fleet2d.Behavior):
+        def decide(self, now: fleet2d.Situation) -> fleet2d.Plan:
+            plan = now.plan().use("bed").stay(timedelta(minutes=2))
+            return plan.go_to([9, 2.4]).stay()
+
+    ana.behaviors[:] = [Nap()]
+    simulation.replan("ana")
+    simulation.advance(60)
+    assert {"on": True} == simulation.state["bed_sensor"]
+    stored = simulation.run()
+    (on, _), (off, _) = readings(stored, "bed_sensor")
+    assert 60 < on < 75
+    assert 120 <= off - on <= 126
+
+
+def test_readings_name_the_activity(plan: str) -> None:
+    stored = run(household(plan))
+    rows = table(stored, "sensors", sensor="plug")
+    assert ["Cook", "Relax"] == rows["activity"].tolist() or ["Cook", "Cook"] == (
+        rows["activity"].tolist()
+    )
+
+
+def test_algorithms_are_handed_the_readings(plan: str) -> None:
+    stored = run(household(plan))
+    said = table(stored, "collector")["said"]
+    assert len(table(stored, "sensors")["step"]) == int(np.sum(said))
+
+
+@pytest.mark.parametrize(
+    ("sensor", "message"),
+    [
+        ({"type": "contact_sensor", "of": "gate"}, "'gate', which is no door"),
+        ({"type": "occupancy_sensor", "of": "sofa"}, "no object 'sofa'.*bed"),
+        ({"type": "smart_plug", "of": "cart"}, "cart has no place to use it from"),
+        ({"type": "motion_sensor", "at": [50, 50]}, "outside the home"),
+    ],
+)
+def test_sensor_of_what_is_not_there_is_refused(
+    plan: str, sensor: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        fleet2d.Simulation(home(plan, users={"ana": stands(6, 1.4)}, objects={"s": sensor}))
+
+
+@given(st.sets(st.integers(0, 39)), st.integers(0, 6), st.lists(st.integers(1, 15), min_size=40))
+def test_sensor_goes_off_when_it_was_quiet_for_its_hold(
+    excited: set[int], hold: int, spans: list[int]
+) -> None:
+    memory, said, begin = Memory(hold), [], 0
+    for length in spans:
+        end = min(40, begin + length)
+        steps = np.array([s for s in sorted(excited) if begin <= s < end], np.int64)
+        said += [(r.step, r.on) for r in memory.read(steps, np.zeros_like(steps), end)]
+        begin = end
+    expected, on, last = [], False, 0
+    for step in range(40):
+        if step in excited:
+            if not on:
+                expected.append((step, True))
+            on, last = True, step
+        elif on and step > last + hold:
+            expected.append((step, False))
+            on = False
+    assert expected == said

@@ -1,0 +1,116 @@
+"""Using objects: the way there, the last step onto them, postures, and getting up again."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from tests.homes import needs_jit
+
+import fleet2d
+from fleet2d import Behavior, ComponentError, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.objects import PlacedObject, UsePlace
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+
+pytestmark = needs_jit
+
+BED = PlacedObject(
+    "bed",
+    "bed",
+    shapely.box(3, 1, 5, 2.6),
+    uses=(UsePlace(4, 2.2, np.pi, "lie", approach=(4, 2.9)), UsePlace(4, 1.4, 0, "lie")),
+)
+RUG = PlacedObject("rug", "rug", shapely.box(0.5, 0.5, 1, 1), "nothing")
+
+
+class Rest(Behavior):
+    """Use the bed, and then go to a corner."""
+
+    thing: str = "bed"
+    place: int = 0
+
+    def decide(self, now: Situation) -> Plan:
+        from datetime import timedelta
+
+        plan = now.plan().use(self.thing, self.place).stay(timedelta(seconds=60))
+        return plan.go_to([0.5, 3.5]).stay()
+
+
+def simulation(tmp_path: Any, **behavior: Any) -> fleet2d.Simulation:
+    import json
+
+    room = [LabelledRegion(("bedroom",), shapely.box(0, 0, 6, 4))]
+    plan = FloorPlan.build("bedroom", shapely.box(0, 0, 6, 4), room, objects=[BED, RUG])
+    path = tmp_path / "bedroom.json"
+    path.write_text(json.dumps(plan.to_native()))
+    return fleet2d.Simulation(
+        {
+            "simulation": {"duration": "2 min", "seed": 1},
+            "floorplan": {"type": "native", "path": str(path)},
+            "users": {"ana": {"type": f"{__name__}:Rest", "start": [0.5, 0.5], **behavior}},
+        }
+    )
+
+
+def where(sim: fleet2d.Simulation) -> tuple[float, float]:
+    state = sim.state["ana"]
+    return state["x"], state["y"]
+
+
+def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path: Any) -> None:
+    sim = simulation(tmp_path)
+    sim.advance(30)
+    assert where(sim) == pytest.approx((4, 2.2), abs=1e-3)
+    assert sim.state["ana"]["heading"] == pytest.approx(np.pi, abs=0.002)
+    plan = sim.actors["ana"].plan
+    assert [0, 2] == plan.posture_at(np.array([0, 30_000_000])).tolist()
+
+
+def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path: Any) -> None:
+    sim = simulation(tmp_path)
+    track = sim.actors["ana"].plan
+    sim.advance(1)
+    track = sim.actors["ana"].plan.finish().breakpoints  # type: ignore[attr-defined]
+    lattice = sim.home.plan.lattice
+    points = lattice.to_metres(np.stack([track.x, track.y], axis=1)).round(3).tolist()
+    lying = points.index([4.0, 2.2])
+    assert [4.0, 2.9] == points[lying - 1] or [4.0, 2.9] in points[:lying]
+    assert [4.0, 2.9] == next(p for p in points[lying:] if p != [4.0, 2.2])
+    end = sim.actors["ana"].plan
+    assert "stand" == end.posture
+
+
+def test_way_to_the_bed_goes_round_it(tmp_path: Any) -> None:
+    sim = simulation(tmp_path)
+    sim.advance(1)
+    track = sim.actors["ana"].plan.finish().breakpoints  # type: ignore[attr-defined]
+    lattice = sim.home.plan.lattice
+    points = lattice.to_metres(np.stack([track.x, track.y], axis=1))
+    arrives = int(np.flatnonzero((np.abs(points - (4, 2.9)) < 0.001).all(axis=1))[0])
+    way = shapely.LineString(points[: arrives + 1])
+    assert way.distance(BED.footprint) >= 0.2
+
+
+def test_place_without_an_approach_is_stepped_to_from_beside_the_object(tmp_path: Any) -> None:
+    sim = simulation(tmp_path, place=1)
+    sim.advance(30)
+    assert where(sim) == pytest.approx((4, 1.4), abs=1e-3)
+    sim.advance(89)
+    assert where(sim) == pytest.approx((0.5, 3.5), abs=1e-3)
+
+
+def test_use_is_told_in_the_events(tmp_path: Any) -> None:
+    run = simulation(tmp_path).run()
+    rows = run.tables["events"].to_pylist()
+    assert [("uses", "bed")] == [(row["event"], row["detail"]) for row in rows]
+
+
+def test_object_without_a_place_is_refused(tmp_path: Any) -> None:
+    with pytest.raises(ComponentError, match="rug has no place to use it from"):
+        simulation(tmp_path, thing="rug").run()
+
+
+def test_unknown_object_is_refused_with_those_there_are(tmp_path: Any) -> None:
+    with pytest.raises(ComponentError, match=r"no object 'bad': did you mean 'bed'\?.*bed, rug"):
+        simulation(tmp_path, thing="bad").run()

@@ -1,0 +1,42 @@
+"""Pet: it naps and roams where it may."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import path, run, scenario
+
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError
+
+ROOMS = ["kitchen", "living_room"]
+
+
+def cat(duration: str = "1 d", **fields: Any) -> dict[str, Any]:
+    return scenario(duration, users={"rex": {"type": "pet", "radius": 0.1, **fields}})
+
+
+@needs_jit
+def test_it_sleeps_most_of_the_time_and_roams_through_its_rooms() -> None:
+    stored = run(cat("4 d", rooms=ROOMS, start="kitchen"))
+    poses = path(stored, "rex")
+    moves = (np.diff(poses.x) != 0) | (np.diff(poses.y) != 0)
+    assert 0.01 < moves.mean() < 0.4
+    names = {stored.plan.rooms[i].type for i in set(poses.room.tolist())}
+    assert set(ROOMS) | {"unknown"} == names  # the doorway is nobody's room
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"spots": [5, 2]}, ["spots", "5", "2"]),
+        ({"rooms": ["attic"]}, ["attic"]),
+        ({"stays_in_room": 2}, ["stays_in_room"]),
+    ],
+)
+def test_a_pet_that_can_not_live_is_refused(fields: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        Simulation(cat(**fields))
+    for word in ["users.rex", *words]:
+        assert word in str(caught.value)

@@ -1,0 +1,114 @@
+"""Population: what many people do at each hour is what the survey found."""
+
+import copy
+import statistics
+from collections import Counter
+from datetime import date, timedelta
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from tests.homes import needs_jit
+from tests.routines.days import MONDAY
+from tests.scenes import run, scenario, table
+
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError
+from fleet2d.routines import survey
+from fleet2d.streams import Draws, stream_key
+
+HOUR = 3600
+
+
+def users(count: int, **fields: Any) -> dict[str, Any]:
+    return {f"user_{i}": {"type": "population", **fields} for i in range(count)}
+
+
+def apart(counts: Counter[str], wanted: dict[str, float]) -> float:
+    """The total variation distance of counted shares from the survey's."""
+    total = sum(counts.values())
+    return sum(abs(counts[c] / total - share) for c, share in wanted.items()) / 2
+
+
+@needs_jit
+def test_shares_of_a_thousand_people_follow_the_survey_hour_by_hour() -> None:
+    simulation = Simulation(scenario("5 min", users=users(1000, group="workers")))
+    counts: dict[tuple[str, int], Counter[str]] = {}
+    for actor in simulation.actors.values():
+        for ordinal in range(MONDAY, MONDAY + 7):
+            kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
+            day = iter(actor.behaviors[0].day(ordinal))
+            doing = next(day)
+            for hour in range(4, 28):
+                while doing.end <= hour * HOUR + HOUR // 2:
+                    doing = next(day)
+                counts.setdefault((kind, hour % 24), Counter())[doing.task] += 1
+    distances = [
+        apart(count, survey.shares("workers", kind)[hour]) for (kind, hour), count in counts.items()
+    ]
+    assert 48 == len(distances)
+    assert statistics.median(distances) < 0.03
+    assert max(distances) < 0.10
+
+
+def test_days_follow_each_other_without_a_gap() -> None:
+    actor = Simulation(scenario("5 min", users=users(1))).actors["user_0"]
+    days = [actor.behaviors[0].day(MONDAY + i) for i in range(20)]
+    for day, after in pairwise(days):
+        assert all(one.end == other.begin for one, other in pairwise(day))
+        assert all(doing.begin < doing.end for doing in day)
+        assert (4 * HOUR, 28 * HOUR) == (day[0].begin, day[-1].end)
+        assert 4 * HOUR == after[0].begin
+
+
+def test_an_hour_of_television_lasts_as_long_as_in_the_survey() -> None:
+    group = survey.group("retired")
+    lasted = []
+    for person in range(60):
+        key = stream_key(4, f"users.{person}", "day")
+        state = survey.first_state(group, Draws(key, 0), MONDAY)
+        for ordinal in range(MONDAY, MONDAY + 14):
+            blocks, state = survey.live(group, Draws(key, ordinal), ordinal, state)
+            lasted += [b.end - b.begin for b in blocks if b.category == "tv"]
+    wanted = group.facts["minutes"]["tv"] * 60
+    assert wanted == pytest.approx(statistics.mean(lasted), rel=0.35)
+    # A geometric law has a standard deviation as large as its mean.
+    assert statistics.pstdev(lasted) < 0.9 * statistics.mean(lasted)
+
+
+def test_asking_for_a_day_again_or_from_a_branch_gives_the_same() -> None:
+    simulation = Simulation(scenario("5 min", users=users(1)))
+    behavior = simulation.actors["user_0"].behaviors[0]
+    third = behavior.day(MONDAY + 3)
+    assert third == copy.deepcopy(simulation).actors["user_0"].behaviors[0].day(MONDAY + 3)
+    behavior.day(MONDAY + 9)
+    assert third == behavior.day(MONDAY + 3)
+
+
+def test_groups_are_drawn_by_their_shares() -> None:
+    simulation = Simulation(scenario("5 min", users=users(400)))
+    drawn = Counter(a.behaviors[0].people.name for a in simulation.actors.values())
+    for name in survey.groups():
+        share = survey.table()["groups"][name]["share"] / 10_000
+        assert share == pytest.approx(drawn[name] / 400, abs=0.08)
+
+
+@needs_jit
+def test_people_of_the_survey_live_in_the_home() -> None:
+    stored = run(scenario("3 d", users=users(3, group="at_home")))
+    told = set(table(stored, "events", event="activity")["detail"])
+    assert {"sleep", "cook", "tv"} <= told
+    assert timedelta(days=3).total_seconds() == stored.manifest["steps"]
+
+
+def test_a_group_that_is_none_is_refused() -> None:
+    with pytest.raises(InputError, match=r"users\.user_0\.group"):
+        Simulation(scenario(users=users(1, group="teens")))
+
+
+def test_the_table_is_whole() -> None:
+    assert sum(facts["share"] for facts in survey.table()["groups"].values()) == 10_000
+    for facts in survey.table()["groups"].values():
+        for kind in ("weekday", "weekend"):
+            assert [10_000] * 24 == [sum(hour) for hour in facts[kind]]
+        assert 10_000 == sum(share for share, _ in facts["other"].values())

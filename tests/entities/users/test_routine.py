@@ -1,0 +1,279 @@
+"""Routine: a persona lives in a home, alone and with others."""
+
+import copy
+import itertools
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.routines.days import MONDAY
+from tests.scenes import OWN, digests, path, run, scenario, table
+
+import fleet2d
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError
+from fleet2d.routines.persona import bundled
+
+HOME = {"floorplan": {"type": "bundled", "furnish": True}}
+FAMILY = {
+    "members": {"ana": "works_outside", "ben": "works_from_home", "cleo": "child"},
+    "couples": [["ana", "ben"]],
+    "together": {"dinner": {"at": "18:45", "spread": "10 min", "on": "daily", "takes": "35 min"}},
+}
+SHORT = {
+    "days": {
+        "any_day": {
+            "on": "daily",
+            "wake": {"at": "07:00", "spread": "1 min"},
+            "do": {
+                "breakfast": {"on_waking": True, "takes": "20 min"},
+                "errand": {"at": "08:00", "fixed": True, "takes": {"law": "fixed", "mean": "1 h"}},
+            },
+            "leisure": {"read": 1},
+        }
+    }
+}
+
+
+def lives(persona: Any = "works_outside", duration: str = "1 d", **more: Any) -> dict[str, Any]:
+    """A scenario with one user who has a routine."""
+    sections = {k: more.pop(k) for k in ("simulation", "robots", "floorplan") if k in more}
+    user = {"type": "routine", "persona": persona, **more}
+    return scenario(duration, users={"ana": user}, **sections)
+
+
+def family(duration: str = "2 d", **household: Any) -> dict[str, Any]:
+    shared = {**FAMILY, **household}
+    users = {name: {"type": "routine", "household": shared} for name in shared["members"]}
+    return {**scenario(duration, users=users), **HOME}
+
+
+@needs_jit
+@pytest.mark.parametrize("name", bundled())
+def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name: str) -> None:
+    stored = run(lives(name, "7 d"))
+    told = set(table(stored, "events", event="activity")["detail"])
+    assert {"sleep"} < told
+
+
+@needs_jit
+@pytest.mark.parametrize("span", [7, 1])
+def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
+    content = family("45 min", away=[["2026-01-05T07:30", "2026-01-05T07:36"]])
+    content["users"]["rex"] = {"type": "pet"}
+    content["users"]["dan"] = {"type": "population"}
+    content["users"]["eve"] = {
+        "type": "room_sampling",
+        "shares": {"kitchen": 1, "bedroom": 2, "away": 1},
+    }
+    content["robots"] = {"astro": {"type": "patrol", "dwell": "1 min"}}
+    content["simulation"]["start"] = "2026-01-05T07:00"
+    assert digests(run(content)) == digests(run(content, max_span=span))
+
+
+@needs_jit
+def test_a_life_does_not_depend_on_who_else_there_is() -> None:
+    alone = lives()
+    crowd = copy.deepcopy(alone)
+    crowd["users"]["ben"] = {"type": "routine", "persona": "student"}
+    crowd["robots"] = {"astro": {"type": "patrol"}}
+    one, other = path(run(alone), "ana"), path(run(crowd), "ana")
+    assert (one.x == other.x).all()
+    assert (one.heading == other.heading).all()
+
+
+@needs_jit
+def test_two_seeds_give_different_lives_and_one_the_same() -> None:
+    content = lives(duration="2 d")
+    first, again = run(content), run(content)
+    other = run(content, seed=5)
+    assert digests(first) == digests(again)
+    assert (path(first, "ana").room != path(other, "ana").room).any()
+
+
+@needs_jit
+def test_a_run_can_branch_in_the_middle_of_an_activity() -> None:
+    simulation = Simulation(family("1 d"))
+    simulation.run_until(timedelta(hours=3, seconds=17))
+    twin = copy.deepcopy(simulation)
+    assert simulation.run().digest == twin.run().digest == run(family("1 d")).digest
+
+
+def test_it_does_what_its_day_says_when_it_says_so() -> None:
+    stored = run(lives(SHORT, "3 h", simulation={"start": "2026-01-05T06:30"}))
+    events = table(stored, "events", entity="ana")
+    told = [d for d, e in zip(events["detail"], events["event"], strict=True) if e == "activity"]
+    assert ["sleep", "breakfast"] == told[:2]
+    poses = path(stored, "ana")
+    gone = np.flatnonzero(poses.away)
+    left, back = 90 * 60, 150 * 60  # 08:00 to 09:00, and the way to the door
+    assert left < gone[0] < left + 30
+    assert back - 1 == gone[-1]
+
+
+def test_it_walks_at_the_pace_of_its_persona() -> None:
+    slow, fast = (
+        run(lives({**SHORT, "pace": pace}, "3 h", simulation={"start": "2026-01-05T06:30"}))
+        for pace in (0.5, 2.0)
+    )
+
+    def top_speed(stored: Any) -> float:
+        poses = path(stored, "ana")
+        moved = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)
+        return float(np.nanmax(np.where(poses.away[1:] | poses.away[:-1], 0, moved)))
+
+    assert 0.5 == pytest.approx(top_speed(slow), abs=0.02)
+    assert 2.0 == pytest.approx(top_speed(fast), abs=0.08)
+
+
+@needs_jit
+def test_small_moves_can_be_switched_off() -> None:
+    still, restless = (
+        run(lives({"extends": "retired", "leisure": {"read": 1}}, "1 d", small_moves=moves))
+        for moves in (False, True)
+    )
+
+    def stirs(stored: Any) -> int:
+        heading = path(stored, "ana").heading
+        return int((np.diff(heading) != 0).sum())
+
+    assert stirs(still) < stirs(restless)
+    told = [list(table(s, "events", event="activity")["detail"]) for s in (still, restless)]
+    assert told[0] == told[1]
+
+
+@needs_jit
+def test_an_activity_is_done_at_its_furniture_in_its_posture() -> None:
+    stored = run({**lives("works_from_home", "2 d"), **HOME})
+    used = table(stored, "events", event="uses")["detail"]
+    assert {"bed", "desk", "stove", "sofa"} <= {name.rpartition("_")[0] for name in used}
+
+
+@needs_jit
+def test_a_family_eats_at_one_time_at_places_of_its_own() -> None:
+    stored = run(family("3 d"))
+    events = table(stored, "events", event="activity")
+    dinner = events["detail"] == "dinner"
+    assert 9 == dinner.sum()
+    for day in range(3):
+        at = events["step"][dinner & (events["step"] // 86400 == (day * 86400 + 7 * 3600) // 86400)]
+        assert at.max() - at.min() < 120
+    places = {name: path(stored, name) for name in FAMILY["members"]}
+    eating = int(events["step"][dinner].max()) + 60
+    spots = {(p.x[eating], p.y[eating]) for p in places.values()}
+    assert 3 == len(spots)
+
+
+@needs_jit
+def test_a_couple_shares_a_bed_and_the_child_has_its_own() -> None:
+    simulation = Simulation(family())
+    beds = {n: a.behaviors[0].settings["sleep"].seats for n, a in simulation.actors.items()}
+    assert beds["ana"][0].thing == beds["ben"][0].thing != beds["cleo"][0].thing
+    assert beds["ana"] != beds["ben"]
+
+
+@needs_jit
+def test_members_never_stand_where_another_does() -> None:
+    stored = run(family("3 d"))
+    paths = [path(stored, name) for name in FAMILY["members"]]
+    for i, one in enumerate(paths):
+        for other in paths[:i]:
+            apart = np.sqrt((one.x - other.x) ** 2 + (one.y - other.y) ** 2)
+            still = np.r_[False, (np.diff(one.x) == 0) & (np.diff(other.x) == 0)]
+            both = still & ~one.away & ~other.away
+            assert (apart[both] > 0.3).mean() > 0.999
+
+
+def test_one_bathroom_is_used_by_one_at_a_time() -> None:
+    simulation = Simulation(
+        family(members={f"user_{i}": "works_outside" for i in range(4)}, couples=[])
+    )
+    actors = list(simulation.actors.values())
+    waited = 0
+    for ordinal in range(MONDAY, MONDAY + 60):
+        busy = sorted(
+            (doing.begin, doing.end)
+            for actor in actors
+            for doing in actor.behaviors[0].day(ordinal)
+            if doing.activity in ("wash", "shower", "toilet")
+        )
+        assert all(one[1] <= other[0] for one, other in itertools.pairwise(busy))
+        waited += sum(one[1] == other[0] for one, other in itertools.pairwise(busy))
+    assert waited > 10  # or nobody was ever in the way
+
+
+def test_on_holiday_nobody_is_at_home_and_a_visitor_only_when_visiting() -> None:
+    content = family("2 d", away=[["2026-01-05T08:00", "2026-01-06T06:00"]])
+    visit = ["2026-01-05T12:00", "2026-01-05T20:00"]
+    content["users"]["eve"] = {"type": "routine", "persona": "retired", "visits": [visit]}
+    stored = run(content)
+    hour = np.arange(48 * 3600) / 3600 + 7
+    for name in FAMILY["members"]:
+        assert path(stored, name).away[(hour > 8.1) & (hour < 30)].all()
+    eve = path(stored, "eve").away
+    assert eve[(hour < 12) | (hour > 20.1)].all()
+    assert not eve[(hour > 12.01) & (hour < 13)].all()
+
+
+def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
+    detour = {"type": f"{OWN}:Scripted", "script": ["kitchen", 60]}
+    routine = {"type": "routine", "persona": SHORT}
+    content = scenario(
+        "20 min", users={"ana": {"start": "bathroom", "behaviors": [detour, routine]}}
+    )
+    told = table(run(content), "events", entity="ana", event="activity")["detail"]
+    assert "breakfast" in told
+
+
+@pytest.mark.parametrize(
+    ("user", "words"),
+    [
+        ({"persona": "retierd"}, ["persona", "retierd", "did you mean 'retired'"]),
+        ({"persona": 3}, ["persona", "works_outside"]),
+        ({"persona": {"extends": "retired", "activities": {"read": {"rooms": ["sauna"]}}}}, ["sauna", "The rooms are"]),
+        ({"persona": {"extends": "retired", "days": {"every_day": {"do": {"nap": {"at": "25:00"}}}}}}, ["25:00"]),
+        ({"persona": "retired", "household": FAMILY}, ["household", "persona"]),
+        ({"household": {**FAMILY, "members": {"ben": "retired"}, "couples": []}}, ["no member", "ben"]),
+        ({"household": {**FAMILY, "couples": [["ana", "zoe"]]}}, ["zoe", "no member"]),
+        ({"household": {**FAMILY, "together": {"dinner": {"at": "18:00"}}}}, ["dinner", "'on' or 'dates'"]),
+        ({"visits": [["2026-01-06", "2026-01-05"]]}, ["no time"]),
+    ],
+)  # fmt: skip
+def test_what_makes_no_life_is_refused_in_plain_words(
+    user: dict[str, Any], words: list[str]
+) -> None:
+    content = scenario(users={"ana": {"type": "routine", **user}})
+    with pytest.raises(InputError) as caught:
+        Simulation(content)
+    for word in ["users.ana", *words]:
+        assert word in str(caught.value)
+
+
+def test_a_persona_comes_from_a_file_beside_the_scenario_and_is_stored_whole(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "ana.yaml").write_text("extends: retired\npace: 0.5\ndays: {sunday: null}\n")
+    (tmp_path / "home.yaml").write_text(
+        "extends: bundled:base\nusers: {ana: {type: routine, persona: ana.yaml}}\n"
+    )
+    loaded = fleet2d.load_scenario(tmp_path / "home.yaml", "simulation.duration=1 h")
+    persona = loaded.users["ana"].behaviors[0].persona
+    assert (0.5, ["every_day"]) == (persona.pace, list(persona.days))
+    (tmp_path / "ana.yaml").unlink()
+    assert loaded == fleet2d.load_scenario(loaded.resolved())
+
+
+def test_a_bundled_persona_is_stored_by_its_name() -> None:
+    resolved = fleet2d.load_scenario(lives("child")).resolved()
+    assert "child" == resolved["users"]["ana"]["behaviors"][0]["persona"]
+
+
+def test_it_begins_where_the_hour_suggests() -> None:
+    for hour, away in (("03:00", False), ("11:00", True)):
+        content = lives(simulation={"start": f"2026-01-07T{hour}"})
+        state = Simulation(content).state["ana"]
+        assert away == state["away"]
+    assert datetime(2026, 1, 7).weekday() == 2

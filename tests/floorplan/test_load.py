@@ -1,0 +1,53 @@
+"""All real maps against the numbers of their own files."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fleet2d.floorplan.load import load_floorplan
+
+# How many rooms the file has (None: it names none), and its free space without specks [m2].
+MAPS = {
+    "ros_maps/aws_small_house/map.yaml": (None, 155.5),
+    "ros_maps/turtlebot3_house/map.yaml": (None, 19.8),
+    "valetudo/dreame_d9_no_segments.json": (None, 24.3),
+    "valetudo/dreame_x40_named_rooms.json": (5, 29.3),
+    "valetudo/dreame_z10_named_rooms_and_paths.json": (8, 40.9),
+    "valetudo/roborock_s6_segments.json": (7, 46.0),
+}
+
+
+def test_table_has_every_map(shared_data: Path) -> None:
+    maps = {*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")}
+
+    assert {str(path.relative_to(shared_data)) for path in maps} == set(MAPS)
+
+
+@pytest.mark.parametrize("file", MAPS)
+def test_map_has_the_rooms_and_the_area_of_its_file(shared_data: Path, file: str) -> None:
+    rooms, area = MAPS[file]
+
+    plan = load_floorplan(shared_data / file)
+
+    assert area == pytest.approx(plan.area_m2, abs=0.05)
+    assert rooms in (None, len(plan.rooms))
+    assert np.array_equal(plan.free, plan.room_of_cell >= 0)
+    assert plan.area_m2 == pytest.approx(sum(room.area_m2 for room in plan.rooms))
+
+
+@pytest.mark.parametrize("file", [file for file, (rooms, _) in MAPS.items() if rooms])
+def test_named_rooms_have_the_areas_that_the_file_states(shared_data: Path, file: str) -> None:
+    """But for the few pixels that are wall, too."""
+    content = json.loads((shared_data / file).read_text())
+    segments = [layer for layer in content["layers"] if layer["type"] == "segment"]
+    stated = {
+        s["metaData"].get("name") or f"segment_{s['metaData']['segmentId']}": s["metaData"]["area"]
+        for s in segments
+    }
+
+    plan = load_floorplan(shared_data / file)
+
+    found = {room.name: room.area_m2 for room in plan.rooms if room.name != "unknown_0"}
+    assert {name: pytest.approx(area / 100**2, abs=0.011) for name, area in stated.items()} == found

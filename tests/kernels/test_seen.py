@@ -1,0 +1,152 @@
+"""The cells in view: those that every single line of sight says, in every home, at every angle."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import shapely
+from hypothesis import given
+from shapely.geometry import Polygon
+from tests.homes import (
+    Home,
+    all_homes,
+    awkward_points,
+    home_of,
+    needs_jit,
+    shuffled,
+    times_compiled,
+    transformed,
+    turns,
+)
+from tests.reference import seen as slow
+from tests.strategies import homes, quick, seeds
+
+from fleet2d.kernels._jit import kernel
+from fleet2d.kernels.headings import half_sine
+from fleet2d.kernels.lens import in_wedge
+from fleet2d.kernels.mesh import Mesh, locate, rasterize_cells
+from fleet2d.kernels.seen import Bench, Reach, bench_for, cells_in_view, mark_spans
+from fleet2d.kernels.sight import line_of_sight
+
+Int64 = npt.NDArray[np.int64]
+Bool = npt.NDArray[np.bool_]
+
+SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
+HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
+ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
+
+
+def found_in(home: Home, mesh: Mesh, pose: tuple[int, int, int], reach: Reach) -> Bool:
+    """Return the mask of the cells in view; no cell may be told twice."""
+    bench = bench_for(mesh, home.rows, home.columns)
+    count = cells_in_view(mesh, *pose, reach, bench)
+    spans = bench.spans[:count]
+    mask = np.zeros((home.rows, home.columns), np.bool_)
+    mark_spans(bench.spans, count, mask)
+    assert int(mask.sum()) == int((spans[:, 2] - spans[:, 1] + 1).sum())
+    return mask
+
+
+@kernel
+def _by_lines(mesh: Mesh, x: int, y: int, heading: int, reach: Reach, mask: Bool) -> None:
+    """Set the cells in view, each by its own line of sight."""
+    triangle = locate(mesh, x, y)
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            dx, dy = column * 64 + 33 - x, row * 64 + 33 - y
+            if not reach.near_squared <= dx * dx + dy * dy <= reach.far_squared:
+                continue
+            if in_wedge(heading, reach.half_angle, dx, dy):
+                mask[row, column] = line_of_sight(mesh, x, y, triangle, x + dx, y + dy)
+
+
+def random_reach(rng: np.random.Generator) -> tuple[int, int, int]:
+    """Return near, far [lattice] and half angle, the odd ones often."""
+    near = int(rng.choice([0, 0, 1, 64, 200, 500]))
+    far = near + int(rng.choice([1, 64, 500, 1500, 6000, 200_000]))
+    return near, far, int(rng.choice([*HALVES, rng.integers(1, 4097)]))
+
+
+def random_pose(home: Home, rng: np.random.Generator) -> tuple[int, int, int]:
+    """Return a pose at one of the awkward points, looking along an eighth of a turn or anywhere."""
+    x, y = rng.choice(awkward_points(home, rng, 3)).tolist()
+    heading = rng.integers(0, 8) * 512 if rng.random() < 0.5 else rng.integers(0, 4096)
+    return x, y, int(heading)
+
+
+@quick
+@given(homes(), seeds())
+def test_cells_are_those_that_brute_force_finds(polygons: list[Polygon], seed: int) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    mesh = shuffled(home.mesh, rng, 2)
+
+    for _ in range(4):
+        pose, (near, far, half) = random_pose(home, rng), random_reach(rng)
+        shape = (home.rows, home.columns)
+        expected = slow.cells_in_view(home.walls, shape, pose, near, far, half, SINES)
+        found = found_in(home, mesh, pose, Reach(near**2, far**2, half))
+        assert np.array_equal(expected, found), (pose, near, far, half)
+
+
+@pytest.mark.parametrize("half", HALVES)
+@pytest.mark.parametrize("at", [(33, 33), (0, 0), (40, 2), (33, 0), (0, 33)])
+def test_cells_round_a_pillar_are_those_that_brute_force_finds(
+    half: int, at: tuple[int, int]
+) -> None:
+    for heading in range(0, 4096, 256):
+        pose = (320 + at[0], 192 + at[1], heading)
+        shape = (ROOM.rows, ROOM.columns)
+        expected = slow.cells_in_view(ROOM.walls, shape, pose, 70, 700, half, SINES)
+        assert np.array_equal(expected, found_in(ROOM, ROOM.mesh, pose, Reach(4900, 490_000, half)))
+
+
+@needs_jit
+def test_cells_are_those_in_line_of_sight_in_fifty_homes_turned_and_mirrored(
+    shared_data: Path,
+) -> None:
+    rng = np.random.default_rng(8)
+    compared = 0
+    for number, home in enumerate(all_homes(shared_data)):
+        for turn in [list(turns(home))[i] for i in (0, 1 + number % 7)]:
+            turned = transformed(home, turn)
+            for _ in range(6):
+                pose, (near, far, half) = random_pose(turned, rng), random_reach(rng)
+                reach = Reach(near**2, far**2, half)
+                expected = np.zeros((turned.rows, turned.columns), np.bool_)
+                _by_lines(turned.mesh, *pose, reach, expected)
+                assert np.array_equal(expected, found_in(turned, turned.mesh, pose, reach)), pose
+                compared += expected.size
+    assert compared > 10_000_000
+
+
+@needs_jit
+def test_everything_in_view_all_round_is_free(shared_data: Path) -> None:
+    for home in list(all_homes(shared_data))[:10]:
+        free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
+        x, y = home.cells[len(home.cells) // 2].tolist()
+        found = found_in(home, home.mesh, (x, y, 0), Reach(0, 10**12, 4096))
+        assert found[y // 64, x // 64]
+        assert not (found & ~free).any()
+
+
+def test_no_camera_in_a_wall_sees_a_cell() -> None:
+    for x, y in [(128, 200), (600, 350), (0, 0), (-5, 9), (5000, 20)]:
+        assert not found_in(ROOM, ROOM.mesh, (x, y, 0), Reach(0, 10**9, 4096)).any()
+
+
+def test_range_ends_are_in_view_and_what_is_nearer_is_not() -> None:
+    eye = (64 * 6 + 33, 64 * 3 + 33, 0)
+
+    found = found_in(ROOM, ROOM.mesh, eye, Reach(64**2, (2 * 64) ** 2, 1))
+
+    assert np.argwhere(found).tolist() == [[3, 7], [3, 8]]
+
+
+@needs_jit
+def test_every_kernel_is_compiled_once() -> None:
+    found_in(ROOM, ROOM.mesh, (200, 200, 0), Reach(0, 10**6, 1000))
+
+    for function in (bench_for, cells_in_view, mark_spans):
+        assert 1 == times_compiled(function)
+    assert Bench._fields[-1] == "spans"

@@ -1,0 +1,149 @@
+"""What a robot has seen over time, against a twin that looks from every pose by brute force."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import shapely
+from tests.homes import Home, home_of, needs_jit, times_compiled
+from tests.reference import seen as slow
+
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels.headings import half_sine
+from fleet2d.kernels.lens import Lenses, camera_pose
+from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.seen import bench_for
+from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
+from fleet2d.sight.camera import Camera
+from fleet2d.sight.tables import Scene, stack_lenses
+
+SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
+SECOND = 1_000_000
+ROOMS = 3
+FLAT = home_of(
+    [
+        shapely.union_all([shapely.box(128, 128, 900, 700), shapely.box(960, 128, 1500, 700)])
+        .union(shapely.box(890, 300, 970, 420))
+        .difference(shapely.box(400, 300, 480, 380))
+    ]
+)
+
+
+class Seen(NamedTuple):
+    """What a robot has seen: first and last step of each cell, and the exposure of rooms."""
+
+    first: npt.NDArray[np.int64]
+    last: npt.NDArray[np.int64]
+    exposure: list[int]
+
+
+def lenses_of(*cameras: Camera) -> Lenses:
+    """Return cameras as the kernel has them, with 64 lattice units to 5 cm."""
+    lenses = [camera.lens(1280, SECOND) for camera in cameras]
+    lattice = Lattice(0.05, (0.0, 0.0), FLAT.columns, FLAT.rows)
+    return stack_lenses(lenses, [False] * len(lenses), Scene([], [], lattice, SECOND, "robots.a"))
+
+
+def rooms_of(home: Home) -> npt.NDArray[np.int16]:
+    """Return three rooms: strips of columns, with cells of no room between."""
+    rooms = np.full((home.rows, home.columns), -1, np.int16)
+    for room in range(ROOMS):
+        rooms[:, 8 * room : 8 * room + 7] = room
+    rooms.setflags(write=False)  # as a floor plan's are
+    return rooms
+
+
+def random_poses(rng: np.random.Generator, count: int) -> Poses:
+    """Return poses of a robot that stands, comes back to a few places, and is away at times."""
+    cells = FLAT.cells
+    spots = rng.choice(cells, 6) + rng.integers(-30, 30, (6, 2))
+    at = np.repeat(rng.integers(0, 6, count), rng.integers(1, 5, count))[:count]
+    headings = np.repeat(rng.choice([0, 512, 1900, 3333], count), rng.integers(1, 4, count))[:count]
+    away = np.repeat(rng.random(count) < 0.1, rng.integers(1, 6, count))[:count]
+    return Poses(
+        np.ascontiguousarray(spots[at, 0]), np.ascontiguousarray(spots[at, 1]),
+        headings.astype(np.int64), away.astype(np.uint8),
+    )  # fmt: skip
+
+
+def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
+    """Return what is seen, step by step and cell by cell."""
+    shape = (FLAT.rows, FLAT.columns)
+    first, last = np.full(shape, NEVER), np.full(shape, NEVER)
+    rooms, exposure = rooms_of(FLAT), np.zeros(ROOMS, np.int64)
+    for step in range(0, len(poses.x), every):
+        if poses.away[step]:
+            continue
+        seen = np.zeros(shape, bool)
+        for c in range(len(lenses.near_squared)):
+            robot = (int(poses.x[step]), int(poses.y[step]), int(poses.heading[step]))
+            pose = camera_pose(lenses, c, *robot, step * SECOND)
+            near, far = (
+                round(float(v) ** 0.5) for v in (lenses.near_squared[c], lenses.far_squared[c])
+            )
+            half = int(lenses.half_angle[c])
+            seen |= slow.cells_in_view(FLAT.walls, shape, pose, near, far, half, SINES)
+        first[seen & (first == NEVER)] = step
+        last[seen] = step
+        exposure += every * np.bincount(rooms[seen & (rooms >= 0)], minlength=ROOMS)
+    return Seen(first, last, exposure.tolist())
+
+
+def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[int]) -> Seen:
+    """Return what the kernel makes of it, in spans that end at the given steps."""
+    shape = (FLAT.rows, FLAT.columns)
+    several = len(lenses.near_squared) > 1
+    record = Record(
+        np.full(shape, NEVER, np.int64), np.full(shape, NEVER, np.int64), np.zeros(ROOMS, np.int64),
+        np.full(shape if several else (0, 0), NEVER, np.int64),
+    )  # fmt: skip
+    watched = Watched(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every)
+    glances, bench = no_glances(slots, ROOMS), bench_for(FLAT.mesh, *shape)
+    begin = 0
+    for end in [*ends, len(poses.x)]:
+        part = Poses(*(np.ascontiguousarray(column[begin:end]) for column in poses))
+        watch(watched, part, begin, glances, bench, record)
+        begin = end
+    settle(watched, glances, bench, record.last)
+    return Seen(record.first, record.last, record.exposure.tolist())
+
+
+ONE = [Camera(range=(0.1, 0.6), angle_deg=108)]
+WIDE = [Camera(range=(0, 3), angle_deg=250)]
+TWO = [
+    Camera(range=(0, 0.5), angle_deg=90),
+    Camera.model_validate(
+        {
+            "range": [0, 0.4], "angle_deg": 120, "offset": [0.05, -0.02], "heading_deg": 40,
+            "pan": {"headings_deg": [-60, 0, 60], "dwell": "2 s"},
+        }
+    ),
+]  # fmt: skip
+
+
+@needs_jit
+@pytest.mark.parametrize("cameras", [ONE, WIDE, TWO], ids=["one", "wide", "two, one of them pans"])
+@pytest.mark.parametrize(("every", "slots"), [(1, 64), (1, 2), (3, 8)])
+@pytest.mark.parametrize("ends", [[], [1, 2, 17, 18, 40]], ids=["whole", "in spans"])
+def test_what_was_seen_is_what_brute_force_sees(
+    cameras: Any, every: int, slots: int, ends: list[int]
+) -> None:
+    poses = random_poses(np.random.default_rng(len(cameras)), 60)
+    lenses = lenses_of(*cameras)
+
+    expected = by_brute_force(poses, lenses, every)
+    found = by_kernel(poses, lenses, every, slots, ends)
+
+    assert expected.exposure == found.exposure
+    assert np.array_equal(expected.first, found.first)
+    assert np.array_equal(expected.last, found.last)
+    assert (expected.first >= 0).sum() > 20
+
+
+@needs_jit
+def test_kernels_are_compiled_once() -> None:
+    by_kernel(random_poses(np.random.default_rng(1), 5), lenses_of(*ONE), 1, 8, [])
+
+    for function in (watch, settle):
+        assert 1 == times_compiled(function)

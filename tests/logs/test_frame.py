@@ -1,0 +1,55 @@
+"""Frames of logs: any similarity is undone, exactly told or fitted to matches."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from fleet2d.logs.frame import Frame
+
+NUMBER = st.floats(-50, 50)
+
+
+@given(
+    scale=st.floats(0.001, 100),
+    degrees=st.floats(-720, 720),
+    flip=st.booleans(),
+    origin=st.tuples(NUMBER, NUMBER),
+)
+def test_a_frame_does_what_complex_numbers_do_and_matches_find_it_again(
+    scale: float, degrees: float, flip: bool, origin: tuple[float, float]
+) -> None:
+    frame = Frame(scale=scale, rotation_deg=degrees, flip_y=flip, origin=origin)
+    log = np.array([[0.0, 0.0], [10.0, 0.0], [3.0, 7.0]])
+    z = log[:, 0] + 1j * (-log[:, 1] if flip else log[:, 1])
+    w = scale * np.exp(1j * np.radians(degrees)) * z + complex(*origin)
+    expected = np.stack([w.real, w.imag], 1)
+    assert expected == pytest.approx(frame.to_plan(log), abs=1e-9 * (1 + scale))
+    matches = [{"log": a, "plan": b} for a, b in zip(log.tolist(), expected.tolist(), strict=True)]
+    found = Frame(flip_y=flip, matches=matches)
+    assert expected == pytest.approx(found.to_plan(log), abs=1e-6 * (1 + scale))
+    assert found.errors().max() < 1e-6 * (1 + scale)
+
+
+def test_headings_turn_and_mirror_with_the_frame() -> None:
+    east, north = 0.0, 0.25
+    turned = Frame(rotation_deg=90).turned(np.array([east, north]))
+    assert [0.25, 0.5] == pytest.approx(turned.tolist())
+    mirrored = Frame(flip_y=True).turned(np.array([east, north]))
+    assert [0.0, -0.25] == pytest.approx(mirrored.tolist())
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"scale": 2, "matches": [{"log": (0, 0), "plan": (0, 0)}]}, "not both"),
+        ({"matches": [{"log": (0, 0), "plan": (0, 0)}]}, "two different places"),
+        ({"scale": 0}, "greater than 0"),
+    ],
+)
+def test_a_frame_that_says_too_much_or_too_little_is_refused(
+    settings: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ValidationError, match=message):
+        Frame.model_validate(settings)

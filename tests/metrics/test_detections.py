@@ -1,0 +1,94 @@
+"""Precision, recall and confusion, against the stored observations and a count of their own."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import run, scenario, table
+
+from fleet2d.artifacts.reader import Run
+
+pytestmark = needs_jit
+
+CONFUSION = {"ana": {"ben": 1.0}, "ben": {"ana": 0.5, "cleo": 0.5}}
+
+
+def content(period: str = "10 min") -> dict[str, Any]:
+    return scenario(
+        "2 h",
+        users={name: {"type": "meander"} for name in ("ana", "ben", "cleo")},
+        robots={
+            "astro": {
+                "type": "patrol",
+                "dwell": "20 s",
+                "camera": {"detection": 0.7, "angle_deg": 180},
+                "perception": {
+                    "identity": {"right": 0.7, "mistaken": 0.2, "confusion": CONFUSION},
+                    "false_positives": {"per_hour": 200, "looks_like": {"cleo": 0.5}},
+                },
+            },
+            "blind": {"camera": None},
+            "sharp": {"type": "meander", "camera": {"angle_deg": 360}},
+        },
+        metrics={"detections": {"period": period}},
+    )
+
+
+@pytest.fixture(scope="module")
+def stored() -> Run:
+    return run(content())
+
+
+def name_of(value: Any, missing: str) -> str:
+    return value if isinstance(value, str) else missing
+
+
+def test_precision_and_confusion_are_those_of_the_stored_rows(stored: Run) -> None:
+    rows = table(stored, "observations", robot="astro")
+    true = np.array([name_of(v, "nobody") for v in rows["true_user"]])
+    found = np.array([name_of(v, "unknown") for v in rows["user"]])
+    result = stored.metrics["detections"]["astro"]
+    assert (true != "nobody").mean() == pytest.approx(result["precision"])
+    real = true != "nobody"
+    assert (true == found)[real].mean() == pytest.approx(result["recognized"])
+    for who, shares in result["confusion"].items():
+        for taken in ("ana", "ben", "cleo", "unknown"):
+            expected = (found[true == who] == taken).mean()
+            assert expected == pytest.approx(shares.get(taken, 0.0)), (who, taken)
+
+
+def test_recall_and_confusion_are_those_configured(stored: Run) -> None:
+    """Looks of four hours a user in view, far more than these bounds need."""
+    astro, sharp = (stored.metrics["detections"][name] for name in ("astro", "sharp"))
+    looks = table(stored, "detections", robot="astro")
+    count = looks["in_view"].sum()
+    assert count > 2000
+    assert abs(astro["recall"] - 0.7) < 4.5 * np.sqrt(0.21 / count)
+    assert astro["confusion"]["ana"]["ben"] == pytest.approx(0.2, abs=0.05)
+    assert "cleo" not in astro["confusion"]["ana"]
+    assert astro["confusion"]["ben"]["cleo"] == pytest.approx(0.1, abs=0.04)
+    assert astro["confusion"]["nobody"]["cleo"] == pytest.approx(0.5, abs=0.1)
+    assert {"precision": 1.0, "recall": 1.0, "recognized": 1.0} == {
+        key: sharp[key] for key in ("precision", "recall", "recognized")
+    }
+    assert {"ana": {"ana": 1.0}, "ben": {"ben": 1.0}, "cleo": {"cleo": 1.0}} == sharp["confusion"]
+
+
+def test_a_robot_that_sees_nothing_has_no_shares(stored: Run) -> None:
+    assert {} == stored.metrics["detections"]["blind"]
+
+
+def test_rows_of_all_periods_add_up_to_the_observations(stored: Run) -> None:
+    rows = table(stored, "detections")
+    observed = table(stored, "observations")
+    assert len(observed["step"]) == rows["observed"].sum()
+    for user in ("ana", "ben", "cleo"):
+        mine = rows["user"] == user
+        assert (observed["true_user"] == user).sum() == rows["observed"][mine].sum()
+        assert rows["detected"][mine].sum() == rows["observed"][mine].sum()  # without latency
+    assert (rows["in_view"] >= rows["detected"]).all()
+
+
+def test_results_do_not_depend_on_the_period(stored: Run) -> None:
+    assert stored.metrics["detections"] == run(content("7 min")).metrics["detections"]

@@ -1,0 +1,70 @@
+"""What every planned day must keep, checked straight from the template and not by the planner."""
+
+from collections.abc import Sequence
+from datetime import date
+from itertools import pairwise
+
+from fleet2d.routines.persona import DayTemplate, Persona
+from fleet2d.routines.planner import Doing
+from fleet2d.routines.templates import REACH
+
+DAY_S = 86_400
+MONDAY = date(2026, 1, 5).toordinal()
+
+
+def violations(
+    persona: Persona, ordinal: int, day: Sequence[Doing], next_day: Sequence[Doing]
+) -> list[str]:
+    """Say in words what a day breaks."""
+    template = persona.days[persona.day(date.fromordinal(ordinal))]
+    found = [f"gap or overlap before {b}" for a, b in pairwise(day) if a.end != b.begin]
+    found += [f"{doing} takes no time" for doing in day if doing.end <= doing.begin]
+    if day[-1].end != next_day[0].begin + DAY_S:
+        found.append("the next day doesn't follow")
+    if "sleep" != day[-1].activity:
+        found.append("it doesn't end asleep")
+    found += _outside("wake", template.wake, day[0].begin)
+    found += _outside("sleep", template.sleep, day[-1].begin)
+    if day[-1].end - day[-1].begin < template.sleep.at_least.total_seconds():
+        found.append("too short a night")
+    return found + _broken_tasks(persona, template, day)
+
+
+def _broken_tasks(persona: Persona, template: DayTemplate, day: Sequence[Doing]) -> list[str]:
+    found = []
+    at = {doing.task: doing for doing in day if doing.task}
+    if len(at) != sum(1 for doing in day if doing.task):
+        found.append("a task is done twice")
+    for name, task in template.do.items():
+        if name not in at:
+            if task.fixed or (task.probability == 1 and not task.after):
+                found.append(f"{name} is left out")
+            continue
+        doing = at[name]
+        found += _outside(name, task, doing.begin)
+        takes = task.takes or persona.activity(task.activity or name).takes
+        lasts = doing.end - doing.begin
+        if takes.at_least is not None and lasts < takes.at_least.total_seconds():
+            found.append(f"{name} is too short")
+        if takes.at_most is not None and lasts > takes.at_most.total_seconds():
+            found.append(f"{name} is too long")
+        if task.until is not None:
+            until = task.until.total_seconds()
+            if doing.end > until + DAY_S * (until < day[0].begin - 3600):
+                found.append(f"{name} ends after {task.until}")
+        found += [f"{name} before {o}" for o in task.after if o in at and at[o].end > doing.begin]
+    return found
+
+
+def _outside(name: str, timing: object, begin: int) -> list[str]:
+    at, between = timing.at, timing.between
+    if between is not None:
+        first, last = (t.total_seconds() for t in between)
+        last += DAY_S * (last < first)
+    elif at is not None:
+        reach = 0 if getattr(timing, "fixed", False) else REACH * timing.spread.total_seconds()
+        first, last = at.total_seconds() - reach, at.total_seconds() + reach
+    else:
+        return []
+    inside = any(first <= begin - shift <= last for shift in (0, DAY_S, -DAY_S))
+    return [] if inside else [f"{name} begins at {begin}, outside {first} to {last}"]

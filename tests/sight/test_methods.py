@@ -1,0 +1,188 @@
+"""The methods of fields of view: one answer, whatever is precomputed, kept or shared."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from tests.scenes import flat_path
+
+import fleet2d
+from fleet2d.component import components
+from fleet2d.errors import InputError
+from fleet2d.floorplan.doorways import DoorLine
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.seen import Reach
+from fleet2d.sight.flashlight import Flashlight
+from fleet2d.sight.fov import Bool, FieldOfView
+from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.visibility_polygon import VisibilityPolygon
+
+POINTS = 300
+
+
+@pytest.fixture(scope="module")
+def home() -> Home:
+    return Home(fleet2d.load_floorplan(flat_path()))
+
+
+def exact_methods(folder: Path) -> list[FieldOfView]:
+    """The methods that answer for any point."""
+    return [
+        LineOfSight(),
+        VisibilityPolygon(),
+        VisibilityPolygon(keep=1),
+        VisibilityPolygon(precompute="all"),
+        VisibilityPolygon(precompute="file", path=folder),
+    ]
+
+
+def some_poses(home: Home, count: int) -> list[tuple[int, int, int]]:
+    """Poses at the centres of cells, beside them, in walls and outside."""
+    rng = np.random.default_rng(5)
+    cells = np.argwhere(home.plan.free)
+    poses = []
+    for row, column in rng.choice(cells, count).tolist():
+        x, y = home.plan.lattice.cell_centre(row, column)
+        dx, dy = rng.choice([0, 0, 1, -31, 17, 400], 2).tolist()
+        poses.append((x + dx, y + dy, int(rng.integers(0, 4096))))
+    return [*poses, (0, 0, 0), (-5, 9, 100)]
+
+
+def some_reaches() -> list[Reach]:
+    return [Reach(0, 3000**2, 1229), Reach(200**2, 6000**2, 3000), Reach(0, 10**10, 4096)]
+
+
+def test_methods_agree_on_every_point(home: Home, tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    low, high = (0, 0), (SUB * home.plan.lattice.columns, SUB * home.plan.lattice.rows)
+    methods = exact_methods(tmp_path)
+    for method in methods:
+        method.start(home)
+    seen = 0
+    for pose in some_poses(home, 25):
+        corners = rng.choice(home.plan.mesh.vertices, POINTS)
+        points = np.concatenate(
+            [rng.integers(low, high, (POINTS, 2)), corners, 2 * corners - pose[:2]]
+        )
+        for reach in some_reaches():
+            answers = [method.sees(home, *pose, reach, points) for method in methods]
+            for method, answer in zip(methods[1:], answers[1:], strict=True):
+                assert np.array_equal(answers[0], answer), (method, pose, reach)
+            seen += int(answers[0].sum())
+    assert seen > 1000
+
+
+def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home, tmp_path: Path) -> None:
+    flashlight = Flashlight()
+    rows, columns = np.indices(home.plan.free.shape)
+    centres = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.int64) * SUB + 33
+    for pose in some_poses(home, 6):
+        for reach in some_reaches():
+            expected = LineOfSight().cells(home, *pose, reach)
+            for method in (*exact_methods(tmp_path), flashlight):
+                assert np.array_equal(expected, method.cells(home, *pose, reach)), method
+            found = flashlight.sees(home, *pose, reach, centres)
+            assert np.array_equal(expected.ravel(), found)
+            nearby = centres + np.random.default_rng(1).integers(-33, 31, centres.shape)
+            assert np.array_equal(found, flashlight.sees(home, *pose, reach, nearby))
+
+
+def test_flashlight_keeps_no_more_than_its_memory_and_answers_the_same(home: Home) -> None:
+    small, large = Flashlight(memory_mb=0.01), Flashlight()
+    poses = some_poses(home, 60)
+    reach = some_reaches()[0]
+    for pose in (*poses, *poses[:5]):
+        assert np.array_equal(small.cells(home, *pose, reach), large.cells(home, *pose, reach))
+        assert small.kept[1] <= 10_000
+    assert 1 <= small.kept[0] < large.kept[0] <= len(set(poses))
+
+
+def test_every_method_follows_a_door() -> None:
+    free = shapely.union_all(
+        [shapely.box(0, 0, 2, 3), shapely.box(2.1, 0, 5, 3), shapely.box(2, 1, 2.1, 1.9)]
+    )
+    plan = FloorPlan.build("two", free, doorways=[DoorLine((2.05, 1.0), (2.05, 1.9))])
+    home = Home(plan, plan.doorways)
+    methods: list[FieldOfView] = [
+        LineOfSight(), VisibilityPolygon(), VisibilityPolygon(precompute="all"), Flashlight(),
+    ]  # fmt: skip
+    (eye, point) = plan.lattice.to_lattice([(1.025, 1.425), (3.025, 1.475)]) // SUB * SUB + 33
+    for is_open in (True, False, True):
+        home.set_door(0, is_open=is_open)
+        for method in methods:
+            assert [is_open] == method.visible(home, *eye.tolist(), point[None]).tolist(), method
+
+
+def test_file_is_written_once_and_read_by_others(home: Home, tmp_path: Path) -> None:
+    folder = tmp_path / "shared" / "regions"
+    first = VisibilityPolygon(precompute="file", path=folder)
+    first.start(home)
+    (file,) = folder.iterdir()
+    before = file.stat().st_mtime_ns, file.read_bytes()
+    second = VisibilityPolygon(precompute="file", path=folder)
+    second.start(home)
+
+    assert before == (file.stat().st_mtime_ns, file.read_bytes())
+    assert isinstance(second._regions.right, np.memmap)  # type: ignore[union-attr]
+    other = Home(fleet2d.load_floorplan())
+    second.start(other)
+    assert 2 == len(list(folder.iterdir()))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda file: file.write_bytes(b""),
+        lambda file: file.write_bytes(b"nonsense" * 100),
+        lambda file: file.write_bytes(file.read_bytes()[:5000]),
+        lambda file: np.save(file, np.zeros(5000)),
+        lambda file: np.save(file, np.load(file)[:-2]),
+    ],
+    ids=["empty", "other", "cut off", "of floats", "too short"],
+)
+def test_damaged_file_is_an_error_that_says_what_to_do(
+    home: Home, tmp_path: Path, damage: Any
+) -> None:
+    VisibilityPolygon(precompute="file", path=tmp_path).start(home)
+    (file,) = tmp_path.iterdir()
+    damage(file)
+
+    with pytest.raises(InputError, match="remove it"):
+        VisibilityPolygon(precompute="file", path=tmp_path).start(home)
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        ({"type": "visibility_polygon", "precompute": "file"}, "give 'path'"),
+        ({"type": "visibility_polygon", "path": "here"}, "give 'path'"),
+        ({"type": "visibility_polygon", "precompute": "al"}, "visited"),
+        ({"type": "visibility_polygon", "keep": 0}, "keep"),
+        ({"type": "flashlight", "memory_mb": 0}, "memory_mb"),
+        ({"type": "flash_light"}, "did you mean 'flashlight'"),
+        ({"type": "flashlight", "keep": 4}, "memory_mb"),
+    ],
+)
+def test_wrong_method_is_an_error_that_names_the_key(settings: dict[str, Any], why: str) -> None:
+    with pytest.raises(InputError, match=why) as caught:
+        fleet2d.load_scenario(None, sight={"method": settings})
+    assert "sight.method" in str(caught.value)
+
+
+class XRay(FieldOfView):
+    """A user's own method, for which walls don't count."""
+
+    def visible(self, home: Home, x: int, y: int, points: Any) -> Bool:
+        return np.ones(len(points), np.bool_)
+
+
+def test_own_method_needs_only_what_is_visible(home: Home) -> None:
+    pose, reach = some_poses(home, 1)[0], some_reaches()[0]
+    cells = XRay().cells(home, *pose, reach)
+
+    assert cells.sum() > LineOfSight().cells(home, *pose, reach).sum()
+    assert {"flashlight", "line_of_sight", "visibility_polygon"} <= set(components("sight"))

@@ -1,0 +1,137 @@
+"""A camera that looks at users who are somewhere else in each step: what comes of a perception."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from tests.homes import home_of
+
+from fleet2d.engine.buckets import new_memory
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels.look import SIGHTING, Crowd, Memory, Rule, SightEvents, look
+from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.perception import MOST_GHOSTS
+from fleet2d.sight.camera import Camera
+from fleet2d.sight.perception import Perception
+from fleet2d.sight.tables import Scene, error_tables, stack_lenses
+from fleet2d.streams import stream_key
+
+Int64 = npt.NDArray[np.int64]
+Float64 = npt.NDArray[np.float64]
+
+UNITS_PER_M = 1280  # cells of 5 cm
+SIDE_M = 20.0
+LATTICE = Lattice(cell=0.05, origin=(0.0, 0.0), columns=400, rows=400)
+PILLAR = shapely.box(12, 10.3, 12.5, 11.5)
+
+
+def hall(*pillars: shapely.Polygon) -> Mesh:
+    """Return a hall of 20 m by 20 m, with pillars [m]."""
+    space = shapely.box(0, 0, SIDE_M, SIDE_M).difference(shapely.union_all(pillars))
+    return home_of([shapely.transform(space, lambda xy: np.rint(xy * UNITS_PER_M))]).mesh
+
+
+HALL = hall()
+
+
+@dataclass
+class Watch:
+    """What is watched: poses by step, of the robot (steps, 3) and of each user (users, steps, 3).
+
+    Poses are x, y [m] and heading [deg]; the robot is in the middle of the hall and looks along +x.
+    """
+
+    users: Float64
+    camera: Mapping[str, Any] = field(default_factory=dict)
+    perception: Mapping[str, Any] = field(default_factory=dict)
+    robot: Float64 | None = None
+    posture: npt.NDArray[np.int8] | None = None
+    names: Sequence[str] = ("ana", "ben", "cleo", "dora")
+    step_s: float = 1.0
+    start_h: float = 0.0
+    seed: int = 1
+    first: int = 0
+    walls: Mesh = HALL
+    radius: float = 0.2
+    memory: Memory | None = None
+
+    def look(self) -> Int64:
+        """Return all sightings."""
+        count, steps = self.users.shape[:2]
+        camera = Camera.model_validate(
+            {"range": [0, 9], "angle_deg": 360, **self.camera, "perception": self.perception}
+        )
+        step_us = round(self.step_s * 1e6)
+        lens = camera.lens(UNITS_PER_M, step_us)
+        scene = Scene(
+            self.names[:count], [self.radius * UNITS_PER_M] * count, LATTICE, step_us, "robots.r"
+        )
+        errors = error_tables([lens], [camera.perception or Perception()], scene)
+        for u, name in enumerate(scene.users):
+            for i in range(errors.keys.shape[2]):
+                errors.keys[0, u, i] = stream_key(self.seed, "robots.r", f"{i} {name}")
+        for s in range(errors.ghost_keys.shape[1]):
+            for i in range(errors.ghost_keys.shape[2]):
+                errors.ghost_keys[0, s, i] = stream_key(self.seed, "robots.r", f"{i} ghost {s}")
+        burst = count + MOST_GHOSTS * int(errors.sources[0])
+        rule = Rule(lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False)
+        if self.memory is None:
+            self.memory = new_memory(1, count, burst * (lens.latency // lens.period + 2))
+        robot = (
+            np.tile([SIDE_M / 2, SIDE_M / 2, 0.0], (steps, 1)) if self.robot is None else self.robot
+        )
+        sightings = np.empty((3 * (count + 1) * steps + burst, SIGHTING), np.int64)
+        events = SightEvents(
+            *(np.empty((count + 1) * steps, dtype) for dtype in (np.int64, np.int32, np.int32))
+        )
+        posture = np.zeros((count, steps), np.int8) if self.posture is None else self.posture
+        none = np.zeros((count, steps), np.uint8)
+        done, found, _ = look(
+            self.walls,
+            stack_lenses([lens], [True], scene),
+            errors,
+            rule,
+            Poses(*_lattice(robot), none[0] if count else np.zeros(steps, np.uint8)),
+            Crowd(*_lattice(self.users), none, posture),
+            self.first,
+            self.memory,
+            sightings,
+            events,
+        )
+        assert done == steps
+        return sightings[:found]
+
+
+def _lattice(poses: Float64) -> list[Int64]:
+    """Return x, y and heading as the kernels have them."""
+    x, y = (np.rint(poses[..., i] * UNITS_PER_M).astype(np.int64) for i in (0, 1))
+    return [x, y, np.rint(poses[..., 2] / 360 * 4096).astype(np.int64) % 4096]
+
+
+def around(distance: Float64, bearing_deg: Float64, facing_deg: Float64 | float = 0.0) -> Float64:
+    """Return poses (1, n, 3) of a user at distances and bearings from the middle of the hall."""
+    angle = np.deg2rad(bearing_deg)
+    x = SIDE_M / 2 + distance * np.cos(angle)
+    y = SIDE_M / 2 + distance * np.sin(angle)
+    return np.stack([x, y, np.broadcast_to(facing_deg, x.shape)], axis=-1)[None]
+
+
+def agree(hits: npt.NDArray[Any], expected: npt.ArrayLike, z: float = 4.5) -> bool:
+    """Return whether independent yes/no outcomes happen as often as their probabilities say.
+
+    A true model fails in one of 150,000 cases (4.5 standard deviations of the binomial).
+    """
+    p = np.broadcast_to(np.asarray(expected, np.float64), hits.shape)
+    assert len(hits) > 100
+    spread = np.sqrt((p * (1 - p)).sum())
+    return bool(abs(hits.sum() - p.sum()) <= z * spread + 0.5 + 1e-3 * p.sum())
+
+
+def changed(watch: Watch, **changes: Any) -> Watch:
+    """Return the same with changes, and nothing remembered."""
+    return dataclasses.replace(watch, memory=None, **changes)
