@@ -373,10 +373,23 @@ def month(repeats: int = REPEATS) -> dict[str, float]:
         def update(self, history: Any, state: Any) -> None:
             self.sum = self.sum + history.exposure
 
-    base = fleet2d.load_scenario(None)
-    layers = fleet2d.load_scenario(None, "floorplan.layers={explored: {}, last_seen: {}}")
-    exposed = layers.model_copy(update={"algorithms": {"exposed": Exposed()}})
-    cases = {"base": base, "explored, last seen": layers, "… and exposure": exposed}
+    class Idle(fleet2d.Algorithm):
+        """Does nothing: what an algorithm costs that asks for nothing."""
+
+        def update(self, history: Any, state: Any) -> None:
+            return None
+
+    base = fleet2d.load_scenario(None, algorithms={})
+    base = base.model_copy(update={"algorithms": {"idle": Idle()}})
+    layers = fleet2d.load_scenario(None, "floorplan.layers={explored: {}}")
+    layers = layers.model_copy(update={"algorithms": {"exposed": Exposed()}})
+    last = fleet2d.load_scenario(None, "floorplan.layers={explored: {}, last_seen: {}}")
+    last = last.model_copy(update={"algorithms": {"exposed": Exposed()}})
+    cases = {
+        "with an algorithm that does nothing": base,
+        "explored and exposure": layers,
+        "last seen besides": last,
+    }
     times: dict[str, list[float]] = {name: [] for name in cases}
     for _ in range(repeats + 1):
         for name, scenario in cases.items():
@@ -426,7 +439,7 @@ def main() -> None:
         print("  peers: not compared, for --peers names no Python that has them")
     months = {} if options.no_month else month()
     for name, seconds in months.items():
-        more = seconds / months["base"] - 1
+        more = seconds / next(iter(months.values())) - 1
         print(f"base month, {name}: {seconds:.3f} s ({more:+.0%})")
     if options.json:
         figures = {"homes": [asdict(row) for row in rows], "month_s": months}

@@ -1,6 +1,6 @@
 """How close generated homes come to HouseExpo's plans, and how long one takes.
 
-    python benchmarks/synthetic_homes.py HOUSEEXPO [--homes 1000] [--figure FILE.png] [--json FILE]
+    python benchmarks/synthetic_homes.py HOUSEEXPO [--homes N] [--check] [--figure P] [--json J]
 
 HOUSEEXPO is a folder of plans with an INDEX.tsv. Its kinds `empty` (no rooms), `tiny` (one room of
 a few metres) and `big` (no homes: offices and floors of flats) are left out. All homes are drawn
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.houseexpo import read_houseexpo
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.synthetic.source import Synthetic
@@ -46,6 +47,9 @@ def main() -> None:
         print(_written(row))
     alike = len(homes) - len({plan.named("home").digest for plan in homes})
     print(f"alike: {alike}; with notes: {sum(bool(plan.notes) for plan in homes)}")
+    if arguments.check:
+        wrong = [plan.name for plan in homes if checkup(plan)]
+        print(f"check-up: {len(wrong)} homes with findings {' '.join(wrong[:10])}".rstrip())
     low, middle, high = min(seconds), statistics.median(seconds), max(seconds)
     slow = float(np.percentile(seconds, 95))
     print(f"ms per home: {1e3 * middle:.1f} median, {1e3 * low:.1f} to {1e3 * high:.1f},", end=" ")
@@ -63,7 +67,7 @@ def generated(count: int) -> tuple[list[FloorPlan], list[float]]:
     homes, seconds = [], []
     for seed in range(count):
         start = time.perf_counter()
-        homes.append(Synthetic(seed=seed, furnish=False).load())
+        homes.append(Synthetic(seed=seed).load())
         seconds.append(time.perf_counter() - start)
     return homes, seconds
 
@@ -188,6 +192,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("houseexpo", type=Path, help="folder of plans with INDEX.tsv")
     parser.add_argument("--homes", type=int, default=1000)
+    parser.add_argument("--check", action="store_true", help="give each home a check-up, too")
     parser.add_argument("--figure", type=Path, help="PNG to draw the distributions to")
     parser.add_argument("--json", type=Path, help="file to write the table to")
     return parser.parse_args()

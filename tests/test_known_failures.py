@@ -316,6 +316,8 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 ELSEWHERE = {
     (User, "color"): "tests/view: pictures",
     (Robot, "color"): "tests/view: pictures",
+    (User, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
+    (Robot, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
     (SimulationSettings, "max_span"): "test_spans: changes no result by design; see below",
     (SimulationSettings, "speedup"): "test_pace: wall time",
 }
@@ -442,7 +444,8 @@ def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path: Path) -> 
     )
     assert 2 == len(plan.rooms)
     assert plan.rooms_of_type("kitchen") == plan.rooms_of_type("dining_room")
-    assert 12 == pytest.approx(plan.rooms_of_type("kitchen")[0].area_m2)
+    # Boxes end at a border of cells now, where the room's cells do.
+    assert 12 == pytest.approx(plan.rooms_of_type("kitchen")[0].area_m2, abs=0.05)
     assert () == plan.rooms_of_type("pool")
 
 

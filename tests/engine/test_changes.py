@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from tests.homes import needs_jit
-from tests.scenes import digests, run, table
+from tests.scenes import digests, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, ComponentError, InputError
@@ -351,11 +351,9 @@ def test_branches_change_on_their_own(plan: str) -> None:
     assert branch.actors["ana"].home is branch.home
 
 
-def test_homes_without_doors_pay_nothing(plan: str) -> None:
-    simulation = fleet2d.Simulation(
-        home(plan, users={"ana": stands(6, 1.45)}, floorplan={"type": "bundled"})
-    )
-    assert simulation.home.plan.mesh is simulation.home.walls or simulation.home.objects
+def test_homes_without_doors_pay_nothing() -> None:
+    simulation = fleet2d.Simulation(scenario("1 min"))
+    assert simulation.home.walls is simulation.home.plan.mesh
 
 
 @pytest.mark.parametrize(

@@ -315,6 +315,15 @@ def test_outline_of_100_000_corners_is_read(tmp_path: Path, kind: str, corners: 
 
 
 @vector_format
+def test_coordinate_next_to_nothing_is_nothing(tmp_path: Path, kind: str) -> None:
+    """GEOS would divide by it."""
+    name, _, read = FORMATS[kind]
+    path = written(tmp_path, name, with_outline(kind, [[0, 0], [1e-300, 0], [4, 3], [-1e-200, 3]]))
+
+    assert 6 == pytest.approx(read(path).area_m2, abs=0.01)
+
+
+@vector_format
 def test_outline_of_9_000_m2_is_read(tmp_path: Path, kind: str) -> None:
     name, _, read = FORMATS[kind]
     path = written(tmp_path, name, with_outline(kind, [[0, 0], [100, 0], [100, 90], [0, 90]]))

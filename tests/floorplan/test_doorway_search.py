@@ -112,7 +112,7 @@ def test_moved_and_mirrored_plan_has_the_same_passages() -> None:
 def grids(draw: st.DrawFn) -> tuple[Polygon, list[shapely.Polygon], int]:
     """Draw rooms in a grid with doors in some of the walls between them; all hang together."""
     columns, rows = draw(st.integers(1, 4)), draw(st.integers(1, 3))
-    steps = st.integers(40, 80)  # of 5 cm
+    steps = st.integers(60, 90)  # of 5 cm
     x = np.cumsum([20, *draw(st.lists(steps, min_size=columns, max_size=columns))]) / 20
     y = np.cumsum([20, *draw(st.lists(steps, min_size=rows, max_size=rows))]) / 20
     boxes = {

@@ -37,7 +37,7 @@ from fleet2d.kernels.look import (
     look,
 )
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.perception import DETECT, ErrorTables
+from fleet2d.kernels.perception import DETECT, IN_VIEW, NOTICED, ErrorTables
 from fleet2d.sight.camera import Camera, Lens
 from fleet2d.sight.tables import Scene as LensScene
 from fleet2d.sight.tables import error_tables, stack_lenses
@@ -125,7 +125,7 @@ def looked(
     sightings = np.full((room, SIGHTING), -7, np.int64)
     events = SightEvents(*(np.full((count + 1) * steps, -7, dtype) for dtype in _EVENTS))
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
-    before = memory.counts.copy()
+    before = memory.about.copy()
     done, found, happened = look(
         home.mesh, lenses, errors, rule, robot, crowd, first, memory, sightings, events
     )
@@ -136,7 +136,7 @@ def looked(
         done,
         [tuple(row) for row in rows_[:, [STEP, CAMERA, USER, X, Y]].tolist()],
         list(zip(*(array[:happened].tolist() for array in events), strict=True)),
-        (memory.counts - before).tolist(),
+        (memory.about - before)[..., [IN_VIEW, NOTICED]].tolist(),
         memory.noticed.tolist(),
         memory.seen.tolist(),
     )

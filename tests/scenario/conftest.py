@@ -78,6 +78,7 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(component, "_REGISTRY", {})
     monkeypatch.setattr(component, "_ALIASES", {})
     monkeypatch.setattr(component, "_COMPLETE", set(component.PACKAGES))
+    register("sight", "line_of_sight")(LineOfSight)  # a default that every scenario has
     register("floorplan", "houseexpo", aliases=("he",))(File)
     register("floorplan", "empty")(Empty)
     register("behavior", "drift")(Drift)

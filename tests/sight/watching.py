@@ -75,10 +75,9 @@ class Watch:
         for u, name in enumerate(scene.users):
             for i in range(errors.keys.shape[2]):
                 errors.keys[0, u, i] = stream_key(self.seed, "robots.r", f"{i} {name}")
-        for s in range(errors.ghost_keys.shape[1]):
-            for i in range(errors.ghost_keys.shape[2]):
-                errors.ghost_keys[0, s, i] = stream_key(self.seed, "robots.r", f"{i} ghost {s}")
-        burst = count + MOST_GHOSTS * int(errors.sources[0])
+        for i in range(errors.ghost_keys.shape[1]):
+            errors.ghost_keys[0, i] = stream_key(self.seed, "robots.r", f"{i} ghost")
+        burst = count + MOST_GHOSTS * int(errors.haunted[0])
         rule = Rule(lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False)
         if self.memory is None:
             self.memory = new_memory(1, count, burst * (lens.latency // lens.period + 2))

@@ -23,7 +23,7 @@ from fleet2d.kernels.look import (
     look,
 )
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.perception import MOST_GHOSTS
+from fleet2d.kernels.perception import ABOUT, DRAWN_AT, IN_VIEW, MOST_GHOSTS, NOTICED, TRACKED
 from fleet2d.sight.tables import Scene, error_tables, is_perfect, stack_lenses
 from fleet2d.streams import stream_key
 
@@ -35,7 +35,7 @@ EVENT_NAMES = ("user_lost", "user_seen")
 DAY_US = 86_400_000_000
 # What draws are for, in the order of fleet2d.kernels.perception.
 ABOUT_USERS = ("detect", "attend", "identify", "whom", "range", "bearing", "heading", "posture")
-ABOUT_GHOSTS = ("how many", "where", "looks like", "faces")
+ABOUT_GHOSTS = ("how many", "which", "where", "looks like", "faces")
 
 I64 = NDArray[np.int64]
 
@@ -144,7 +144,7 @@ class Eye:
         )
         self._draw_streams()
         count = len(self.users)
-        bursts = count + MOST_GHOSTS * self.errors.sources
+        bursts = count + MOST_GHOSTS * self.errors.haunted
         midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
         since_midnight = clock.start - midnight
         self.rule = Rule(
@@ -167,16 +167,21 @@ class Eye:
                 for i, purpose in enumerate(ABOUT_USERS if self.errs else ABOUT_USERS[:1]):
                     key = stream_key(robot.seed, robot.path, f"{of}{purpose} {user.name}")
                     errors.keys[c, u, i] = key
-            for source in range(int(errors.sources[c])):
-                for i, purpose in enumerate(ABOUT_GHOSTS):
-                    name = f"{of}{purpose}, false positives {source}"
-                    errors.ghost_keys[c, source, i] = stream_key(robot.seed, robot.path, name)
+            for i, purpose in enumerate(ABOUT_GHOSTS):
+                name = f"{of}{purpose}, false positives"
+                errors.ghost_keys[c, i] = stream_key(robot.seed, robot.path, name)
 
     @property
     def stops(self) -> tuple[bool, bool]:
         """Whether (user_lost, user_seen) end the span."""
         wanted = self.robot.plan.interrupts
         return EVENT_NAMES[USER_LOST] in wanted, EVENT_NAMES[USER_SEEN] in wanted
+
+    @property
+    def counts(self) -> I64:
+        """How often each camera had each user in view and noticed: (cameras, users, 2)."""
+        counts: I64 = self.memory.about[..., [IN_VIEW, NOTICED]]
+        return counts
 
     def name_of(self, identity: int) -> str:
         """Return the name of an identity; that of somebody unknown is empty."""
@@ -209,14 +214,12 @@ class Eye:
 def new_memory(cameras: int, users: int, backlog: int) -> Memory:
     """Return the memory of a robot that has seen nobody."""
     never = -1
+    about = np.zeros((cameras, users, ABOUT), np.int64)
+    about[..., [DRAWN_AT, TRACKED]] = never
     return Memory(
         noticed=np.full(users + 1, never, np.int64),
         seen=np.zeros(users + 1, np.int64),
-        drawn=np.zeros((cameras, users), np.int64),
-        drawn_at=np.full((cameras, users), never, np.int64),
-        taken_for=np.zeros((cameras, users), np.int64),
-        tracked=np.full((cameras, users), never, np.int64),
-        counts=np.zeros((cameras, users, 2), np.int64),
+        about=about,
         backlog=np.zeros((cameras, backlog, SIGHTING), np.int64),
         waiting=np.zeros((cameras, 2), np.int64),
     )

@@ -10,12 +10,15 @@ from fleet2d.engine.buckets import PoseBlock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
 from fleet2d.kernels.seen import bench_for
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
 from fleet2d.sight.tables import Scene, stack_lenses
 
 # Poses kept: half as many as slots. Rounds through a large home take a few thousand.
 SLOTS = 1 << 14
+# Steps that wait to be looked from together.
+BUFFER = 1 << 16
 
 I64 = NDArray[np.int64]
 
@@ -57,6 +60,7 @@ class SeenArea:
             counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
         )
         self._glances = no_glances(SLOTS, len(plan.rooms))
+        self._buffer, self._waiting = empty_poses(BUFFER), 0
         self._face(robot.home.walls)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
@@ -83,26 +87,45 @@ class SeenArea:
         if walls is not self._watched.walls:
             self._settle()
             self._face(walls)
-        poses = block.row(self.row, count)
-        watch(self._watched, poses, first, self._glances, self._bench, self._record)
-        self.steps = first + count
+        taken = 0
+        while taken < count:
+            if self._waiting == BUFFER:
+                self._catch_up()
+            part = min(count - taken, BUFFER - self._waiting)
+            row = block.row(self.row, count)
+            paste_poses(self._buffer, self._waiting, row, slice(taken, taken + part))
+            self._waiting += part
+            self.steps = first + taken + part
+            taken += part
+
+    def _catch_up(self) -> None:
+        """Look from the poses that wait: a call of the kernel costs as much as many of them."""
+        if self._waiting:
+            poses = Poses(*(column[: self._waiting] for column in self._buffer))
+            begin = self.steps - self._waiting
+            watch(self._watched, poses, begin, self._glances, self._bench, self._record)
+            self._waiting = 0
 
     def _settle(self) -> None:
+        self._catch_up()
         if len(self._record.last):
             settle(self._watched, self._glances, self._bench, self._record.last)
 
     @property
     def exposure(self) -> I64:
         """Cells of each room in view, summed over the steps so far: int64 (rooms,), a copy."""
+        self._catch_up()
         return self._record.exposure.copy()
 
     def explored(self) -> NDArray[np.bool_]:
         """Return which cells were ever in view: bool (rows, columns)."""
+        self._catch_up()
         explored: NDArray[np.bool_] = self._record.first != NEVER
         return explored
 
     def first_seen(self) -> I64:
         """Return the first step at which each cell was in view: int64 (rows, columns), -1 never."""
+        self._catch_up()
         return self._record.first.copy()
 
     def last_seen(self) -> I64:

@@ -410,7 +410,7 @@ class Simulation:
 
     def _count_looks(self, log: Log) -> None:
         """Keep for metrics what the cameras have counted up to the present step."""
-        log.count_looks(self.step, [eye.memory.counts.copy() for eye in self._eyes])
+        log.count_looks(self.step, [eye.counts for eye in self._eyes])
         self._layers.expose(self.step, log)
 
     def _interrupt(self, step: int) -> None:

@@ -82,7 +82,7 @@ def cut_chambers(
     lengths = [(x1 - x0) ** 2 + (y1 - y0) ** 2 for (x0, y0), (x1, y1) in segments]
     joined = _joined(areas, sides, lengths, min_area_m2)
     triangle = rasterize_cells(shut, lattice.rows, lattice.columns)
-    chamber = np.where(triangle >= 0, joined[part][triangle], -1).astype(np.int32)
+    chamber = np.append(joined[part], -1).astype(np.int32)[triangle]  # the last serves -1
     if (free & (chamber < 0)).any():  # a centre that lies on a passage has no triangle
         chamber = spread_labels(chamber, free)
     return _numbered(chamber, free, joined, sides)

@@ -31,8 +31,9 @@ HALLWAY_ROOMS = 3
 HALLWAY_MAX_M2 = 25.0
 """Space that no label covers is a hallway where one gets from it to so many rooms; if it is larger
 than this, more is done in it than walking through."""
-ISLAND_M = 3.0
-"""What stands free and is shorter than this is no wall, but a column or furniture."""
+ISLAND_M, WALL_M, THICK_M = 3.0, 1.2, 0.25
+"""What stands free is a column or furniture, and no wall, if it is shorter than the first; or than
+the second if it is as thin as a wall, which is at most the third."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,11 @@ def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
     """Return the polygon without its small holes: furniture and columns end no room."""
     if not polygon.interiors:
         return polygon
-    bounds = shapely.bounds(np.array(polygon.interiors, dtype=object))
-    large = (bounds[:, 2:] - bounds[:, :2]).max(axis=1) >= ISLAND_M * units_per_m
+    islands = np.array([Polygon(hole) for hole in polygon.interiors])
+    bounds = shapely.bounds(islands) / units_per_m
+    length = (bounds[:, 2:] - bounds[:, :2]).max(axis=1)
+    thickness = 2 * shapely.area(islands) / shapely.length(islands) / units_per_m
+    large = length >= np.where(thickness <= THICK_M, WALL_M, ISLAND_M)
     holes = [hole for hole, kept in zip(polygon.interiors, large, strict=True) if kept]
     return Polygon(polygon.exterior, holes)
 

@@ -17,7 +17,7 @@ from shapely import LineString, MultiLineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.source import MAX_COORDINATE_M, shown_value
+from fleet2d.floorplan.source import MAX_COORDINATE_M, settled, shown_value
 from fleet2d.floorplan.vocabulary import room_type
 from fleet2d.problems import did_you_mean
 
@@ -272,7 +272,7 @@ def _place(value: object, where: str) -> tuple[float, float]:
         if not sensible or not abs(number) <= FARTHEST:
             found = shown_value(number)
             raise FloorPlanError(f"{where} is {shown_value(value)}: {found} is no coordinate")
-    return float(value[0]), float(value[1])
+    return settled(value[0]), settled(value[1])
 
 
 def _listed(value: object, where: str) -> list[tuple[object, str]]:

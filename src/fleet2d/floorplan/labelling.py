@@ -225,9 +225,13 @@ def _seen_in(box: Patch, window: tuple[slice, slice], inside: Mask) -> Mask:
 
 def _filled(labels: I32, inside: Mask, cell: float, following: int) -> tuple[I32, int]:
     """Give every cell of a block a room; returns also the number for the next one without a box."""
-    claimants = len(np.unique(labels[labels >= 0]))
-    following = _rests(labels, inside, claimants, cell, following)
-    labels = spread_labels(labels, inside)
+    claimants = np.flatnonzero(np.bincount(labels[labels >= 0]))
+    before = following
+    following = _rests(labels, inside, len(claimants), cell, following)
+    if len(claimants) == 1 and following == before:
+        return np.where(inside, claimants[0], -1).astype(np.int32), following
+    if (labels[inside] < 0).any():
+        labels = spread_labels(labels, inside)
     while (labels[inside] < 0).any():  # parts that no way across sides joins to a label
         part = label_parts(inside & (labels < 0), False)
         labels[part == 0] = following
@@ -262,6 +266,10 @@ def _rests(labels: I32, inside: Mask, claimants: int, cell: float, following: in
     if claimants == 0:
         labels[rest] = following
         return following + 1
+    share = REST_SHARE_OF_ONE if claimants == 1 else REST_SHARE
+    enough = max(MIN_REST_M2 / cell**2, share * np.count_nonzero(inside))
+    if np.count_nonzero(rest) < enough:
+        return following
     radius = MIN_REST_WIDTH_M / 2 / cell
     core = squared_distance(np.pad(rest, 1))[1:-1, 1:-1] >= radius**2
     if not core.any():
@@ -269,8 +277,6 @@ def _rests(labels: I32, inside: Mask, claimants: int, cell: float, following: in
     opened = rest & (squared_distance(~core) < radius**2)
     part = label_parts(opened, False)
     sizes = np.bincount(part[opened])
-    share = REST_SHARE_OF_ONE if claimants == 1 else REST_SHARE
-    enough = max(MIN_REST_M2 / cell**2, share * np.count_nonzero(inside))
     for number in np.flatnonzero(sizes >= enough):
         labels[part == number] = following
         following += 1

@@ -22,6 +22,7 @@ from fleet2d.units import Length
 
 # No home is as large; what is beyond was not written in metres.
 MAX_COORDINATE_M = 100_000.0
+TINY = 1e-12
 
 YAML = (".yaml", ".yml")
 # Lists in lists: a floor plan has 8; what is deeper is damaged, or made to break the reader.
@@ -258,7 +259,12 @@ def read_numbers(value: object, count: int, where: str) -> tuple[float, ...]:
             raise FloorPlanError(
                 f"{where} is {shown_value(value)}: too far out for coordinates in metres"
             )
-    return tuple(float(number) for number in value)
+    return tuple(settled(number) for number in value)
+
+
+def settled(number: float) -> float:
+    """Return a coordinate as a float; what is next to nothing is 0, for GEOS divides by it."""
+    return 0.0 if abs(number) < TINY else float(number)
 
 
 def read_ring(value: object, where: str) -> list[Point]:

@@ -29,7 +29,7 @@ class Lenses(NamedTuple):
     pan_us: I64  # how long it looks in each
     period: I64  # steps from look to look
     latency: I64  # steps until a sighting is known
-    errs: I64  # 1 where `ErrorTables` counts
+    errs: I64  # 1 where what is perceived can be wrong
     points: I64  # points of a user's body besides its centre that are looked at
     bodies: I64  # (cameras, users, points + 1, 2): where they are, from the centre; it is first
     reach: I64  # (cameras, users): how far they are from it

@@ -11,15 +11,22 @@ from fleet2d.kernels.lens import Lenses, camera_pose, in_wedge, near_wedge, poin
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.perception import (
+    AT_SEEMS,
     DETECT,
     FACES,
+    HEADING_NOISE,
     HOW_MANY,
+    IN_VIEW,
     LOOKS_LIKE,
     MINUTES,
     NOBODY,
+    NOTICED,
+    POSTURES,
     SEEMS,
+    SHIFT,
     TURNED,
     WHERE,
+    WHICH,
     ErrorTables,
     attention,
     bell,
@@ -65,11 +72,8 @@ class Memory(NamedTuple):
 
     noticed: I64  # (identities,): last step at which one was noticed; -1: never
     seen: I64  # (identities,): 1 while one counts as seen
-    drawn: I64  # (cameras, users): the draw of the last look, for `attention`
-    drawn_at: I64  # (cameras, users): its step; -1: there was none
-    taken_for: I64  # (cameras, users): identity when last noticed
-    tracked: I64  # (cameras, users): step of that look; -1: there was none
-    counts: I64  # (cameras, users, 2): looks at which a user was in view, and was noticed
+    about: I64  # (cameras, users, ABOUT): last draw and its step, last identity and its step (a
+    # step of -1: never), looks at which a user was in view, and at which one was noticed
     backlog: I64  # (cameras, rows, SIGHTING): a ring of what isn't known yet
     waiting: I64  # (cameras, 2): its first row, and its length
 
@@ -95,42 +99,40 @@ class Rule(NamedTuple):
 
 @kernel
 def perceive(
-    lenses: Lenses,
     errors: ErrorTables,
-    memory: Memory,
+    about: I64,
     rule: Rule,
     camera: int,
     user: int,
     heading: int,
+    chance: int,
     dx: int,
     dy: int,
     shown: int,
     now: int,
     row: I64,
 ) -> bool:
-    """Decide whether a user in view at (dx, dy) is noticed, and as what: USER, IDENTITY … of `row`.
+    """Decide whether a user in view at (dx, dy) is noticed, and as what: IDENTITY … of `row`.
 
     `row` holds the truth; X and Y come out from the camera.
     """
+    table, keys = errors.table, errors.keys
     distance = int(np.sqrt(np.float64(dx * dx + dy * dy)))
-    at = distance >> errors.shift[camera]
+    at = distance >> table[camera, SHIFT]
     bearing = turn_between(heading, heading_of(dx, dy)) if distance > 0 else 0
     facing = abs(turn_between(heading_of(-dx, -dy), row[TRUE_HEADING])) if distance > 0 else 0
     posture = row[TRUE_POSTURE]
     minute = (rule.start_us + now * rule.step_us) // MINUTE_US % MINUTES
-    chance = notice_chance(
-        errors, camera, lenses.chance[camera], at, bearing, facing, posture, shown, minute
-    )
-    if attention(errors, camera, user, now, memory.drawn, memory.drawn_at) >= chance:
+    likely = notice_chance(table, camera, chance, at, bearing, facing, posture, shown, minute)
+    if attention(table, keys, about, camera, user, now) >= likely:
         return False
-    keys = errors.keys[camera, user]
-    row[IDENTITY] = identify(
-        errors, camera, user, now, at, rule.patience, memory.taken_for, memory.tracked
-    )
-    row[X], row[Y] = blurred(errors, camera, user, now, dx, dy, distance)
-    turned = bell(keys[TURNED], now, errors.heading_noise[camera])
+    row[IDENTITY] = identify(table, errors.whom, keys, about, camera, user, now, at, rule.patience)
+    row[X], row[Y] = blurred(table, keys, camera, user, now, dx, dy, distance)
+    turned = bell(keys[camera, user, TURNED], now, table[camera, HEADING_NOISE])
     row[HEADING] = (row[TRUE_HEADING] + turned) & (TURN - 1)
-    row[POSTURE] = pick(errors.seems[camera, posture], random_share(keys[SEEMS], now))
+    seems = AT_SEEMS + POSTURES * posture
+    draw = random_share(keys[camera, user, SEEMS], now)
+    row[POSTURE] = pick(table[camera, seems : seems + POSTURES], draw)
     return True
 
 
@@ -141,23 +143,23 @@ def imagine(
     errors: ErrorTables,
     memory: Memory,
     camera: int,
-    source: int,
     count: int,
     now: int,
     x: int,
     y: int,
     heading: int,
-    triangle: int,
 ) -> None:
-    """Put the false positives that a source gives in one look into the backlog."""
+    """Put so many false positives into the backlog, each at its source if that is in view."""
     near, far = lenses.near_squared[camera], lenses.far_squared[camera]
-    half_angle, keys = lenses.half_angle[camera], errors.ghost_keys[camera, source]
-    spot = errors.spot[camera, source]
-    if source > 0:
-        dx, dy = spot[0] - x, spot[1] - y
-        if not (near <= dx * dx + dy * dy <= far and in_wedge(heading, half_angle, dx, dy)):
-            return
+    half_angle, keys = lenses.half_angle[camera], errors.ghost_keys[camera]
+    triangle = locate(walls, x, y)
     for k in range(count):
+        source = pick(errors.source[camera], random_share(random_bits(keys[WHICH], now), k))
+        spot = errors.spot[camera, source]
+        dx, dy = spot[0] - x, spot[1] - y
+        in_range = near <= dx * dx + dy * dy <= far
+        if source > 0 and not (in_range and in_wedge(heading, half_angle, dx, dy)):
+            continue
         found, px, py = ghost_place(
             walls, spot, source == 0, random_bits(random_bits(keys[WHERE], now), k),
             x, y, triangle, heading, half_angle, near, far,
@@ -225,7 +227,9 @@ def look(
     user_x, user_y, user_away = crowd.x, crowd.y, crowd.away
     near, far, half_angle = lenses.near_squared, lenses.widest, lenses.half_angle
     period, points, reach, moves = lenses.period, lenses.points, lenses.reach, lenses.moves
-    sources, ghosts, ghost_keys = errors.sources, errors.ghosts, errors.ghost_keys
+    haunted, ghosts, ghost_keys = errors.haunted, errors.ghosts, errors.ghost_keys
+    chance, latency, errs = lenses.chance, lenses.latency, lenses.errs
+    user_heading, posture, about, keys = crowd.heading, crowd.posture, memory.about, errors.keys
     last, seen, waiting = memory.noticed, memory.seen, memory.waiting
     vertices, triangles, neighbors = walls.vertices, walls.triangles, walls.neighbors
     cameras, users = far.shape
@@ -262,26 +266,33 @@ def look(
                         triangle = locate(walls, x, y)
                     shown = points_in_view(walls, lenses, c, u, x, y, heading, triangle, dx, dy)
                 if shown > 0:
-                    see(lenses, errors, memory, rule, crowd, c, u, j, x, y, heading, shown, now)
-            for source in range(sources[c]):
-                draw = random_share(ghost_keys[c, source, HOW_MANY], now)
-                if draw >= ghosts[c, source, 0]:  # seldom: there are any
-                    triangle = locate(walls, x, y)
-                    count = pick(ghosts[c, source], draw)
-                    imagine(
-                        walls,
-                        lenses,
-                        errors,
-                        memory,
-                        c,
-                        source,
-                        count,
-                        now,
-                        x,
-                        y,
-                        heading,
-                        triangle,
-                    )
+                    about[c, u, IN_VIEW] += 1
+                    if errs[c] == 0:
+                        bits = random_bits(keys[c, u, DETECT], now) >> np.uint64(11)
+                        if np.int64(bits) >= chance[c]:
+                            continue
+                    row = append(memory, c)
+                    row[STEP], row[CAMERA], row[USER] = now + latency[c], c, u
+                    row[TRUE_X], row[TRUE_Y] = user_x[u, j], user_y[u, j]
+                    row[TRUE_HEADING] = user_heading[u, j]
+                    row[TRUE_POSTURE] = posture[u, j]
+                    if errs[c] == 0:
+                        row[IDENTITY] = u
+                        row[X:TRUE_X] = row[TRUE_X:]
+                    elif perceive(
+                        errors, about, rule, c, u, heading, chance[c], dx, dy, shown, now, row
+                    ):
+                        row[X] += x
+                        row[Y] += y
+                    else:
+                        waiting[c, 1] -= 1  # the row isn't used
+                        continue
+                    about[c, u, NOTICED] += 1
+            if haunted[c] != 0:
+                ghost = random_share(ghost_keys[c, HOW_MANY], now)
+                if ghost >= ghosts[c, 0]:  # seldom: there are any
+                    count = pick(ghosts[c], ghost)
+                    imagine(walls, lenses, errors, memory, c, count, now, x, y, heading)
         before = found
         for c in range(cameras):
             if waiting[c, 1] > 0:
@@ -301,45 +312,3 @@ def look(
         if stop:
             return j + 1, found, happened
     return robot_x.shape[0], found, happened
-
-
-@kernel
-def see(
-    lenses: Lenses,
-    errors: ErrorTables,
-    memory: Memory,
-    rule: Rule,
-    crowd: Crowd,
-    camera: int,
-    user: int,
-    column: int,
-    x: int,
-    y: int,
-    heading: int,
-    shown: int,
-    now: int,
-) -> None:
-    """Look at a user in view, and put a sighting into the backlog if the user is noticed."""
-    memory.counts[camera, user, 0] += 1
-    if lenses.errs[camera] == 0:
-        draw = random_bits(errors.keys[camera, user, DETECT], now) >> np.uint64(11)
-        if np.int64(draw) >= lenses.chance[camera]:
-            return
-    row = append(memory, camera)
-    row[STEP], row[CAMERA] = now + lenses.latency[camera], camera
-    row[USER] = row[IDENTITY] = user
-    row[TRUE_X], row[TRUE_Y] = crowd.x[user, column], crowd.y[user, column]
-    row[TRUE_HEADING] = crowd.heading[user, column]
-    row[TRUE_POSTURE] = crowd.posture[user, column]
-    if lenses.errs[camera] == 0:
-        row[X:TRUE_X] = row[TRUE_X:]
-    else:
-        dx, dy = row[TRUE_X] - x, row[TRUE_Y] - y
-        if not perceive(
-            lenses, errors, memory, rule, camera, user, heading, dx, dy, shown, now, row
-        ):
-            memory.waiting[camera, 1] -= 1  # the row isn't used
-            return
-        row[X] += x
-        row[Y] += y
-    memory.counts[camera, user, 1] += 1

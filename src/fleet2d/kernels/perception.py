@@ -23,15 +23,42 @@ ONE = 1 << BITS  # probability 1
 POSTURES = 3  # stand, sit, lie
 MINUTES = 1440
 DOUBLINGS = 62
-MOST_GHOSTS = 20  # of one source in one look; more are too unlikely to have a probability
+MOST_GHOSTS = 20  # in one look; more are too unlikely to have a probability
 TRIES = 64  # points of a wedge that are tried before nothing is taken to be in view
 NOBODY = -1  # the user behind a false positive; the identity of somebody not recognized
 
-# Streams of the draws about one user, and of those about one source of false positives.
+# Streams of the draws about one user, and of those about false positives.
 DETECT, ATTEND, IDENTIFY, WHOM, RANGE, BEARING, TURNED, SEEMS = range(8)
 PURPOSES = 8
-HOW_MANY, WHERE, LOOKS_LIKE, FACES = range(4)
-GHOST_PURPOSES = 4
+HOW_MANY, WHICH, WHERE, LOOKS_LIKE, FACES = range(5)
+GHOST_PURPOSES = 5
+
+
+# The parts of a camera's table. All in one row of one array: compiled code hands a tuple of many
+# arrays from function to function at a price.
+BINS = 512  # of a table by distance
+MOST_SHOWN = 34  # numbers of a body's points that may be in view, 0 included
+AT_DISTANCE = 0  # factors of the probability to notice a user, by entry of the distance
+AT_BEARING = AT_DISTANCE + BINS  # by 1/4096 turn left of the optical axis, + HALF_TURN
+AT_FACING = AT_BEARING + TURN  # by how far the user is turned away from the camera
+AT_POSTURE = AT_FACING + HALF_TURN + 1
+AT_SHOWN = AT_POSTURE + POSTURES  # by the number of the body's points in view
+AT_LIGHT = AT_SHOWN + MOST_SHOWN  # by the minute of the day
+AT_STAY = AT_LIGHT + MINUTES  # that attention outlasts 2**i steps
+AT_RIGHT = AT_STAY + DOUBLINGS  # that a user is recognized, by entry of the distance
+AT_MISTAKEN = AT_RIGHT + BINS  # that a user is taken for another one
+AT_SEEMS = AT_MISTAKEN + BINS  # perceived posture by true one, cumulative
+SHIFT = AT_SEEMS + POSTURES * POSTURES  # a distance of d lattice units is entry d >> shift
+KEEPS = SHIFT + 1  # 1 if an identity lasts as long as the user is tracked
+RANGE_NOISE = SHIFT + 2  # 2**-16 lattice units per unit of random_bell
+RANGE_SHARE = SHIFT + 3  # the same per lattice unit of distance, times 2**16
+BEARING_NOISE = SHIFT + 4  # 2**-16 / 8192 of a turn per unit of random_bell
+HEADING_NOISE = SHIFT + 5  # 2**-16 headings per unit of random_bell
+TABLE = SHIFT + 6
+
+# What is carried along about each user, by camera.
+DRAWN, DRAWN_AT, TAKEN_FOR, TRACKED, IN_VIEW, NOTICED = range(6)
+ABOUT = 6
 
 
 class ErrorTables(NamedTuple):
@@ -40,29 +67,15 @@ class ErrorTables(NamedTuple):
     "Cumulative" tables hold in entry i the probability of all outcomes up to i.
     """
 
-    shift: I64  # (cameras,): a distance of d lattice units is entry d >> shift of a table
-    distance: I64  # (cameras, bins): factors of the probability to notice a user
-    bearing: I64  # (cameras, TURN): by 1/4096 turn left of the optical axis, + HALF_TURN
-    facing: I64  # (cameras, HALF_TURN + 1): by how far the user is turned away from the camera
-    posture: I64  # (cameras, POSTURES)
-    shown: I64  # (cameras, points + 2): by the number of the body's points in view
-    light: I64  # (cameras, MINUTES): by the minute of the day
-    stay: I64  # (cameras, DOUBLINGS): that attention outlasts 2**i steps
-    right: I64  # (cameras, bins): that a user is recognized
-    mistaken: I64  # (cameras, bins): that a user is taken for another one
-    whom: I64  # (cameras, users, users): for whom, cumulative
-    keeps: I64  # (cameras,): 1 if an identity lasts as long as the user is tracked
-    range_noise: I64  # (cameras,): 2**-16 lattice units per unit of random_bell
-    range_share: I64  # (cameras,): the same per lattice unit of distance, times 2**16
-    bearing_noise: I64  # (cameras,): 2**-16 / 8192 of a turn per unit of random_bell
-    heading_noise: I64  # (cameras,): 2**-16 headings per unit of random_bell
-    seems: I64  # (cameras, POSTURES, POSTURES): perceived posture by true one, cumulative
-    sources: I64  # (cameras,): number of sources of false positives; 0: there are none
-    ghosts: I64  # (cameras, sources, MOST_GHOSTS): how many in one look, cumulative
-    spot: I64  # (cameras, sources, 3): x, y, noise as range_noise; of source 0 all is in view
+    table: I64  # (cameras, TABLE)
+    whom: I64  # (cameras, users, users): for whom one is mistaken, cumulative
+    haunted: I64  # (cameras,): 1 if there are false positives
+    ghosts: I64  # (cameras, MOST_GHOSTS): how many in one look, of all sources, cumulative
+    source: I64  # (cameras, sources): which source one is of, cumulative
+    spot: I64  # (cameras, sources, 3): x, y, noise as RANGE_NOISE; of source 0 all is in view
     looks_like: I64  # (cameras, users + 1): identity of a false positive, nobody last, cumulative
     keys: U64  # (cameras, users, PURPOSES): streams
-    ghost_keys: U64  # (cameras, sources, GHOST_PURPOSES)
+    ghost_keys: U64  # (cameras, GHOST_PURPOSES)
 
 
 @kernel
@@ -85,12 +98,12 @@ def pick(cumulative: I64, draw: int) -> int:
 
 
 @kernel
-def lasting(stay: I64, steps: int) -> int:
+def lasting(table: I64, camera: int, steps: int) -> int:
     """Return the probability that attention outlasts so many steps, from that for 2**i steps."""
-    share, i = ONE, 0
+    share, i = ONE, AT_STAY
     while steps > 0:
         if steps & 1:
-            share = (share * stay[i]) >> BITS
+            share = (share * table[camera, i]) >> BITS
         steps >>= 1
         i += 1
     return share
@@ -98,7 +111,7 @@ def lasting(stay: I64, steps: int) -> int:
 
 @kernel
 def notice_chance(
-    errors: ErrorTables,
+    table: I64,
     camera: int,
     chance: int,
     distance: int,
@@ -114,61 +127,62 @@ def notice_chance(
     the signed turn from the optical axis to the user, `facing` the turn between where the user
     faces and the camera.
     """
-    share = errors.distance[camera, distance]
-    share = (share * errors.bearing[camera, bearing + HALF_TURN]) >> BITS
-    share = (share * errors.facing[camera, facing]) >> BITS
-    share = (share * errors.posture[camera, posture]) >> BITS
-    share = (share * errors.shown[camera, shown]) >> BITS
-    share = (share * errors.light[camera, minute]) >> BITS
+    share = table[camera, AT_DISTANCE + distance]
+    share = (share * table[camera, AT_BEARING + HALF_TURN + bearing]) >> BITS
+    share = (share * table[camera, AT_FACING + facing]) >> BITS
+    share = (share * table[camera, AT_POSTURE + posture]) >> BITS
+    share = (share * table[camera, AT_SHOWN + shown]) >> BITS
+    share = (share * table[camera, AT_LIGHT + minute]) >> BITS
     return int(((chance >> (53 - BITS)) * share) >> (2 * BITS - 53))
 
 
 @kernel
-def attention(
-    errors: ErrorTables, camera: int, user: int, now: int, drawn: I64, drawn_at: I64
-) -> int:
+def attention(table: I64, keys: U64, about: I64, camera: int, user: int, now: int) -> int:
     """Return the draw [2**-53] that decides whether a user in view is noticed.
 
     It is the last look's with the probability that attention has lasted since then, else a new one.
     So misses come in runs, and at a steady chance they are a two-state Markov chain; how often
     they happen is just as configured, since each draw for itself is uniform.
     """
-    before = drawn_at[camera, user]
-    drawn_at[camera, user] = now
-    stay = errors.stay[camera]
-    keys = errors.keys[camera, user]
-    if before < 0 or stay[0] == 0 or random_share(keys[ATTEND], now) >= lasting(stay, now - before):
-        drawn[camera, user] = np.int64(random_bits(keys[DETECT], now) >> np.uint64(11))
-    return int(drawn[camera, user])
+    before = about[camera, user, DRAWN_AT]
+    about[camera, user, DRAWN_AT] = now
+    fresh = before < 0 or table[camera, AT_STAY] == 0
+    if not fresh:
+        draw = random_share(keys[camera, user, ATTEND], now)
+        fresh = draw >= lasting(table, camera, now - before)
+    if fresh:
+        bits = random_bits(keys[camera, user, DETECT], now) >> np.uint64(11)
+        about[camera, user, DRAWN] = np.int64(bits)
+    return int(about[camera, user, DRAWN])
 
 
 @kernel
 def identify(
-    errors: ErrorTables,
+    table: I64,
+    whom: I64,
+    keys: U64,
+    about: I64,
     camera: int,
     user: int,
     now: int,
     distance: int,
     patience: int,
-    taken_for: I64,
-    tracked: I64,
 ) -> int:
     """Return for whom a noticed user is taken; NOBODY for somebody not recognized."""
-    before = tracked[camera, user]
-    tracked[camera, user] = now
-    if errors.keeps[camera] == 1 and before >= 0 and now - before < patience:
-        return int(taken_for[camera, user])
-    keys = errors.keys[camera, user]
-    draw = random_share(keys[IDENTIFY], now)
+    before = about[camera, user, TRACKED]
+    about[camera, user, TRACKED] = now
+    if table[camera, KEEPS] == 1 and before >= 0 and now - before < patience:
+        return int(about[camera, user, TAKEN_FOR])
+    draw = random_share(keys[camera, user, IDENTIFY], now)
     found = NOBODY
-    right = errors.right[camera, distance]
+    right = table[camera, AT_RIGHT + distance]
     if draw < right:
         found = user
-    elif draw < right + errors.mistaken[camera, distance]:
-        found = pick(errors.whom[camera, user], random_share(keys[WHOM], now))
-        if found == errors.whom.shape[2]:
+    elif draw < right + table[camera, AT_MISTAKEN + distance]:
+        found = pick(whom[camera, user], random_share(keys[camera, user, WHOM], now))
+        if found == whom.shape[2]:
             found = NOBODY
-    taken_for[camera, user] = found
+    about[camera, user, TAKEN_FOR] = found
     return found
 
 
@@ -193,16 +207,16 @@ def turn_and_stretch(dx: int, dy: int, turn: int, distance: int, wanted: int) ->
 
 @kernel
 def blurred(
-    errors: ErrorTables, camera: int, user: int, now: int, dx: int, dy: int, distance: int
+    table: I64, keys: U64, camera: int, user: int, now: int, dx: int, dy: int, distance: int
 ) -> tuple[int, int]:
     """Return where a user at (dx, dy) from the camera, `distance` away, is perceived from there."""
-    noise = errors.range_noise[camera] + ((errors.range_share[camera] * distance) >> 16)
-    turning = errors.bearing_noise[camera]
+    noise = table[camera, RANGE_NOISE] + ((table[camera, RANGE_SHARE] * distance) >> 16)
+    turning = table[camera, BEARING_NOISE]
     if distance == 0 or (noise == 0 and turning == 0):
         return dx, dy
-    keys = errors.keys[camera, user]
-    wanted = max(0, distance + bell(keys[RANGE], now, noise))
-    return turn_and_stretch(dx, dy, bell(keys[BEARING], now, turning), distance, wanted)
+    wanted = max(0, distance + bell(keys[camera, user, RANGE], now, noise))
+    turn = bell(keys[camera, user, BEARING], now, turning)
+    return turn_and_stretch(dx, dy, turn, distance, wanted)
 
 
 @kernel

@@ -158,10 +158,12 @@ def _glance(
 
 
 @kernel
-def _expose(exposure: Int64, cells: Int32, slot: int, steps: int) -> None:
-    """Add what a pose shows, so many times."""
-    for room in range(exposure.shape[0] if slot >= 0 else 0):
-        exposure[room] += steps * np.int64(cells[slot, room])
+def _let_go(glances: Glances, exposure: Int64, slot: int, step: int, steps: int) -> None:
+    """Add what a pose shows, that was held for so many steps and at `step` last."""
+    if slot >= 0:
+        glances.last[slot] = step
+        for room in range(exposure.shape[0]):
+            exposure[room] += steps * np.int64(glances.cells[slot, room])
 
 
 @kernel
@@ -198,15 +200,16 @@ def watch(
     pose, last, cells, taken = glances.pose, glances.last, glances.cells, glances.taken
     exposure, lenses, every = record.exposure, watched.lenses, watched.every
     pans = lenses.pan_count.max() > 0
-    panned = 0
+    panned, looked = 0, NEVER
     slot, looks = -1, 0  # the pose that is held, and for how many looks
+    held_x, held_y, held_heading, held_panned = 0, 0, 0, 0
     for j in range(-begin % every, xs.shape[0], every):
         x, y, heading, step = xs[j], ys[j], headings[j], begin + j
         if pans:
             panned = _panned(lenses, step * watched.step_us)
-        held = slot >= 0 and not aways[j] and (pose[slot, 0] == x and pose[slot, 1] == y)
-        if not (held and pose[slot, 2] == heading and pose[slot, 3] == panned):
-            _expose(exposure, cells, slot, looks * every)
+        same = x == held_x and y == held_y and heading == held_heading and panned == held_panned
+        if not same or slot < 0 or aways[j]:
+            _let_go(glances, exposure, slot, looked, looks * every)
             slot, looks = -1, 0
             if aways[j]:
                 continue
@@ -216,13 +219,15 @@ def watch(
                 last[:] = NEVER
                 glances.told[:] = NEVER
                 taken[0] = 0
+            held_x, held_y, held_heading, held_panned = x, y, heading, panned
             slot = _slot_of(pose, last, x, y, heading, panned)
             if last[slot] == NEVER:
                 pose[slot, 0], pose[slot, 1] = x, y
                 pose[slot, 2], pose[slot, 3] = heading, panned
                 _glance(watched, pose[slot], step, bench, record, cells[slot])
+                last[slot] = step
                 glances.told[slot] = step
                 taken[0] += 1
-        last[slot] = step
+        looked = step
         looks += 1
-    _expose(exposure, cells, slot, looks * every)
+    _let_go(glances, exposure, slot, looked, looks * every)

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import Settings
 from fleet2d.problems import did_you_mean, problem
 from fleet2d.routines import laws
-from fleet2d.routines.written import NUMBER, PAIR, TEXT, OrWritten
+from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
 from fleet2d.units import Duration, PositiveDuration, format_duration
 
@@ -92,7 +92,7 @@ class Takes(Settings):
         return make(mean, std).within(low, high)
 
 
-AnyTakes = Annotated[Takes, OrWritten(TEXT, NUMBER, PAIR)]
+AnyTakes = Annotated[Takes, OrWritten("text", "number", "pair")]
 """A law of durations, in any form."""
 
 

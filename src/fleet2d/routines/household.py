@@ -24,7 +24,7 @@ from fleet2d.routines.periods import AnyPeriod
 from fleet2d.routines.persona import AnyPersona, Dates, OnDays, Timing, holds_on, weekdays_of
 from fleet2d.routines.planner import MILLION, NEVER, DayPlan, Doing, Job
 from fleet2d.routines.templates import starts
-from fleet2d.routines.written import TEXT, OrWritten
+from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import Share
@@ -66,7 +66,7 @@ class Household(Settings):
     couples: tuple[tuple[str, str], ...] = Field(
         default=(), description="members who sleep in the same room and bed"
     )
-    together: dict[str, Annotated[Together, OrWritten(TEXT)]] = Field(
+    together: dict[str, Annotated[Together, OrWritten("text")]] = Field(
         default_factory=dict, description="what several of them do together, by name"
     )
     away: tuple[AnyPeriod, ...] = Field(default=(), description="when nobody is at home")
@@ -116,7 +116,7 @@ def read_household(value: object) -> Any:
         raise problem(str(error)) from None
 
 
-AnyHousehold = Annotated[Household, BeforeValidator(read_household), OrWritten(TEXT)]
+AnyHousehold = Annotated[Household, BeforeValidator(read_household), OrWritten("text")]
 """A household in a scenario: a mapping or a YAML file; dumped whole."""
 
 

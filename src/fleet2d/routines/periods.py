@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from fleet2d.component import Settings
 from fleet2d.problems import problem
 from fleet2d.routines.planner import Doing
-from fleet2d.routines.written import PAIR, OrWritten
+from fleet2d.routines.written import OrWritten
 
 SECOND = timedelta(seconds=1)
 AWAY = "holiday"
@@ -53,7 +53,7 @@ class Period(Settings):
         return (self.begins - midnight) // SECOND, (self.ends - midnight) // SECOND
 
 
-AnyPeriod = Annotated[Period, OrWritten(PAIR)]
+AnyPeriod = Annotated[Period, OrWritten("pair")]
 """A period, in any form."""
 
 

@@ -21,7 +21,7 @@ from fleet2d.problems import did_you_mean, problem, problem_at, shown
 from fleet2d.routines.activity import Activity, AnyTakes, find_activity
 from fleet2d.routines.planner import REST, SLEEP, DayPlan
 from fleet2d.routines.templates import check, day_plans
-from fleet2d.routines.written import NUMBER, TEXT, OrWritten
+from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
 from fleet2d.units import Duration, Share, TimeOfDay, format_time_of_day
 
@@ -131,7 +131,7 @@ class Pastime(Settings):
         return {"weight": data} if isinstance(data, int | float) else data
 
 
-AnyPastime = Annotated[Pastime, OrWritten(NUMBER)]
+AnyPastime = Annotated[Pastime, OrWritten("number")]
 
 
 class DayTemplate(Settings):
@@ -143,11 +143,11 @@ class DayTemplate(Settings):
     dates: Dates = Field(
         default=(), description="dates and [first, last] ranges on which it holds before all others"
     )
-    wake: Annotated[Wake, OrWritten(TEXT)] = Field(
+    wake: Annotated[Wake, OrWritten("text")] = Field(
         default=Wake(), description="when the day begins"
     )
-    sleep: Annotated[Sleep, OrWritten(TEXT)] = Field(default=Sleep(), description="when it ends")
-    do: dict[str, Annotated[Task, OrWritten(TEXT)]] = Field(
+    sleep: Annotated[Sleep, OrWritten("text")] = Field(default=Sleep(), description="when it ends")
+    do: dict[str, Annotated[Task, OrWritten("text")]] = Field(
         default_factory=dict, description="what is done, by name"
     )
     leisure: dict[str, AnyPastime] | None = Field(
@@ -353,8 +353,7 @@ def _dump(persona: Persona, dump: SerializerFunctionWrapHandler) -> Any:
     return next(names, None) or dump(persona)
 
 
-OTHER = {"type": "object", "description": "a mapping that extends another persona"}
 AnyPersona = Annotated[
-    Persona, BeforeValidator(read_persona), WrapSerializer(_dump), OrWritten(TEXT, OTHER)
+    Persona, BeforeValidator(read_persona), WrapSerializer(_dump), OrWritten("text", "extension")
 ]
 """A persona in a scenario: a bundled name, a file, or a mapping that may extend either."""

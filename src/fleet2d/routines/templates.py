@@ -185,8 +185,8 @@ def _check_appointments(name: str, plan: DayPlan) -> None:
         if begin + takes > after:
             raise problem_at(
                 ("days", name, "do", other),
-                f"it begins at {clock(after)}, but {task!r} begins at {clock(begin)} and takes"
-                f" {span(takes)} at least: they overlap",
+                f"{other!r} begins at {clock(after)}, but {task!r} begins at {clock(begin)} and"
+                f" takes {span(takes)} at least: they overlap",
             )
 
 
@@ -223,14 +223,15 @@ def _conflict(chain: Chain, wake: int) -> tuple[tuple[str, ...], str]:
             day = f"on a day that begins at {clock(wake)}"
             if until == i:
                 return path, (
-                    f"it has to begin by {clock(chain.latest[i])}, but what comes before it is over"
-                    f" at {clock(now)} at the earliest, {day}"
+                    f"{job.task!r} has to begin by {clock(chain.latest[i])}, but what comes before"
+                    f" it is over at {clock(now)} at the earliest, {day}"
                 )
+            between = " and ".join(repr(name) for name in names[i:until])
             return path, (
-                f"{day} it can begin at {clock(now)} at the earliest and lasts {span(takes)} at"
-                f" least{' with what follows' * (until > i + 1)}, but {names[until]!r} has to begin"
-                f" by {clock(chain.latest[until])}: widen a window, shorten what is done, or give a"
-                " task a probability below 1"
+                f"{day} {job.task!r} can begin at {clock(now)} at the earliest, and {between}"
+                f" {'takes' if until == i + 1 else 'take'} {span(takes)} at least, but"
+                f" {names[until]!r} has to begin by {clock(chain.latest[until])}: widen a window,"
+                " shorten what is done, or give a task a probability below 1"
             )
         now += job.takes.shortest
     return ("sleep",), (

@@ -214,7 +214,9 @@ def _type_of(value: Mapping[str, Any]) -> str:
     if value.get("type") == "object":
         return f"mapping to {_type_of(value.get('additionalProperties') or {})}"
     words = {"integer": "whole number", "string": "text", "boolean": "true | false"}
-    return words.get(value.get("type", "any"), str(value.get("type", "any")))
+    found = value.get("type", "any")
+    kinds = found if isinstance(found, list) else [found]
+    return " | ".join(words.get(kind, str(kind)) for kind in kinds)
 
 
 def _shown(default: Any) -> str:

@@ -12,13 +12,31 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels.headings import HALF_TURN, TURN
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.perception import (
+    AT_BEARING,
+    AT_DISTANCE,
+    AT_FACING,
+    AT_LIGHT,
+    AT_MISTAKEN,
+    AT_POSTURE,
+    AT_RIGHT,
+    AT_SEEMS,
+    AT_SHOWN,
+    AT_STAY,
+    BEARING_NOISE,
+    BINS,
     DOUBLINGS,
     GHOST_PURPOSES,
+    HEADING_NOISE,
+    KEEPS,
     MINUTES,
     MOST_GHOSTS,
     ONE,
     POSTURES,
     PURPOSES,
+    RANGE_NOISE,
+    RANGE_SHARE,
+    SHIFT,
+    TABLE,
     ErrorTables,
 )
 from fleet2d.kernels.random import BELL_STD
@@ -26,12 +44,17 @@ from fleet2d.problems import did_you_mean
 from fleet2d.sight.camera import Lens
 from fleet2d.sight.curve import chance, cumulative, decay
 from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
-from fleet2d.sight.perception import FalsePositives, Identity, Perception
+from fleet2d.sight.perception import (
+    Attributes,
+    Detection,
+    FalsePositives,
+    Identity,
+    Perception,
+)
+from fleet2d.units import micros
 
 I64 = NDArray[np.int64]
 
-# A table by distance has at most so many entries, each for 2**shift lattice units.
-BINS = 512
 NEARLY = 1e-6
 
 
@@ -108,75 +131,61 @@ def error_tables(
     sources = 1 + max(len(perception.false_positives.spots) for perception in given)
     # Where no camera errs, nothing of all this is ever read.
     errs = any(perception is not None for perception in perceptions)
-    bins = BINS if errs else 1
-    points = 2 + max(lens.points for lens in lenses)
     tables = ErrorTables(
-        shift=np.zeros(cameras, np.int64),
-        distance=np.zeros((cameras, bins), np.int64),
-        bearing=np.zeros((cameras, TURN if errs else 1), np.int64),
-        facing=np.zeros((cameras, HALF_TURN + 1 if errs else 1), np.int64),
-        posture=np.full((cameras, POSTURES), ONE, np.int64),
-        shown=np.zeros((cameras, points), np.int64),
-        light=np.zeros((cameras, MINUTES if errs else 1), np.int64),
-        stay=np.zeros((cameras, DOUBLINGS), np.int64),
-        right=np.zeros((cameras, bins), np.int64),
-        mistaken=np.zeros((cameras, bins), np.int64),
+        table=np.zeros((cameras, TABLE if errs else 1), np.int64),
         whom=np.zeros((cameras, users, users), np.int64),
-        keeps=np.zeros(cameras, np.int64),
-        range_noise=np.zeros(cameras, np.int64),
-        range_share=np.zeros(cameras, np.int64),
-        bearing_noise=np.zeros(cameras, np.int64),
-        heading_noise=np.zeros(cameras, np.int64),
-        seems=np.full((cameras, POSTURES, POSTURES), ONE, np.int64),
-        sources=np.zeros(cameras, np.int64),
-        ghosts=np.full((cameras, sources, MOST_GHOSTS), ONE, np.int64),
+        haunted=np.zeros(cameras, np.int64),
+        ghosts=np.full((cameras, MOST_GHOSTS), ONE, np.int64),
+        source=np.full((cameras, sources), ONE, np.int64),
         spot=np.zeros((cameras, sources, 3), np.int64),
         looks_like=np.zeros((cameras, users + 1), np.int64),
         keys=np.zeros((cameras, users, PURPOSES), np.uint64),
-        ghost_keys=np.zeros((cameras, sources, GHOST_PURPOSES), np.uint64),
+        ghost_keys=np.zeros((cameras, GHOST_PURPOSES), np.uint64),
     )
     for c, (lens, perception) in enumerate(zip(lenses, perceptions, strict=True)):
         if perception is not None:
             reach = lens.far + max((round(radius) + 2 for radius in scene.radii), default=0)
-            tables.shift[c] = max(0, reach.bit_length() - (BINS - 1).bit_length())
-            _fill_detection(tables, c, lens, perception, scene)
-            _fill_identity(tables, c, perception.identity, scene)
-            _fill_attributes(tables, c, perception, scene)
+            table = tables.table[c]
+            table[SHIFT] = max(0, reach.bit_length() - (BINS - 1).bit_length())
+            _fill_detection(table, lens, perception.detection, scene)
+            _fill_identity(table, tables.whom[c], perception.identity, scene)
+            _fill_attributes(table, perception.attributes, scene)
             _fill_false_positives(tables, c, lens, perception.false_positives, scene)
     return tables
 
 
-def _distances(tables: ErrorTables, camera: int, scene: Scene) -> list[float]:
+def _distances(table: I64, scene: Scene) -> list[float]:
     """Return the distance in the middle of each entry of the tables by distance [m]."""
-    width = 1 << int(tables.shift[camera])
+    width = 1 << int(table[SHIFT])
     return [(i + 0.5) * width / scene.lattice.units_per_m for i in range(BINS)]
 
 
-def _fill_detection(
-    tables: ErrorTables, camera: int, lens: Lens, perception: Perception, scene: Scene
-) -> None:
-    model = perception.detection
-    tables.distance[camera] = model.distance.chances(_distances(tables, camera, scene))
+def _put(table: I64, at: int, values: Sequence[int] | I64) -> None:
+    """Write a part of a camera's table."""
+    table[at : at + len(values)] = values
+
+
+def _fill_detection(table: I64, lens: Lens, model: Detection, scene: Scene) -> None:
+    _put(table, AT_DISTANCE, model.distance.chances(_distances(table, scene)))
     angles = [360 * i / TURN for i in range(-HALF_TURN, HALF_TURN)]
     if not model.bearing.reaches_below_zero:
         angles = [abs(angle) for angle in angles]
-    tables.bearing[camera] = model.bearing.chances(angles)
-    turns = range(HALF_TURN + 1)
-    tables.facing[camera] = model.orientation.chances([360 * i / TURN for i in turns])
-    tables.posture[camera] = [chance(model.posture.get(name, 1.0)) for name in POSTURE_NAMES]
+    _put(table, AT_BEARING, model.bearing.chances(angles))
+    turns = [360 * i / TURN for i in range(HALF_TURN + 1)]
+    _put(table, AT_FACING, model.orientation.chances(turns))
+    _put(table, AT_POSTURE, [chance(model.posture.get(name, 1.0)) for name in POSTURE_NAMES])
     count = lens.points + 1
-    tables.shown[camera, : count + 1] = model.visible_share.chances(
-        [i / count for i in range(count + 1)]
-    )
+    shares = [i / count for i in range(count + 1)]
+    _put(table, AT_SHOWN, model.visible_share.chances(shares))
     hours = [(minute + 0.5) / 60 for minute in range(MINUTES)]
-    tables.light[camera] = model.light.around_the_clock().chances(hours)
+    _put(table, AT_LIGHT, model.light.around_the_clock().chances(hours))
     if model.memory:
-        steps = Decimal(scene.step_us) / Decimal(round(model.memory.total_seconds() * 10**6))
-        tables.stay[camera] = [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)]
+        steps = Decimal(scene.step_us) / micros(model.memory)
+        _put(table, AT_STAY, [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)])
 
 
-def _fill_identity(tables: ErrorTables, camera: int, model: Identity, scene: Scene) -> None:
-    distances = _distances(tables, camera, scene)
+def _fill_identity(table: I64, whom: I64, model: Identity, scene: Scene) -> None:
+    distances = _distances(table, scene)
     mistaken = model.mistaken.chances(distances)
     right = ONE - mistaken if model.right is None else model.right.chances(distances)
     over = np.flatnonzero(right + mistaken > ONE + chance(NEARLY))
@@ -186,8 +195,9 @@ def _fill_identity(tables: ErrorTables, camera: int, model: Identity, scene: Sce
             f"{scene.path}: perception.identity: at {distances[i]:.2f} m, right"
             f" ({right[i] / ONE:.3g}) and mistaken ({mistaken[i] / ONE:.3g}) add up to more than 1"
         )
-    tables.right[camera], tables.mistaken[camera] = right, mistaken
-    tables.keeps[camera] = model.per_track
+    _put(table, AT_RIGHT, right)
+    _put(table, AT_MISTAKEN, mistaken)
+    table[KEEPS] = model.per_track
     _check_users(model.confusion, "confusion", scene)
     for u, user in enumerate(scene.users):
         others = model.confusion.get(user)
@@ -195,7 +205,7 @@ def _fill_identity(tables: ErrorTables, camera: int, model: Identity, scene: Sce
             rest = [name for name in scene.users if name != user]
             others = {name: 1 / len(rest) for name in rest}
         _check_users(others, f"confusion.{user}", scene)
-        tables.whom[camera, u] = _whole(cumulative(others, scene.users), others, scene.users)
+        whom[u] = _whole(cumulative(others, scene.users), others, scene.users)
 
 
 def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
@@ -213,18 +223,17 @@ def _check_users(names: Mapping[str, object], key: str, scene: Scene) -> None:
             )
 
 
-def _fill_attributes(
-    tables: ErrorTables, camera: int, perception: Perception, scene: Scene
-) -> None:
-    model, per_bell = perception.attributes, 65536 / BELL_STD
-    tables.range_noise[camera] = round(model.range_noise * scene.lattice.units_per_m * per_bell)
-    tables.range_share[camera] = round(model.range_noise_share * per_bell * 65536)
-    tables.bearing_noise[camera] = round(model.bearing_noise_deg / 360 * 2 * TURN * per_bell)
-    tables.heading_noise[camera] = round(model.heading_noise_deg / 360 * TURN * per_bell)
+def _fill_attributes(table: I64, model: Attributes, scene: Scene) -> None:
+    per_bell = 65536 / BELL_STD
+    table[RANGE_NOISE] = round(model.range_noise * scene.lattice.units_per_m * per_bell)
+    table[RANGE_SHARE] = round(model.range_noise_share * per_bell * 65536)
+    table[BEARING_NOISE] = round(model.bearing_noise_deg / 360 * 2 * TURN * per_bell)
+    table[HEADING_NOISE] = round(model.heading_noise_deg / 360 * TURN * per_bell)
     for i, posture in enumerate(POSTURE_NAMES):
         others: dict[str, float] = dict(model.posture.get(posture, {}).items())
         others[posture] = 1 - sum(others.values())
-        tables.seems[camera, i] = _whole(cumulative(others, POSTURE_NAMES), others, POSTURE_NAMES)
+        sums = _whole(cumulative(others, POSTURE_NAMES), others, POSTURE_NAMES)
+        _put(table, AT_SEEMS + POSTURES * i, sums)
 
 
 def _fill_false_positives(
@@ -236,20 +245,24 @@ def _fill_false_positives(
     rates = [model.per_hour, *(spot.per_hour for spot in model.spots)]
     if not any(rates):
         return
-    tables.sources[camera] = len(rates)
+    tables.haunted[camera] = 1
     hours = Decimal(lens.period * scene.step_us) / (3600 * 10**6)
-    for i, rate in enumerate(rates):
-        mean = Decimal(rate) * hours
-        if mean > 1:
-            raise ScenarioError(
-                f"{scene.path}: perception.false_positives: {rate:g} per hour is more than one in"
-                f" each look, {float(1 / hours):g} per hour"
-            )
-        term, total = decay(mean), 0.0
-        for count in range(MOST_GHOSTS):
-            total += term
-            tables.ghosts[camera, i, count] = chance(min(total, 1.0))
-            term *= float(mean) / (count + 1)
+    mean = sum(map(Decimal, rates)) * hours
+    if mean > 1:
+        raise ScenarioError(
+            f"{scene.path}: perception.false_positives: {sum(rates):g} per hour are more than one"
+            f" in each look, {float(1 / hours):g} per hour"
+        )
+    # Poisson processes side by side are one, whose points belong to each by its share of the rate.
+    term, total = decay(mean), 0.0
+    for count in range(MOST_GHOSTS):
+        total += term
+        tables.ghosts[camera, count] = chance(min(total, 1.0))
+        term *= float(mean) / (count + 1)
+    shares = {str(i): rate / sum(rates) for i, rate in enumerate(rates)}
+    tables.source[camera, : len(rates)] = _whole(
+        cumulative(shares, list(shares)), shares, list(shares)
+    )
     for i, spot in enumerate(model.spots, 1):
         x, y = scene.lattice.to_lattice(spot.at).tolist()
         noise = round(spot.spread * scene.lattice.units_per_m * 65536 / BELL_STD)

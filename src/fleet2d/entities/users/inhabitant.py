@@ -1,9 +1,11 @@
 """Inhabitant: what behaviors share that live by activities: where one does them, and how."""
 
+import math
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 from pydantic import Field
 
 from fleet2d.entities.behavior import Behavior, Situation
@@ -84,6 +86,7 @@ class Inhabitant(Behavior):
             PlacementError: The home has none of an activity's rooms.
         """
         self.key = actor.stream("activity")
+        self.turn_rate = actor.turn_rate
         self.spots = spots
         self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
         if sleeps_in is not None:
@@ -129,23 +132,25 @@ class Inhabitant(Behavior):
     ) -> None:
         """Turn, move and fetch things at the activity's rates until it is nearly over."""
         next_us = [plan.time_us + _wait_us(law, draws) for _, law in setting.restless]
-        ahead = plan.heading
+        turns = _Turns(plan, self.turn_rate)
         end_us -= NEARLY_OVER_US
         while True:
             k = min(range(len(next_us)), key=next_us.__getitem__)
             if next_us[k] >= end_us:
+                turns.add_to_plan()
                 return
             what, law = setting.restless[k]
-            _stay_until(plan, next_us[k])
             if what == "shifts":
-                _face(plan, ahead + draws.below(2 * SIDEWAYS + 1) - SIDEWAYS)
-            elif what == "moves":
-                place = self._go_elsewhere(plan, setting, place, draws)
-                ahead = plan.heading
+                turns.turn(next_us[k], draws.below(2 * SIDEWAYS + 1) - SIDEWAYS)
             else:
-                self._fetch(plan, setting, place, end_us, draws)
-                ahead = plan.heading
-            next_us[k] = plan.time_us + _wait_us(law, draws)
+                turns.add_to_plan()
+                _stay_until(plan, next_us[k])
+                if what == "moves":
+                    place = self._go_elsewhere(plan, setting, place, draws)
+                else:
+                    self._fetch(plan, setting, place, end_us, draws)
+                turns = _Turns(plan, self.turn_rate)
+            next_us[k] = turns.time_us + _wait_us(law, draws)
 
     def _go_elsewhere(
         self, plan: Plan, setting: Setting, place: Spot | Seat, draws: Draws
@@ -231,10 +236,32 @@ def _settle_at(plan: Plan, setting: Setting, place: Spot | Seat) -> None:
         plan.take(setting.activity.posture)
 
 
-def _face(plan: Plan, heading: int) -> None:
-    turn = (heading - plan.heading + TURN // 2) % TURN - TURN // 2
-    if turn:
-        plan.turn_by(turn / TURN)
+class _Turns:
+    """Turns on the spot, gathered before they are added to a plan all at once: most of them all."""
+
+    def __init__(self, plan: Plan, turn_rate: float) -> None:
+        self.time_us = plan.time_us
+        self._plan = plan
+        self._turn_rate = turn_rate  # headings per second
+        self._heading = plan.heading
+        self._rows: list[tuple[int, int, int, int, int]] = []
+
+    def turn(self, time_us: int, aside: int) -> None:
+        """Turn to so many headings beside the one in which it all began."""
+        plan = self._plan
+        heading = (plan.heading + aside) % TURN
+        turn = abs((heading - self._heading + TURN // 2) % TURN - TURN // 2)
+        began_us = max(time_us, self.time_us)
+        self.time_us = began_us + math.ceil(turn * SECOND_US / self._turn_rate)
+        self._rows.append((began_us, plan.x, plan.y, self._heading, 0))
+        self._rows.append((self.time_us, plan.x, plan.y, heading, 0))
+        self._heading = heading
+
+    def add_to_plan(self) -> None:
+        """Let the plan turn."""
+        if self._rows:
+            self._plan.follow(np.array(self._rows, np.int64))
+            self._rows.clear()
 
 
 def _stay_until(plan: Plan, time_us: int) -> None:

@@ -101,11 +101,13 @@ class Widths:
     Attributes:
         door: Between rooms.
         bath: To bathrooms, toilets and small rooms.
+        corridor: Clear width of hallways.
         open_plan: Whether living, dining and kitchen are open to each other.
     """
 
     door: int
     bath: int
+    corridor: int
     open_plan: bool
 
     def of(self, kinds: set[str]) -> int:

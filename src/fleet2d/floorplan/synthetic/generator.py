@@ -7,7 +7,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.synthetic.access import Access, Gap, Widths, gaps_for, linked, with_loops
 from fleet2d.floorplan.synthetic.draws import Choices
 from fleet2d.floorplan.synthetic.geometry import (
-    OUTER_WALL,
     Box,
     Wall,
     inner_walls,
@@ -33,6 +32,8 @@ PATIENCE = 20
 FRONT_DOOR = 19  # 0.95 m
 # Clear space before the front door [units].
 APPROACH = 30
+# How many homes are tried as plain rectangles first [%].
+PLAIN = 30
 WORST_ACCESS = 6.0
 # Where the front door is, the best first; a corridor's end and the living room serve as well where
 # there is no entryway.
@@ -97,11 +98,9 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         FloorPlanError: No home was found that is as asked for.
     """
     settled = settle(wishes, Choices(seed, "wishes"))
-    choices = Choices(seed, "style")
-    open_plan = choices.chance(45) if style.open_plan is None else style.open_plan
-    corridor = choices.between(20, 26) if style.corridor is None else style.corridor
-    door = choices.pick((16, 17, 18)) if style.door is None else style.door
-    widths = Widths(door, min(choices.pick((14, 15, 16)), door), open_plan)
+    widths = _style(style, Choices(seed, "style"))
+    # The usual outline is a first try; the one asked for is the only one.
+    plain = Choices(seed, "outline").chance(PLAIN)
     found: list[_Candidate] = []
     briefs: list[Brief] = []
     for number in range(TRIES):
@@ -110,12 +109,12 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
                 settled = replace(settled, garage=False)
             again = Choices(seed, f"rooms {number // PATIENCE}")
             briefs = rooms_for(settled, again, style.outline == "U")
-        request = Request(briefs, settled.area_m2 or 0.0, corridor, style.outline)
+        usual = "rectangle" if plain and number < 2 * PATIENCE else None
+        request = Request(briefs, settled.area_m2 or 0.0, widths.corridor, style.outline or usual)
         layout = drawn(request, Choices(seed, f"layout {number}"))
-        if layout is not None:
-            candidate = _judged(layout, widths, style.outline, _ease(number))
-            if candidate is not None:
-                found.append(candidate)
+        candidate = layout and _judged(layout, widths, request.outline, _ease(number))
+        if candidate:
+            found.append(candidate)
         # Where good layouts are rare, fewer will do.
         if len(found) >= max(ENOUGH - number // PATIENCE, 1):
             break
@@ -126,9 +125,18 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     raise FloorPlanError(_nothing_found(settled, style))
 
 
+def _style(style: Style, choices: Choices) -> Widths:
+    """Return the widths of a home; all are drawn, so that one given leaves the others alone."""
+    open_plan, corridor = choices.chance(45), choices.between(20, 26)
+    door, bath = choices.pick((16, 17, 18)), choices.pick((14, 15, 16))
+    door = style.door or door
+    open_plan = open_plan if style.open_plan is None else style.open_plan
+    return Widths(door, min(bath, door), style.corridor or corridor, open_plan)
+
+
 def _ease(number: int) -> float:
     """Return by how much rooms may be longer than usual in a late try."""
-    return 1.0 + (number >= TRIES // 4) * 0.15 + (number >= TRIES // 2) * 0.15
+    return 1.0 + 0.1 * min(number // (2 * PATIENCE), 3)
 
 
 def _judged(layout: Layout, widths: Widths, outline: str | None, ease: float) -> _Candidate | None:
@@ -204,7 +212,7 @@ def _approachable(wall: Wall, boxes: Sequence[Box]) -> bool:
     near, far = (
         (wall.at, wall.at + APPROACH) if wall.second == -1 else (wall.at - APPROACH, wall.at)
     )
-    low, high = wall.low - OUTER_WALL, wall.high + OUTER_WALL
+    low, high = wall.low, wall.high
     x0, x1, y0, y1 = (near, far, low, high) if wall.upright else (low, high, near, far)
     return not any(b.x0 < x1 and x0 < b.x1 and b.y0 < y1 and y0 < b.y1 for b in boxes)
 

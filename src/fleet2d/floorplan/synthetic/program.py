@@ -33,8 +33,8 @@ class Size(NamedTuple):
 
 
 SIZES = {
-    "living_room": Size(10, 25, 90, 3.0, 2.2),
-    "dining_room": Size(6.5, 13, 44, 2.4, 2.2),
+    "living_room": Size(10, 23.5, 90, 3.0, 2.2),
+    "dining_room": Size(6.5, 11.5, 44, 2.4, 2.2),
     "kitchen": Size(4.5, 14, 44, 1.8, 2.3),
     "bedroom": Size(7.5, 16, 44, 2.5, 2.1),
     "bathroom": Size(3.2, 7, 18, 1.5, 3.0),
@@ -55,7 +55,8 @@ SPREAD = {
     "kitchen": (70, 185),
     "bathroom": (50, 165),
     "living_room": (75, 140),
-    "garage": (75, 125),
+    "bedroom": (62, 134),
+    "garage": (72, 130),
 }
 USUAL_SPREAD = (78, 130)
 
@@ -96,7 +97,7 @@ def least_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
     """Return the least area [m²] of a home with so many rooms."""
     kinds = [*_base(bedrooms, bathrooms), *["garage"] * garage]
     # A corridor is needed, and room to fit walls to each other, but in the smallest of homes.
-    spare = 1.15 if bedrooms == bathrooms == 1 else min(1.5 + 0.05 * (bedrooms + bathrooms), 1.8)
+    spare = 1.15 if bedrooms == bathrooms == 1 else min(1.5 + 0.05 * (bedrooms + bathrooms), 2.0)
     return round(spare * fsum(SIZES[kind].least for kind in kinds), 1)
 
 
@@ -207,7 +208,7 @@ def rooms_for(wishes: Wishes, choices: Choices, porch: bool = False) -> list[Bri
     kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
     room = area / USUAL_EXTRA
     # Rooms are usual in size or up to so much larger before there is one more of them.
-    fill = choices.between(80, 112) / 100
+    fill = choices.between(70, 104) / 100
     for kind, from_area, often in OPTIONAL:
         if porch and kind == "entryway":
             kinds.append(kind)
