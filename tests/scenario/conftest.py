@@ -8,6 +8,7 @@ import pytest
 from fleet2d import component
 from fleet2d.component import Component, OneOf, register
 from fleet2d.entities.behavior import Behavior
+from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.units import Duration, InputPath, Length, Share
 
 

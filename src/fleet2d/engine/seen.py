@@ -101,7 +101,9 @@ class SeenArea:
     def _catch_up(self) -> None:
         """Look from the poses that wait: a call of the kernel costs as much as many of them."""
         if self._waiting:
-            poses = Poses(*(column[: self._waiting] for column in self._buffer))
+            x, y, heading, away = self._buffer
+            waiting = slice(self._waiting)
+            poses = Poses(x[waiting], y[waiting], heading[waiting], away[waiting])
             begin = self.steps - self._waiting
             watch(self._watched, poses, begin, self._glances, self._bench, self._record)
             self._waiting = 0

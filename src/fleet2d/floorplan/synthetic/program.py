@@ -246,6 +246,9 @@ def scaled(briefs: Sequence[Brief], total: float, choices: Choices) -> list[Brie
         brief.area * choices.between(*spread) / 100
         for brief, spread in zip(briefs, spreads, strict=True)
     ]
+    at = {brief.kind: i for i, brief in enumerate(briefs)}
+    # People live in the living room, not in the kitchen.
+    usual[at["kitchen"]] = min(usual[at["kitchen"]], 0.9 * usual[at["living_room"]])
     sizes = [SIZES[brief.kind] for brief in briefs]
 
     def areas(factor: float) -> list[float]:
