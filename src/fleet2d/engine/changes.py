@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import LineString
 
-from fleet2d.engine.clock import Clock
+from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.objects.door import Door
 from fleet2d.entities.objects.home_object import HomeObject

@@ -11,7 +11,7 @@ from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import Manifest, file_record, versions
 from fleet2d.artifacts.reader import FLOORPLAN_NAME
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.clock import Clock
+from fleet2d.clock import Clock
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
 from fleet2d.floorplan.plan import FloorPlan

@@ -9,9 +9,9 @@ from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.artifacts.store import RunStore
+from fleet2d.clock import Clock
 from fleet2d.component import Component
 from fleet2d.engine.buckets import PoseBlock
-from fleet2d.engine.clock import Clock
 from fleet2d.engine.seen import SeenArea
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot

@@ -16,8 +16,8 @@ from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.output import to_columns
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
-from fleet2d.engine.blame import blame
-from fleet2d.engine.clock import Clock
+from fleet2d.blame import blame
+from fleet2d.clock import Clock
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.engine.clock import Clock
+from fleet2d.clock import Clock
 from fleet2d.engine.recorder import KEY_KINDS, PLANNED, WALK
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander

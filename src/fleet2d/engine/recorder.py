@@ -23,9 +23,9 @@ from fleet2d.algorithms.observations import (
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.clock import Clock
 from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock
 from fleet2d.engine.changes import Happened
-from fleet2d.engine.clock import Clock
 from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Track

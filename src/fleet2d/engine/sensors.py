@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fleet2d.algorithms.history import SensorRow
+from fleet2d.clock import Clock
 from fleet2d.engine.buckets import PoseBlock
-from fleet2d.engine.clock import Clock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.objects.contact_sensor import ContactSensor
 from fleet2d.entities.objects.home_object import HomeObject

@@ -21,10 +21,10 @@ from fleet2d.algorithms.history import Log, Piece
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.reader import Run
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.blame import blame
+from fleet2d.blame import blame
+from fleet2d.clock import Clock
 from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock, look_together
 from fleet2d.engine.changes import Changes
-from fleet2d.engine.clock import Clock
 from fleet2d.engine.keeping import (
     deferred_interrupt,
     describe_end,

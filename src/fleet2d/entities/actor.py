@@ -6,8 +6,8 @@ from datetime import timedelta
 
 import numpy as np
 
-from fleet2d.engine.blame import blame
-from fleet2d.engine.clock import Clock
+from fleet2d.blame import blame
+from fleet2d.clock import Clock
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.entity import Entity
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place

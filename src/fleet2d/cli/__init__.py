@@ -1,0 +1,62 @@
+"""The command line: `fleet2d run`, `validate`, `show` and the rest; see `fleet2d --help`."""
+
+import sys
+from typing import Annotated, NoReturn
+
+import typer
+
+from fleet2d.calibrate.command import calibrating
+from fleet2d.cli import inputs, pictures, runs
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.fit.command import fitting
+
+app = typer.Typer(
+    help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
+    no_args_is_help=True,
+    invoke_without_command=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+for command in (
+    runs.run,
+    inputs.validate,
+    inputs.schema,
+    inputs.components,
+    pictures.show,
+    inputs.convert,
+    runs.export,
+    runs.reproduce,
+):
+    app.command()(command)
+app.add_typer(fitting, name="fit")
+app.add_typer(calibrating, name="calibrate")
+
+
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Simulate weeks of a home in a fraction of a second, exactly reproducible."""
+    if version:
+        import fleet2d
+
+        typer.echo(f"fleet2d {fleet2d.__version__}")
+        raise typer.Exit
+
+
+def main() -> NoReturn:
+    """Run the command line; exit 0 done, 2 wrong input, 1 our fault, 130 interrupted."""
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(2)
+    except Fleet2DError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(0)

@@ -1,0 +1,151 @@
+"""Commands that only read what a user gives: validate, schema, components, convert."""
+
+import json
+from collections.abc import Collection
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fleet2d.cli.arguments import Resolution, file_name, split
+from fleet2d.errors import InputError
+
+
+def validate(
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENARIO.yaml|FLOORPLAN] [KEY.PATH=VALUE]...",
+            help="A scenario and changes to it, or a floor plan of any format.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Picture of a floor plan's check-up, .png or .svg.")
+    ] = None,
+    radius: Annotated[
+        float, typer.Option(min=0.01, max=5, help="Radius of the robot for a floor plan [m].")
+    ] = 0.15,
+    resolution: Resolution = None,
+) -> None:
+    """Check a scenario, and that everybody can be where they should; or a floor plan."""
+    from fleet2d.floorplan.load import is_floorplan
+
+    scenario, overrides = split(arguments)
+    if scenario is not None and is_floorplan(scenario):
+        if overrides:
+            raise InputError(f"{scenario} is a floor plan: {overrides[0]} changes a scenario")
+        _check_floorplan(scenario, out, radius, resolution)
+        return
+    from fleet2d.engine.simulation import Simulation
+
+    simulation = Simulation(scenario, *overrides)
+    plan, settings = simulation.home.plan, simulation.scenario.simulation
+    typer.echo(
+        f"ok: {_count(simulation.scenario.users, 'user')} and"
+        f" {_count(simulation.scenario.robots, 'robot')} in {plan.name}"
+        f" ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
+        f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
+    )
+    for note in plan.notes:
+        typer.echo(f"note: {note}")
+    for actor in simulation.actors.values():
+        for behavior in actor.behaviors:
+            for note in getattr(behavior, "notes", ()):  # what it made of its input
+                typer.echo(f"note: {actor.path}: {note}")
+
+
+def _check_floorplan(
+    source: str, out: Path | None, radius: float, resolution: float | None
+) -> None:
+    """Print a floor plan's findings and draw them; exit with 2 if nobody can live there."""
+    from fleet2d.floorplan.checkup import checkup
+    from fleet2d.floorplan.load import load_floorplan
+    from fleet2d.view.checkup import draw_checkup
+
+    plan = load_floorplan(source, resolution=resolution)
+    findings = checkup(plan, radius)
+    target = out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png")
+    draw_checkup(plan, findings, target)
+    typer.echo(f"{plan.name}: {plan.area_m2:.1f} m2, {_count(plan.rooms, 'room')}")
+    for number, finding in enumerate(findings, start=1):
+        typer.echo(f"{number:>3} {finding.severity}: {finding.text}")
+    if not findings:
+        typer.echo("ok: nothing wrong or odd was found")
+    for note in plan.notes:
+        typer.echo(f"note: {note}")
+    typer.echo(target)
+    if any(finding.severity == "unlivable" for finding in findings):
+        raise typer.Exit(2)
+
+
+def schema(
+    floorplan: Annotated[
+        bool, typer.Option("--floorplan", help="That of a floor plan in Fleet2D's own format.")
+    ] = False,
+) -> None:
+    """Print the JSON Schema of a scenario, for completion in an editor."""
+    if floorplan:
+        from fleet2d.floorplan.native_schema import native_schema
+
+        typer.echo(json.dumps(native_schema(), indent=2))
+        return
+    from fleet2d.scenario.schema import schema as scenario_schema
+
+    typer.echo(json.dumps(scenario_schema(), indent=2))
+
+
+def components(
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+) -> None:
+    """List every registered type, with its fields, units and defaults."""
+    from fleet2d.scenario.schema import describe_components
+
+    described = describe_components()
+    if as_json:
+        typer.echo(json.dumps([asdict(component) for component in described], indent=2))
+        return
+    for component in described:
+        names = " or ".join((component.type, *component.aliases))
+        typer.echo(f"{component.kind}: {names}\n    {component.summary}")
+        for field in component.fields:
+            default = "required" if field.default is None else f"= {field.default or repr('')}"
+            typer.echo(f"    {field.name}: {field.type} {default}")
+            if field.description:
+                typer.echo(f"        {field.description}")
+        typer.echo("")
+
+
+def convert(
+    old: Annotated[
+        Path,
+        typer.Argument(
+            help="A floor plan of any format, or a configuration of the published Fleet2D."
+        ),
+    ],
+    new: Annotated[
+        Path,
+        typer.Argument(help="The floor plan (.json, .yaml, .geojson) or the scenario to write."),
+    ],
+    resolution: Resolution = None,
+) -> None:
+    """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
+    from fleet2d.floorplan.load import is_floorplan, load_floorplan
+
+    if is_floorplan(old):
+        from fleet2d.floorplan.save import save_floorplan
+
+        plan = load_floorplan(old, resolution=resolution)
+        save_floorplan(plan, new)
+        remarks = list(plan.notes)
+    else:
+        from fleet2d.scenario.published import convert_file
+
+        remarks = convert_file(old, new)
+    for remark in remarks:
+        typer.echo(f"note: {remark}")
+    typer.echo(new)
+
+
+def _count(things: Collection[Any], noun: str) -> str:
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"

@@ -1,0 +1,64 @@
+"""The command that draws: `fleet2d show`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleet2d.cli.arguments import Resolution, file_name
+from fleet2d.errors import InputError, RunDirectoryError
+
+
+def show(
+    what: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FLOORPLAN|RUN_DIR]", help="Left out: the bundled home."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Picture to write, .png or .svg.")] = None,
+    resolution: Resolution = None,
+    layer: Annotated[
+        str | None, typer.Option(help="Of a run: draw this layer, such as explored.astro.")
+    ] = None,
+    step: Annotated[
+        int | None, typer.Option(help="With --layer: as it was after this step; else the last.")
+    ] = None,
+    fov: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,HEADING[,RANGE,ANGLE]",
+            help="Of a floor plan: draw what is in view of a pose [m, degrees].",
+        ),
+    ] = None,
+) -> None:
+    """Draw a floor plan of any format, or a stored run in its home."""
+    is_run = what is not None and (what / "manifest.json").exists()
+    if fov is not None if is_run else layer is not None or step is not None:
+        raise InputError("--layer and --step are for a run's directory, --fov for a floor plan")
+    if what is not None and is_run:
+        from fleet2d.artifacts.reader import open_run
+
+        if layer is not None:
+            from fleet2d.view.layers import draw_layer
+
+            target = out or what / f"{layer}.png"
+            draw_layer(open_run(what), layer, target, step)
+        else:
+            from fleet2d.view.run import draw_run
+
+            target = out or what / "picture.png"
+            draw_run(open_run(what), target)
+    elif what is not None and what.is_dir():
+        raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
+    else:
+        from fleet2d.floorplan.load import load_floorplan
+        from fleet2d.view.floorplan import draw_floorplan
+
+        plan = load_floorplan(what, resolution=resolution) if what else load_floorplan()
+        target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
+        if fov is not None:
+            from fleet2d.view.fov import draw_fov, parse_pose
+
+            draw_fov(plan, parse_pose(fov), target)
+        else:
+            draw_floorplan(plan, target)
+    typer.echo(target)

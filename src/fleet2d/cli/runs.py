@@ -1,0 +1,142 @@
+"""Commands that run, and what they say: run, reproduce, export."""
+
+import json
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fleet2d.cli.arguments import file_name, split
+from fleet2d.cli.summary import print_summary, summary_of
+from fleet2d.errors import RunDirectoryError
+
+if TYPE_CHECKING:
+    from fleet2d.artifacts.reader import Run
+    from fleet2d.engine.simulation import Simulation
+
+Arguments = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
+        help="A scenario (left out: the bundled base scenario), and changes to it.",
+    ),
+]
+
+
+def run(
+    arguments: Arguments = None,
+    seed: Annotated[int | None, typer.Option(help="The seed of all randomness.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Directory for the run.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Simulate a scenario and store the run."""
+    scenario, overrides = split(arguments)
+    if not quiet:
+        _announce_compilation()
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.scenario.model import load_scenario
+
+    settings = {} if seed is None else {"seed": seed}
+    loaded = load_scenario(scenario, *overrides, **settings)
+    name = loaded.name or (Path(scenario).stem if scenario else "run")
+    directory = out or _fresh_directory(name)
+    try:
+        simulation = Simulation(loaded, out=directory)
+    except BaseException:
+        if out is None:
+            with suppress(OSError):
+                directory.rmdir()
+                directory.parent.rmdir()  # if it was the first run here
+        raise
+    try:
+        stored = _run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
+            f" {simulation.directory}",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+    summary = summary_of(stored)
+    if as_json:
+        typer.echo(json.dumps(summary))
+    elif not quiet:
+        print_summary(summary, stored)
+
+
+def export(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[Path, typer.Argument(help="The text file to write.")],
+) -> None:
+    """Write what a run's sensors said as smart-home tools read it: in the layout of CASAS."""
+    from fleet2d.artifacts.casas import write_casas
+    from fleet2d.artifacts.reader import open_run
+
+    count = write_casas(open_run(directory), out)
+    typer.echo(f"{count} readings in {out}")
+
+
+def reproduce(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+) -> None:
+    """Run a stored run again from its manifest, and compare."""
+    from fleet2d.engine.run import reproduce as run_again
+
+    result = run_again(directory)
+    for cause in result.causes:
+        typer.echo(f"note: {cause}")
+    if result.same:
+        typer.echo(f"reproduced: digest {result.digest}")
+        return
+    typer.echo(f"not reproduced: {', '.join(result.differing)} came out different", err=True)
+    raise typer.Exit(1)
+
+
+def _fresh_directory(name: str) -> Path:
+    """Make and return runs/NAME-001, or the first number that is free."""
+    plain = file_name(name) or "run"
+    number = 1
+    while True:
+        directory = Path("runs") / f"{plain}-{number:03d}"
+        try:
+            directory.mkdir(parents=True)  # so that a run started beside this one takes the next
+        except FileExistsError:
+            number += 1
+        except OSError as error:
+            raise RunDirectoryError(
+                f"{directory} can't be made: {error.strerror}; name another directory by --out"
+            ) from error
+        else:
+            return directory
+
+
+def _announce_compilation() -> None:
+    from fleet2d.kernels._jit import cache_directory
+
+    if not cache_directory().exists():
+        text = "compiling the kernels, once on this machine: 10 to 20 s of this first run …"
+        typer.echo(text, err=True)
+
+
+def _run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
+    if not show:
+        return simulation.run()
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=simulation.clock.steps)
+        began = time.perf_counter()
+
+        def tell(now: "Simulation") -> None:
+            simulated = now.step * now.clock.step_us / 1e6
+            speedup = simulated / (time.perf_counter() - began)
+            text = f"{now.time:%a %d %b %Y %H:%M}  {speedup:,.0f} x real time"
+            progress.update(task, completed=now.step, description=text)
+
+        return simulation.run(tell)
