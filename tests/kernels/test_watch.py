@@ -21,6 +21,7 @@ from fleet2d.sight.tables import Scene, stack_lenses
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
 SECOND = 1_000_000
 ROOMS = 3
+BIN = 9
 FLAT = home_of(
     [
         shapely.union_all([shapely.box(128, 128, 900, 700), shapely.box(960, 128, 1500, 700)])
@@ -31,11 +32,12 @@ FLAT = home_of(
 
 
 class Seen(NamedTuple):
-    """What a robot has seen: first and last step of each cell, and the exposure of rooms."""
+    """What a robot has seen: first and last step of each cell, exposure of rooms, also by bins."""
 
     first: npt.NDArray[np.int64]
     last: npt.NDArray[np.int64]
     exposure: list[int]
+    binned: list[list[int]]
 
 
 def lenses_of(*cameras: Camera) -> Lenses:
@@ -72,6 +74,7 @@ def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
     shape = (FLAT.rows, FLAT.columns)
     first, last = np.full(shape, NEVER), np.full(shape, NEVER)
     rooms, exposure = rooms_of(FLAT), np.zeros(ROOMS, np.int64)
+    binned = np.zeros((8, ROOMS), np.int64)
     for step in range(0, len(poses.x), every):
         if poses.away[step]:
             continue
@@ -86,8 +89,10 @@ def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
             seen |= slow.cells_in_view(FLAT.walls, shape, pose, near, far, half, SINES)
         first[seen & (first == NEVER)] = step
         last[seen] = step
-        exposure += every * np.bincount(rooms[seen & (rooms >= 0)], minlength=ROOMS)
-    return Seen(first, last, exposure.tolist())
+        counts = every * np.bincount(rooms[seen & (rooms >= 0)], minlength=ROOMS)
+        exposure += counts
+        binned[step // BIN] += counts
+    return Seen(first, last, exposure.tolist(), binned.tolist())
 
 
 def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[int]) -> Seen:
@@ -96,17 +101,19 @@ def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[i
     several = len(lenses.near_squared) > 1
     record = Record(
         np.full(shape, NEVER, np.int64), np.full(shape, NEVER, np.int64), np.zeros(ROOMS, np.int64),
-        np.full(shape if several else (0, 0), NEVER, np.int64),
+        np.full(shape if several else (0, 0), NEVER, np.int64), np.zeros((8, ROOMS), np.int64),
     )  # fmt: skip
-    watched = Watched(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every)
+    watched = Watched(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
+    binned = np.zeros((8, ROOMS), np.int64)
     glances, bench = no_glances(slots, ROOMS), bench_for(FLAT.mesh, *shape)
     begin = 0
     for end in [*ends, len(poses.x)]:
         part = Poses(*(np.ascontiguousarray(column[begin:end]) for column in poses))
         watch(watched, part, begin, glances, bench, record)
+        binned[begin // BIN :] += record.binned[: 8 - begin // BIN]
         begin = end
     settle(watched, glances, bench, record.last)
-    return Seen(record.first, record.last, record.exposure.tolist())
+    return Seen(record.first, record.last, record.exposure.tolist(), binned.tolist())
 
 
 ONE = [Camera(range=(0.1, 0.6), angle_deg=108)]
@@ -136,6 +143,7 @@ def test_what_was_seen_is_what_brute_force_sees(
     found = by_kernel(poses, lenses, every, slots, ends)
 
     assert expected.exposure == found.exposure
+    assert expected.binned == found.binned
     assert np.array_equal(expected.first, found.first)
     assert np.array_equal(expected.last, found.last)
     assert (expected.first >= 0).sum() > 20

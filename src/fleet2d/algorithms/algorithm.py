@@ -25,6 +25,7 @@ class Present:
         path: The component's path in the scenario, "algorithms.ltp".
         step: The present step; its history ends with it.
         time: Its local time.
+        start: The local time of step 0.
         home: The home.
         users: Names of the users, in the order of their indices.
         robots: Names of the robots.
@@ -34,6 +35,7 @@ class Present:
     path: str
     step: int
     time: datetime
+    start: datetime
     home: "Home"
     users: tuple[str, ...]
     robots: tuple[str, ...]
@@ -69,7 +71,9 @@ class Algorithm(Component):
     """
 
     kind: ClassVar[str] = "algorithm"
-    needs: ClassVar[Set[str]] = frozenset()  # of exposure, explored, first_seen, last_seen …
+    needs: ClassVar[Set[str]] = (
+        frozenset()
+    )  # of evidence, exposure, explored, first_seen, last_seen …
 
     period: PositiveDuration = Field(
         default=timedelta(hours=1), description="how often it is updated"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.evidence import Evidence, cells_of_rooms, count_seen
 from fleet2d.algorithms.observations import (
     NOWHERE,
     OBSERVATION,
@@ -132,6 +133,9 @@ class Log:
         self.cameras: list[tuple[int, str]] = []  # index of the robot, and name
         self._looks: dict[int, NDArray[np.int64]] = {}
         self._exposures: dict[int, NDArray[np.int64]] = {}
+        self.bin_steps = 0  # of the bins of evidence; 0: nobody asks for it
+        self._bins: NDArray[np.int64] | None = None  # (bins, robots, rooms), from _first_bin on
+        self._first_bin = 0
         self._rooms = NearestRooms(home.plan)
         self._traced: dict[tuple[str, int, int], BodyPoses] = {}
 
@@ -145,6 +149,9 @@ class Log:
         self.readings = [row for row in self.readings if row.step >= before]
         self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
         self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
+        if self._bins is not None:
+            past = max(0, before // self.bin_steps - self._first_bin)
+            self._bins, self._first_bin = self._bins[past:], self._first_bin + past
 
     def poses(self, name: str, first: int, end: int) -> BodyPoses:
         """Return the poses of a body in the steps from `first` to `end` - 1."""
@@ -199,6 +206,36 @@ class Log:
     def expose(self, step: int, exposure: NDArray[np.int64]) -> None:
         """Keep how much of each room each robot has had in view before `step`."""
         self._exposures[step] = exposure
+
+    def expose_bins(self, bins: NDArray[np.int64]) -> None:
+        """Keep how much of each room each robot has had in view: the bins (n, robots, rooms)."""
+        self._bins = bins if self._bins is None else np.concatenate([self._bins, bins])
+
+    def evidence(self, first: int, end: int, users: int) -> Evidence:
+        """Return what was watched and perceived in the steps from `first` to `end` - 1.
+
+        Raises:
+            ComponentError: Nobody said before the run that it would be asked for, or the steps
+                aren't whole bins.
+        """
+        if self._bins is None:
+            raise ComponentError(
+                "evidence was asked for, but isn't worked out unless somebody says so before: write"
+                " needs = {'evidence'} in the class of the component"
+            )
+        if first % self.bin_steps or end % self.bin_steps:
+            raise ComponentError(
+                f"evidence comes in bins of {self.bin_steps} steps, but the period from step"
+                f" {first} to {end} isn't made of whole ones: choose a period of whole minutes"
+            )
+        begin = first // self.bin_steps - self._first_bin
+        bins = self._bins[begin : end // self.bin_steps - self._first_bin]
+        cells = np.maximum(cells_of_rooms(self.home.plan), 1) * self.bin_steps
+        most = bins.max(axis=1, initial=0)
+        seen = count_seen(
+            self.perceived(first, end), first, len(bins), self.bin_steps, users, most.shape[1]
+        )
+        return Evidence(first, self.bin_steps, most / cells, seen)
 
     def exposure(self, first: int, end: int) -> NDArray[np.int64]:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
@@ -298,6 +335,16 @@ class History:
             ComponentError: The asker has no needs = {"exposure"}.
         """
         return self.log.exposure(self.first, self.end)
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """What robots watched and whom they perceived there, minute by minute.
+
+        Raises:
+            ComponentError: The asker has no needs = {"evidence"}, or no period of whole minutes.
+        """
+        users = sum(path.startswith("users.") for path in self.log.paths)
+        return self.log.evidence(self.first, self.end, users)
 
     def _check_metric(self, what: str) -> None:
         if self.visible != frozenset(self.log.index):

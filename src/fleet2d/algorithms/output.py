@@ -1,7 +1,7 @@
 """What algorithms put out, and how it becomes rows of a table."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,18 @@ from fleet2d.floorplan.change import HomeChanges
 
 # The columns of every table.
 RESERVED = frozenset({"step", "time"})
+
+
+@runtime_checkable
+class Tabular(Protocol):
+    """An output of a class of its own, which knows the rows that it is stored as."""
+
+    def to_columns(self, rooms: Sequence[str]) -> Mapping[str, ArrayLike]:
+        """Return columns of one length, by name.
+
+        Args:
+            rooms: The names of the home's rooms, in the order of their indices.
+        """
 
 
 class RoomDistribution:
@@ -52,8 +64,8 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
 
     Args:
         output: A RoomDistribution (columns room, share), HomeChanges (change, target), a mapping
-            of names to numbers or strings
-            (one row), or a mapping of names to arrays of one length.
+            of names to numbers or strings (one row), a mapping of names to arrays of one length,
+            or an object whose `to_columns` returns such a mapping.
         rooms: The names of the rooms.
         where: The component's path, for errors.
 
@@ -72,6 +84,8 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
         return {"room": np.array(rooms, dtype=object), "share": output.share}
     if isinstance(output, HomeChanges):
         return output.to_columns()
+    if isinstance(output, Tabular):
+        output = output.to_columns(rooms)
     if not isinstance(output, Mapping) or not output:
         raise ComponentError(
             f"{where} put out {output!r}; a RoomDistribution, or a mapping of names to numbers"

@@ -6,6 +6,7 @@ from datetime import timedelta
 import numpy as np
 
 from fleet2d.algorithms.algorithm import Algorithm
+from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.artifacts.store import RunStore
@@ -25,7 +26,7 @@ from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 from fleet2d.units import micros
 
-NEEDS = ("exposure", *SEEN_LAYERS)
+NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 
 
 def lay_layers(home: Home, source: FloorPlanSource) -> None:
@@ -75,12 +76,14 @@ class LayerBook:
         needed = {need for learner in learners for need in _needs_of(learner)}
         wanted = {*needed, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
         self._exposes = "exposure" in needed
+        self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0
+        self._told_bins = 0
         self.areas: list[SeenArea] = []
         if wanted:
             every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
             keeps_last = bool({"last_seen", "time_since_seen"} & wanted)
             self.areas = [
-                SeenArea(actor, row, every=every, keeps_last=keeps_last)
+                SeenArea(actor, row, every=every, keeps_last=keeps_last, bin_steps=self._bin_steps)
                 for row, actor in enumerate(actors)
                 if isinstance(actor.entity, Robot) and actor.entity.eyes
             ]
@@ -100,6 +103,15 @@ class LayerBook:
 
     def expose(self, step: int, log: Log) -> None:
         """Tell the log how much of each room each robot has had in view before `step`."""
+        if self._bin_steps:
+            log.bin_steps = self._bin_steps
+            taken = [area.take_bins(step) for area in self.areas]
+            count = step // self._bin_steps - self._told_bins
+            self._told_bins += count
+            bins = np.zeros((count, self._robots, len(self._home.rooms)), np.int64)
+            for area, rows in zip(self.areas, taken, strict=True):
+                bins[:, area.row - self._first_robot] = rows
+            log.expose_bins(bins)
         if self._exposes:
             exposure = np.zeros((self._robots, len(self._home.rooms)), np.int64)
             for area in self.areas:

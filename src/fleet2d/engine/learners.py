@@ -144,8 +144,8 @@ class Learners:
         visible = frozenset((*self.users, *self.robots) if knows_truth else self.robots)
         history = History(log, learner.since, end, self.clock.step_us / 1e6, visible)
         state = Present(
-            learner.path, end - 1, self.clock.time(end - 1), self.home, self.users, self.robots,
-            MappingProxyType({**outputs}), self.seed
+            learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
+            self.users, self.robots, MappingProxyType({**outputs}), self.seed
         )  # fmt: skip
         with blame(learner.path, end - 1):
             output = learner.component.update(history, state)

@@ -35,7 +35,15 @@ class SeenArea:
         steps: Steps taken in so far.
     """
 
-    def __init__(self, robot: Actor, row: int, *, every: int = 1, keeps_last: bool = True) -> None:
+    def __init__(
+        self,
+        robot: Actor,
+        row: int,
+        *,
+        every: int = 1,
+        keeps_last: bool = True,
+        bin_steps: int = 0,
+    ) -> None:
         """Begin with nothing seen.
 
         Args:
@@ -43,6 +51,7 @@ class SeenArea:
             row: Its row in a PoseBlock.
             every: It looks at the steps that this divides; each look stands for so many steps.
             keeps_last: Whether the last step at which each cell was in view can be asked for.
+            bin_steps: Keep exposure by bins of so many steps, for `take_bins`; 0: don't.
         """
         assert isinstance(robot.entity, Robot)
         self.robot, self.row, self.every = robot, row, every
@@ -58,7 +67,13 @@ class SeenArea:
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
             exposure=np.zeros(len(plan.rooms), np.int64),
             counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
+            binned=np.zeros(
+                (BUFFER // bin_steps + 2 if bin_steps else 0, len(plan.rooms)), np.int64
+            ),
         )
+        self._bin_steps = bin_steps
+        self._bins = np.zeros((0, len(plan.rooms)), np.int64)  # from bin _first_bin on
+        self._first_bin = 0
         self._glances = no_glances(SLOTS, len(plan.rooms))
         self._buffer, self._waiting = empty_poses(BUFFER), 0
         self._face(robot.home.walls)
@@ -75,7 +90,12 @@ class SeenArea:
         """Take other walls: what is known of poses no longer holds."""
         plan = self.robot.home.plan
         self._watched = Watched(
-            walls, self._lenses, plan.room_of_cell, self.robot.clock.step_us, self.every
+            walls,
+            self._lenses,
+            plan.room_of_cell,
+            self.robot.clock.step_us,
+            self.every,
+            max(self._bin_steps, 1),
         )
         self._bench = bench_for(walls, plan.lattice.rows, plan.lattice.columns)
         self._glances.last[:] = self._glances.told[:] = NEVER
@@ -107,6 +127,17 @@ class SeenArea:
             begin = self.steps - self._waiting
             watch(self._watched, poses, begin, self._glances, self._bench, self._record)
             self._waiting = 0
+            if self._bin_steps:
+                self._gather_bins(begin)
+
+    def _gather_bins(self, begin: int) -> None:
+        """Keep the bins of the steps from `begin` to the present one."""
+        first = begin // self._bin_steps - self._first_bin
+        end = (self.steps - 1) // self._bin_steps + 1 - self._first_bin
+        grown = np.zeros((end, self._bins.shape[1]), np.int64)
+        grown[: len(self._bins)] = self._bins
+        grown[first:] += self._record.binned[: end - first]
+        self._bins = grown
 
     def _settle(self) -> None:
         self._catch_up()
@@ -118,6 +149,18 @@ class SeenArea:
         """Cells of each room in view, summed over the steps so far: int64 (rooms,), a copy."""
         self._catch_up()
         return self._record.exposure.copy()
+
+    def take_bins(self, end: int) -> I64:
+        """Hand over exposure by bins, of those that end by step `end` and weren't taken before.
+
+        Returns:
+            int64 (bins, rooms), cells of each room in view, summed over the steps of each bin.
+        """
+        self._catch_up()
+        count = end // self._bin_steps - self._first_bin
+        taken, self._bins = self._bins[:count], self._bins[count:]
+        self._first_bin += count
+        return taken
 
     def explored(self) -> NDArray[np.bool_]:
         """Return which cells were ever in view: bool (rows, columns)."""

@@ -47,12 +47,15 @@ class Record(NamedTuple):
         exposure: int64 (rooms,), cells of each room in view, summed over the steps.
         counted: int64 (rows, columns), the last look that counted each cell, which several cameras
             may show; empty for one camera.
+        binned: int64 (bins, rooms), as `exposure`, by time: set anew by every call of `watch`;
+            empty where nobody asks for it.
     """
 
     first: Int64
     last: Int64
     exposure: Int64
     counted: Int64
+    binned: Int64
 
 
 class Watched(NamedTuple):
@@ -64,6 +67,7 @@ class Watched(NamedTuple):
         room_of_cell: int16 (rows, columns), -1 for none.
         step_us: Length of a step.
         every: It looks at the steps that this divides; each look stands for so many steps.
+        bin_steps: Steps of a bin of `Record.binned`; bins begin at step 0.
     """
 
     walls: Mesh
@@ -71,6 +75,7 @@ class Watched(NamedTuple):
     room_of_cell: NDArray[np.int16]
     step_us: int
     every: int
+    bin_steps: int
 
 
 def no_glances(slots: int, rooms: int) -> Glances:
@@ -158,12 +163,16 @@ def _glance(
 
 
 @kernel
-def _let_go(glances: Glances, exposure: Int64, slot: int, step: int, steps: int) -> None:
+def _let_go(glances: Glances, record: Record, slot: int, step: int, steps: int, row: int) -> None:
     """Add what a pose shows, that was held for so many steps and at `step` last."""
     if slot >= 0:
+        exposure, binned = record.exposure, record.binned
         glances.last[slot] = step
         for room in range(exposure.shape[0]):
-            exposure[room] += steps * np.int64(glances.cells[slot, room])
+            seen = steps * np.int64(glances.cells[slot, room])
+            exposure[room] += seen
+            if binned.shape[0] > 0:
+                binned[row, room] += seen
 
 
 @kernel
@@ -198,7 +207,10 @@ def watch(
     """
     xs, ys, headings, aways = poses.x, poses.y, poses.heading, poses.away
     pose, last, cells, taken = glances.pose, glances.last, glances.cells, glances.taken
-    exposure, lenses, every = record.exposure, watched.lenses, watched.every
+    lenses, every, bin_steps = watched.lenses, watched.every, watched.bin_steps
+    bins = record.binned.shape[0] > 0
+    record.binned[:] = 0
+    begin_bin, row = begin // bin_steps, 0
     pans = lenses.pan_count.max() > 0
     panned, looked = 0, NEVER
     slot, looks = -1, 0  # the pose that is held, and for how many looks
@@ -207,9 +219,12 @@ def watch(
         x, y, heading, step = xs[j], ys[j], headings[j], begin + j
         if pans:
             panned = _panned(lenses, step * watched.step_us)
+        if bins and step // bin_steps - begin_bin != row:
+            _let_go(glances, record, slot, looked, looks * every, row)
+            row, looks = step // bin_steps - begin_bin, 0
         same = x == held_x and y == held_y and heading == held_heading and panned == held_panned
         if not same or slot < 0 or aways[j]:
-            _let_go(glances, exposure, slot, looked, looks * every)
+            _let_go(glances, record, slot, looked, looks * every, row)
             slot, looks = -1, 0
             if aways[j]:
                 continue
@@ -230,4 +245,4 @@ def watch(
                 taken[0] += 1
         looked = step
         looks += 1
-    _let_go(glances, exposure, slot, looked, looks * every)
+    _let_go(glances, record, slot, looked, looks * every, row)
