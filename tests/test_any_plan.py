@@ -23,3 +23,22 @@ def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
         assert sum(shares.values()) == pytest.approx(1)
         assert shares["away"] == pytest.approx(9.5 / 24, abs=0.01)
         assert run.metrics["distance"]["ana"] > 1, plan.name
+
+
+@needs_jit
+def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
+    maps = [
+        *(("ros", path) for path in sorted((shared_data / "ros_maps").glob("*/map.yaml"))),
+        *(("valetudo", path) for path in sorted((shared_data / "valetudo").glob("*.json"))),
+    ]
+    assert 6 == len(maps)
+    for kind, path in maps:
+        overrides = (
+            f"floorplan.type={kind}", f"floorplan.path={path}", "simulation.duration=1 d",
+        )  # fmt: skip
+        run = fleet2d.run(None, *overrides)
+        shares = run.metrics["room_share"]["ana"]
+        assert sum(shares.values()) == pytest.approx(1)
+        assert len(shares) >= 2, path
+        assert run.metrics["distance"]["ana"] > 1, path
+        assert run.metrics["distance"]["astro"] > 10 or len(run.plan.rooms) == 1, path

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,9 +95,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("page", pages_with("python"))
-def test_python_of_a_page_runs_in_an_empty_folder(page: Path, folder: Path) -> None:
+def test_python_of_a_page_runs_in_an_empty_folder(
+    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     write_titled_blocks(page, folder)
+    monkeypatch.syspath_prepend(folder)  # as Python's prompt has its folder
     run_python_blocks(page)
+    for block in blocks(page):
+        sys.modules.pop(Path(block.title or "").stem, None)  # another page may have one, too
 
 
 @pytest.mark.parametrize("block", scenarios())

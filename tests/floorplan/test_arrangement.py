@@ -1,6 +1,7 @@
 """Objects numbered, described and moved."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import shapely
@@ -53,4 +54,12 @@ def test_object_moved_back_is_where_it_was() -> None:
 
 
 def test_description_tells_objects_apart() -> None:
-    assert described(SOFA) != described(moved(SOFA, LATTICE, (5, 5)))
+    (use,) = SOFA.uses
+    others = [
+        moved(SOFA, LATTICE, (5, 5)),
+        replace(SOFA, heading=1.5),
+        replace(SOFA, blocks="sight"),
+        replace(SOFA, uses=()),
+        replace(SOFA, uses=(replace(use, approach=(3.0, 1.5)),)),
+    ]
+    assert all(described(SOFA) != described(other) for other in others)

@@ -10,8 +10,15 @@ from tests.scenes import flat_path
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.floorplan.costmap import CostmapSettings, cells_within, costs_of, route_by_cost
+from fleet2d.floorplan.costmap import (
+    CostedSpace,
+    CostmapSettings,
+    cells_within,
+    costs_of,
+    route_by_cost,
+)
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels.mesh import locate
@@ -151,3 +158,82 @@ def test_wrong_settings_are_an_error_that_names_the_key(
 ) -> None:
     with pytest.raises(InputError, match=f"floorplan.costmap.{why}"):
         fleet2d.load_scenario(None, floorplan={"type": "bundled", "costmap": settings})
+
+
+def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
+    """Return the parts of a set of cells, by walking from side to side, the largest first."""
+    parts, left = [], set(open_cells)
+    while left:
+        waiting = [left.pop()]
+        part = set(waiting)
+        while waiting:
+            row, column = waiting.pop()
+            for other in (
+                (row + 1, column),
+                (row - 1, column),
+                (row, column + 1),
+                (row, column - 1),
+            ):
+                if other in left:
+                    left.remove(other)
+                    part.add(other)
+                    waiting.append(other)
+        parts.append(part)
+    return sorted(parts, key=lambda part: (-len(part), min(part)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_costed_space_is_what_a_walk_over_its_cells_says(seed: int) -> None:
+    plan = fleet2d.load_floorplan(flat_path())
+    base = Home(plan).space(0.15)
+    rng = np.random.default_rng(seed)
+    costs = rng.integers(0, 300, plan.free.shape)
+    for row, column in rng.choice(np.argwhere(plan.free), 12):  # bars across the home
+        costs[row : row + 3, column : column + 40] = -1
+    closed = np.argwhere(costs < 0)
+    cells = {
+        (row, column)
+        for row, column in np.argwhere(base.part_of_cell >= 0).tolist()
+        if ((closed - (row, column)) ** 2).sum(axis=1).min() > (0.15 / 0.05 + 0.5) ** 2
+    }
+    expected = flooded(cells)
+
+    space = CostedSpace(base, costs)
+
+    assert len(expected) == space.parts
+    for number, part in enumerate(expected):
+        assert part == {tuple(cell) for cell in space.cells(None, number).tolist()}
+    chosen = [sorted(cells)[i] for i in rng.choice(len(cells), 12)]
+    for (a, b), (c, d) in zip(chosen[:6], chosen[6:], strict=True):
+        start, goal = plan.lattice.cell_centre(a, b), plan.lattice.cell_centre(c, d)
+        way = space.route(start, goal)
+        assert (space.part_at(*start) == space.part_at(*goal)) == (way is not None)
+        if way is not None:
+            assert (start, goal) == (tuple(way[0].tolist()), tuple(way[-1].tolist()))
+
+
+def test_costed_space_is_another_only_when_the_costs_are() -> None:
+    home = Home(fleet2d.load_floorplan(flat_path()))
+    base = home.space(0.15)
+    assert home.costed(base) is base
+    assert 0 == home.costs_version
+
+    layer = home.layers.add_layer("costmap", LayerSettings(dtype="int32", store=False))
+    space = home.costed(base)
+    layer.values[0, 0] = 0
+    assert (space, 1) == (home.costed(base), home.costs_version)
+    layer.values[30, 30] = 7
+    assert home.costed(base) is not space
+    assert 2 == home.costs_version
+
+
+def test_furniture_costs_as_walls_do() -> None:
+    settings = CostmapSettings(clearance=0.5, wall_cost=200, no_go="ignore")
+    costs = costs_of(HALL, settings, [shapely.box(2.5, 1.5, 3.5, 2.5)])
+    beside, farther, far = (
+        int(costs[HALL.lattice.cell_of(*at(HALL, x, 2.0))]) for x in (3.53, 3.78, 4.2)
+    )
+
+    assert 160 <= beside <= 200
+    assert 80 <= farther <= 120
+    assert 0 == far

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from shapely import Polygon
 
+from fleet2d.floorplan.division import MOST_CORNERS
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.kernels.masks import label_parts
@@ -190,3 +191,14 @@ def test_segments_of_a_robot_keep_their_rooms_and_get_doorways(shared_data: Path
     } == {tuple(plan.rooms[r].name for r in sorted(d.rooms)) for d in plan.doorways} | {
         ("Master Bedroom", "Entrance"),
     }
+
+
+def test_rooms_of_walls_with_very_many_corners_are_those_of_the_plain_walls() -> None:
+    free = space(LEFT, RIGHT, DOOR)
+    dense = shapely.segmentize(free, 0.002)
+    rough = shapely.transform(dense, lambda xy: xy + 0.0008 * (np.arange(len(xy)) % 2)[:, None])
+    plans = [FloorPlan.build("home", f, doorways=None, regions_are="none") for f in (free, rough)]
+
+    assert len(plans[1].mesh.vertices) > MOST_CORNERS
+    assert areas(plans[0]) == pytest.approx(areas(plans[1]), abs=0.11)
+    assert 1 == len(plans[0].doorways) == len(plans[1].doorways)

@@ -86,3 +86,9 @@ def test_too_large_a_plan_is_refused_with_a_cell_that_works() -> None:
 def test_bounds_that_are_not_finite_are_refused() -> None:
     with pytest.raises(FloorPlanError, match="not finite"):
         Lattice.around((0, 0, float("nan"), 1), 0.05)
+
+
+def test_lattice_of_more_cells_than_fit_in_memory_is_refused_with_a_cell_that_fits() -> None:
+    with pytest.raises(FloorPlanError, match=r"81 million.*set floorplan.cell to 0.06 or more"):
+        Lattice.around((0.0, 0.0, 450.0, 450.0), 0.05)
+    assert Lattice.around((0.0, 0.0, 450.0, 450.0), 0.06).columns > 7000

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.synthetic.source import Synthetic
 
 # How many rooms the file has (None: it names none), and its free space without specks [m2].
 MAPS = {
@@ -51,3 +53,9 @@ def test_named_rooms_have_the_areas_that_the_file_states(shared_data: Path, file
 
     found = {room.name: room.area_m2 for room in plan.rooms if room.name != "unknown_0"}
     assert {name: pytest.approx(area / 100**2, abs=0.011) for name, area in stated.items()} == found
+
+
+def test_synthetic_home_is_named_by_its_seed() -> None:
+    assert Synthetic(seed=7).load() == load_floorplan("synthetic:7")
+    with pytest.raises(FloorPlanError, match=r"synthetic:0, synthetic:1"):
+        load_floorplan("synthetic7")

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from tests.reference.chambers import nearest_labels
 
 from fleet2d.floorplan.mesh import build_mesh
-from fleet2d.kernels.chambers import see_each, spread_labels
+from fleet2d.kernels.chambers import fill_beside, label_frames, see_each, spread_labels
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
 
@@ -39,3 +39,35 @@ def test_pairs_see_each_other_as_one_by_one() -> None:
     ]
 
     assert expected == see_each(mesh, eyes, places).tolist()
+
+
+@given(labelled())
+def test_frames_are_the_boxes_of_the_cells_of_each_label(
+    drawn: tuple[NDArray[np.int32], NDArray[np.bool_]],
+) -> None:
+    labels, _ = drawn
+    frames = label_frames(labels, 4)
+
+    for label in range(4):
+        cells = np.argwhere(labels == label)
+        if len(cells):
+            expected = [*cells.min(axis=0), *(cells.max(axis=0) + 1)]
+            assert expected == frames[label].tolist()
+        else:
+            assert (frames[label, :2] > frames[label, 2:]).all()
+
+
+@given(labelled())
+def test_cells_without_a_label_take_the_first_that_touches_them(
+    drawn: tuple[NDArray[np.int32], NDArray[np.bool_]],
+) -> None:
+    labels = np.pad(drawn[0], 1, constant_values=-1).astype(np.int16)
+    around = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
+
+    expected = labels.copy()
+    for row, column in np.argwhere(labels[1:-1, 1:-1] < 0) + 1:
+        near = (int(labels[row + up, column + east]) for up, east in around)
+        expected[row, column] = next((label for label in near if label >= 0), -1)
+    expected[[0, -1]] = expected[:, [0, -1]] = -1
+
+    assert np.array_equal(expected[1:-1, 1:-1], fill_beside(labels)[1:-1, 1:-1])

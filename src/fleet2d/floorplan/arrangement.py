@@ -42,8 +42,8 @@ def number_objects(objects: Sequence[PlacedObject]) -> tuple[PlacedObject, ...]:
 def described(thing: PlacedObject) -> list[Any]:
     """Return what an object is, as plain JSON data."""
     corners = shapely.get_coordinates(thing.footprint).tolist()
-    uses = [[use.x, use.y, use.heading, use.posture] for use in thing.uses]
-    return [thing.name, thing.type, corners, thing.blocks, uses]
+    uses = [[use.x, use.y, use.heading, use.posture, use.approach] for use in thing.uses]
+    return [thing.name, thing.type, corners, thing.blocks, thing.heading, uses]
 
 
 def moved(thing: PlacedObject, lattice: Lattice, to: Point, turn_deg: float = 0.0) -> PlacedObject:

@@ -31,6 +31,11 @@ HALLWAY_ROOMS = 3
 HALLWAY_MAX_M2 = 25.0
 """Space that no label covers is a hallway where one gets from it to so many rooms; if it is larger
 than this, more is done in it than walking through."""
+MOST_CORNERS = 6_000
+"""The search for passages looks at pairs of corners: where there are more, as in a scan with a
+point each millimetre, it looks at walls that are straightened …"""
+STRAIGHTENED_M = (0.01, 0.02, 0.04, 0.08, 0.16)
+"""… by at most so much: the least that leaves few enough corners, or the last."""
 ISLAND_M, WALL_M, THICK_M = 3.0, 1.2, 0.25
 """What stands free is a column or furniture, and no wall, if it is shorter than the first; or than
 the second if it is as thin as a wall, which is at most the third."""
@@ -56,6 +61,7 @@ def survey(
     walls = [_without_islands(polygon, lattice.units_per_m) for polygon in polygons]
     if len(walls) > 1:  # one may lie in what was an island of another
         walls = shapely.orient_polygons(shapely.get_parts(shapely.union_all(walls))).tolist()
+    walls = _with_few_corners(walls, lattice.units_per_m)
     mesh = build_mesh(walls, lattice.columns, lattice.rows)
     passages = find_passages(mesh, walls, lattice.units_per_m, gaps_only=kind != "none")
     lines = [_line(lattice, passage.segment) for passage in passages]
@@ -77,6 +83,17 @@ def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
     large = length >= np.where(thickness <= THICK_M, WALL_M, ISLAND_M)
     holes = [hole for hole, kept in zip(polygon.interiors, large, strict=True) if kept]
     return Polygon(polygon.exterior, holes)
+
+
+def _with_few_corners(walls: list[Polygon], units_per_m: float) -> list[Polygon]:
+    """Return the walls, straightened where they have very many corners."""
+    found, shape = walls, shapely.MultiPolygon(walls)
+    for tolerance in STRAIGHTENED_M:
+        if shapely.get_num_coordinates(found).sum() <= MOST_CORNERS:
+            break
+        simple = shapely.simplify(shape, tolerance * units_per_m)
+        found = shapely.orient_polygons(shapely.get_parts(simple)).tolist()
+    return found
 
 
 def divide(

@@ -41,6 +41,7 @@ STUB_M = (0.15, 0.3, 0.45)
 """How far beyond the ends of an opening there must be wall: it is a gap in one."""
 ASIDE_M = 0.06
 """How far beside that line the wall may be found."""
+SIDEWAYS = (-1, 0, 1)
 TINY = 1e-9
 PER_CORNER = 6
 """The shortest of so many passages that could end at a corner are looked at."""
@@ -222,15 +223,16 @@ def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.
     for offset in OFFSETS_M:
         behind = middle + np.rint(away * (offset * units_per_m)).astype(np.int64)
         waiting = waiting[see_each(mesh, middle[waiting], behind[waiting])]
-        wider = np.zeros(len(waiting))
-        for direction in (1, -1):
-            reach = np.zeros(len(waiting))
-            for step in WIDENINGS_M:
-                target = along * (length / 2 + step * units_per_m)[:, None] * direction
-                there = behind + np.rint(target).astype(np.int64)
-                seen = see_each(mesh, behind[waiting], there[waiting])
-                reach = np.where(seen, step, reach)
-            wider += reach
+        targets = [
+            along[waiting] * (length[waiting] / 2 + step * units_per_m)[:, None] * direction
+            for direction in (1, -1)
+            for step in WIDENINGS_M
+        ]
+        # One line after the other, so that its eye is looked up once.
+        eyes = np.repeat(behind[waiting], len(targets), axis=0)
+        there = eyes + np.rint(np.stack(targets, axis=1).reshape(-1, 2)).astype(np.int64)
+        seen = see_each(mesh, eyes, there).reshape(-1, 2, len(WIDENINGS_M))
+        wider = np.where(seen, WIDENINGS_M, 0.0).max(axis=2).sum(axis=1)
         enough = wider >= needed[waiting] - TINY
         opens[waiting[enough]] = True
         waiting = waiting[~enough]
@@ -247,13 +249,13 @@ def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> NDA
     corners = _keys(walls.start[walls.reflex].astype(np.int64))
     for end, outwards in ((lines[:, :2], -along), (lines[:, 2:], along)):
         found = ~np.isin(_keys(end), corners)
-        for sideways in (-1, 0, 1):
-            walled = np.ones(len(lines), np.bool_)
-            for beyond in STUB_M:
-                shift = outwards * beyond + sideways * aside
-                place = end + np.rint(shift).astype(np.int64)
-                walled &= ~see_each(mesh, place, place)  # in free space a place sees itself
-            found |= walled
+        shifts = [
+            outwards * beyond + sideways * aside for sideways in SIDEWAYS for beyond in STUB_M
+        ]
+        places = (end + np.rint(np.stack(shifts)).astype(np.int64)).reshape(-1, 2)
+        seen = see_each(mesh, places, places)  # in free space a place sees itself
+        walled = ~seen.reshape(len(SIDEWAYS), len(STUB_M), len(lines))
+        found |= walled.all(axis=1).any(axis=0)
         fine &= found
     fine |= length <= MAX_DOOR_M * units_per_m
     return fine

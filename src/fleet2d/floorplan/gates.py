@@ -89,6 +89,8 @@ def _force_edge(
     b: int,
 ) -> None:
     """Flip the edges that cross a segment until it is an edge itself (Sloan 1993)."""
+    if (a, b) in owner and (b, a) in owner:
+        return
     crossing = _crossing(vertices, owner, a, b)
     patience = 16 * (len(crossing) + 1) ** 2
     while crossing:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import shapely
 from pydantic import Field
 from shapely import MultiPolygon, Point, Polygon
@@ -281,6 +282,12 @@ def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     return () if kind == UNKNOWN else (use,), kind
 
 
+def _moved(move: Move, x: float, y: float) -> tuple[float, float]:
+    """Return a place of the file in the frame of the plan [m]."""
+    there_x, there_y = move(np.array([[x, y]]))[0].tolist()
+    return there_x, there_y
+
+
 def _placed(feature: Feature, move: Move) -> Iterable[PlacedObject]:
     shape, properties, where = feature.shape, feature.properties, f"{feature.where}.properties"
     if isinstance(shape, Point):
@@ -291,8 +298,9 @@ def _placed(feature: Feature, move: Move) -> Iterable[PlacedObject]:
     (heading,) = read_numbers([properties.get("heading") or 0.0], 1, f"{where}.heading")
     uses = []
     for use in read_uses(properties.get("uses") or [], f"{where}.uses"):
-        x, y = move(shapely.get_coordinates(shapely.Point(use.x, use.y)))[0].tolist()
-        uses.append(replace(use, x=x, y=y, approach=None))
+        x, y = _moved(move, use.x, use.y)
+        approach = None if use.approach is None else _moved(move, *use.approach)
+        uses.append(replace(use, x=x, y=y, approach=approach))
     name, parts = feature.text("name") or "", _parts(shape)
     for number, part in enumerate(parts):
         own = f"{name} {number + 1}" if name and len(parts) > 1 else name

@@ -8,12 +8,14 @@ from typing import Self
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.doorways import Doorway
 from fleet2d.floorplan.gates import Gates, Segment
-from fleet2d.floorplan.layers import Layers
+from fleet2d.floorplan.layers import COSTMAP, Layers
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
@@ -62,6 +64,11 @@ class Home:
         self._shapes = _Shapes(plan, [self.door_line(door) for door in range(len(self.doors))])
         self._walls: tuple[int, Mesh] = (-1, plan.mesh)
         self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
+        # The costs as they were when last asked for, how often they were others than before, and
+        # the spaces of bodies that mind them.
+        self._costs: NDArray[np.int32] = np.zeros((0, 0), np.int32)
+        self._costs_version = 0
+        self._costed: dict[Space, CostedSpace] = {}
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return a home that changes on its own; what it worked out so far is shared."""
@@ -87,6 +94,33 @@ class Home:
         """
         shut = self.shut & self.locked if opens_doors else self.shut
         return self._shapes.space(radius, shut, self.objects)
+
+    @property
+    def costs_version(self) -> int:
+        """Counts the changes of the layer `costmap`; 0 without one."""
+        if COSTMAP in self.layers:
+            values = self.layers[COSTMAP].values
+            if not np.array_equal(self._costs, values):
+                self._costs, self._costed = values.astype(np.int32), {}
+                self._costs_version += 1
+        return self._costs_version
+
+    @property
+    def hinders(self) -> bool:
+        """Whether ways may be closed at present that are open at other times."""
+        return bool(self.shut) or self.costs_version > 1
+
+    def costed(self, space: Space) -> Space:
+        """Return what a space is to a body that minds the costmap: itself without one.
+
+        Raises:
+            FloorPlanError: The costmap leaves no place to be.
+        """
+        if self.costs_version == 0:
+            return space
+        if space not in self._costed:
+            self._costed[space] = CostedSpace(space, self._costs)
+        return self._costed[space]
 
     def door_line(self, door: int) -> Segment:
         """Return where a door is when shut [lattice]."""

@@ -160,7 +160,7 @@ def _round(slices: list[slice], start: int) -> slice:
 
 def _split(before: Bool, after: Bool, pocket: int) -> bool:
     """Tell whether a part of a mask was cut in two, or lost although larger than a pocket."""
-    old, new = label_parts(before, False), label_parts(after, False)
+    old, new = (label_parts(np.ascontiguousarray(mask), False) for mask in (before, after))
     parts = int(old.max()) + 1
     whose, now = old[after], new[after]
     becomes = np.full(parts, -1, np.int64)

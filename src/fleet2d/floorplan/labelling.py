@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fleet2d.floorplan.chambers import Chambers
 from fleet2d.floorplan.regions import Patch
-from fleet2d.kernels.chambers import spread_labels
+from fleet2d.kernels.chambers import label_frames, spread_labels
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
 
@@ -77,7 +77,7 @@ def label_chambers(
         wide: Whether each line that the chambers were cut at is an opening, and no doorway.
         cell: Side of a cell [m].
     """
-    frames = _frames(chambers.of_cell, chambers.count)
+    frames = label_frames(chambers.of_cell, chambers.count)
     claims, lost = _claims(chambers, frames, boxes, wide, cell)
     blocks = _blocks(chambers, claims, wide, cell)
     out = np.full(chambers.of_cell.shape, -1, np.int32)
@@ -145,18 +145,6 @@ def _too_small(box: Patch, cell: float) -> bool:
     row, column, end_row, end_column = box.frame.tolist()
     narrow = min(end_row - row, end_column - column) * cell < MIN_ROOM_WIDTH_M
     return narrow or box.cells * cell**2 < MIN_ROOM_M2
-
-
-def _frames(labels: I32, count: int) -> I64:
-    """Return the first row, first column, last row and last column, plus one, of each label."""
-    rows, columns = np.nonzero(labels >= 0)
-    found = labels[rows, columns]
-    frames = np.empty((count, 4), np.int64)
-    frames[:, :2], frames[:, 2:] = np.iinfo(np.int32).max, 0
-    for axis, values in enumerate((rows, columns)):
-        np.minimum.at(frames[:, axis], found, values)
-        np.maximum.at(frames[:, 2 + axis], found, values + 1)
-    return frames
 
 
 def _overlaps(frame: I64, frames: I64) -> NDArray[np.float64]:

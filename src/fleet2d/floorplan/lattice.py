@@ -18,6 +18,9 @@ MAX_CELL_M = 1.0
 # Products of three coordinates must stay inside int64: the sight kernels rely on this bound.
 COORDINATE_LIMIT = 2**20
 
+# A floor plan takes 30 bytes a cell while its rooms are found: 2 GB for so many.
+MAX_CELLS = 2**26
+
 
 @dataclass(frozen=True)
 class Lattice:
@@ -55,6 +58,15 @@ class Lattice:
                 f" {self.cell:g} m (at most {COORDINATE_LIMIT // UNITS_PER_CELL - 1} cells a side):"
                 f" set floorplan.cell to {_smallest_cell(max(width, height)):g} or more,"
                 " and check that the file is in metres"
+            )
+        if self.columns * self.rows > MAX_CELLS:
+            width, height = self.columns * self.cell, self.rows * self.cell
+            fits = math.ceil(100 * math.sqrt(width * height / MAX_CELLS)) / 100
+            millions, most = self.columns * self.rows / 1e6, MAX_CELLS / 1e6
+            raise FloorPlanError(
+                f"the floor plan is {width:.0f} m x {height:.0f} m: {millions:.0f} million cells of"
+                f" {self.cell:g} m, more than fit in 2 GB of memory (at most {most:.0f} million):"
+                f" set floorplan.cell to {fits:g} or more, and check that the file is in metres"
             )
 
     @classmethod

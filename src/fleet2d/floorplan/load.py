@@ -1,5 +1,9 @@
-"""Read a floor plan from whatever names one: a file of a known format, or a bundled home."""
+"""Read a floor plan from whatever names one: a file of a known format, or a home of this project.
 
+A home of this project is a bundled one, or a synthetic one by its seed, `synthetic:7`.
+"""
+
+import re
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +24,7 @@ from fleet2d.problems import did_you_mean
 USUAL_CELL_M = 0.05
 IMAGES = (".pgm", ".png")
 JSON = (".json", ".geojson")
+SYNTHETIC = re.compile(r"synthetic:(0|[1-9][0-9]{0,17})", re.ASCII)
 
 
 def load_floorplan(
@@ -28,7 +33,8 @@ def load_floorplan(
     """Read a floor plan.
 
     Args:
-        plan: A file, whose content tells its format, or the name of a bundled home.
+        plan: A file, whose content tells its format, the name of a bundled home, or `synthetic:`
+            and the seed of a synthetic one.
         cell: Side of a grid cell [m]; None for 0.05, or for what is made of pixels their side.
         resolution: Side of a pixel [m], of a picture that no YAML file goes with.
 
@@ -47,10 +53,16 @@ def load_floorplan(
         raise FloorPlanError(f"{plan} is no picture: its file says how large things are in it")
     if str(plan) in names:
         return read_native(HOMES / f"{plan}.json", usual)
+    seed = SYNTHETIC.fullmatch(str(plan))
+    if seed is not None:
+        from fleet2d.floorplan.synthetic.source import Synthetic
+
+        return Synthetic(seed=int(seed[1]), cell=usual).load()
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
-            f"there is no floor plan file {plan!r}, and no bundled home of that name"
-            f"{did_you_mean(plan, names)} Bundled homes: {', '.join(names)}"
+            f"there is no floor plan file {str(plan)!r}, and no bundled home of that name"
+            f"{did_you_mean(plan, names)} Bundled homes: {', '.join(names)}; synthetic ones:"
+            " synthetic:0, synthetic:1, …"
         )
     content = read_document(path)
     kind = _format_of(content)
@@ -73,12 +85,13 @@ def load_floorplan(
 def is_floorplan(plan: str | Path) -> bool:
     """Whether a name or a file is meant for a floor plan, readable or not; a scenario is not.
 
-    >>> is_floorplan("family_home"), is_floorplan("plan.json"), is_floorplan("scenario.yaml")
-    (True, True, False)
+    >>> [is_floorplan(name) for name in ("family_home", "synthetic:7", "plan.json", "run.yaml")]
+    [True, True, True, False]
     """
     path = Path(plan)
     if path.suffix.lower() not in YAML:
-        return str(plan) in bundled_names() or path.suffix.lower() in (*JSON, *IMAGES)
+        own = str(plan) in bundled_names() or SYNTHETIC.fullmatch(str(plan)) is not None
+        return own or path.suffix.lower() in (*JSON, *IMAGES)
     try:
         content = read_yaml(path)
     except FloorPlanError:

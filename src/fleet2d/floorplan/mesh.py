@@ -159,18 +159,20 @@ def _split_at_touching_vertices(polygons: list[list[Int64]]) -> list[list[Int64]
 
 def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]:
     """Insert every one of some points that lies in the middle of a wall into that wall."""
+    tree = shapely.STRtree(np.asarray(shapely.points(vertices)))
 
     def split(ring: Int64) -> Int64:
-        points = []
-        for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-            along, offsets = end - start, vertices - start
-            distances = offsets @ along
-            on_line = along[0] * offsets[:, 1] == along[1] * offsets[:, 0]
-            between = on_line & (distances > 0) & (distances < along @ along)
-            inserted = np.flatnonzero(between)
-            order = np.argsort(distances[inserted], kind="stable")
-            points += [start[None], vertices[inserted[order]]]
-        return np.concatenate(points)
+        ends = np.roll(ring, -1, axis=0)
+        boxes = shapely.box(*np.minimum(ring, ends).T, *np.maximum(ring, ends).T)
+        wall, near = tree.query(np.asarray(boxes))
+        along, offsets = (ends - ring)[wall], vertices[near] - ring[wall]
+        distances = (offsets * along).sum(axis=1)
+        on_line = along[:, 0] * offsets[:, 1] == along[:, 1] * offsets[:, 0]
+        between = on_line & (distances > 0) & (distances < (along * along).sum(axis=1))
+        inserted = np.flatnonzero(between)
+        order = inserted[np.lexsort((distances[inserted], wall[inserted]))]
+        result: Int64 = np.insert(ring, wall[order] + 1, vertices[near[order]], axis=0)
+        return result
 
     return [[split(ring) for ring in rings] for rings in polygons]
 

@@ -17,8 +17,9 @@ from fleet2d.floorplan.adjacency import RoomLink, room_links
 from fleet2d.floorplan.arrangement import described, number_objects
 from fleet2d.floorplan.division import Regions, Survey, divide, found_doorways, survey
 from fleet2d.floorplan.doorways import DoorLine, Doorway, fit_lines, name_doorways
+from fleet2d.floorplan.free_space import free_on_lattice, in_order, part_notes
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.floorplan.mesh import GRID, Snapped, build_mesh, snap_polygon
+from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, beside_rooms
 from fleet2d.floorplan.vocabulary import room_type
@@ -26,12 +27,6 @@ from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.problems import did_you_mean
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
-
-# A free space with more parts than this gets no list of their sizes in its notes.
-PARTS_LISTED = 5
-
-# Lattice units within which a coordinate read from decimals counts as on the lattice.
-ON_WALL = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,13 +112,13 @@ class FloorPlan:
             FloorPlanError: There is no free space at this cell size, it would lose more of its area
                 than rounding explains, it is too large, or the entrance is not in it.
         """
-        lattice, polygons = _snapped(name, free, cell)
+        lattice, polygons = free_on_lattice(name, free, cell)
         lines = list(doorways or ())
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
         passages: Survey | None = None
         if doorways is None or regions_are != "exact":
             polygons, passages = survey(lattice, polygons, regions_are)
-        polygons = _in_order(polygons)
+        polygons = in_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         cells: NDArray[np.bool_] = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0
         if not cells.any():
@@ -153,7 +148,7 @@ class FloorPlan:
             doorways=name_doorways(lattice, beside_rooms(room_of_cell), names, fitted),
             objects=number_objects(objects),
             no_go=tuple(no_go),
-            notes=(*notes, *_part_notes(lattice, polygons), *room_notes, *door_notes),
+            notes=(*notes, *part_notes(lattice, polygons), *room_notes, *door_notes),
             regions=tuple(regions),
             lost_doorways=tuple(
                 line for line, at in zip(lines, segments, strict=True) if at is None
@@ -353,61 +348,3 @@ class FloorPlan:
 def rings(polygon: Polygon) -> list[shapely.LinearRing]:
     """Return the rings of a polygon, the outer one first."""
     return [polygon.exterior, *polygon.interiors]
-
-
-def _snapped(name: str, free: Polygon | MultiPolygon, cell: float) -> tuple[Lattice, list[Polygon]]:
-    """Put free space [m] on the lattice; in one order, so that the same walls are the same plan."""
-    if free.is_empty or not free.area > 0:
-        raise FloorPlanError(
-            f"the outline of {name} encloses no area: check that its points go round the free space"
-        )
-    first = Lattice.around(free.bounds, cell)
-    snapped = _on_walls(free, first.units_per_m)
-    if not snapped.polygons:
-        raise FloorPlanError(
-            f"nothing is left of {name} ({free.area:.3g} m2) at cells of {cell:g} m: choose a"
-            " smaller floorplan.cell, and check that the file is in metres"
-        )
-    if abs(snapped.area_change) > snapped.tolerance:
-        change = snapped.area_change / first.units_per_m**2
-        raise FloorPlanError(
-            f"rounding the walls of {name} to cells of {cell:g} m would change its area by"
-            f" {change:+.2f} of {free.area:.2f} m2: choose a smaller floorplan.cell, and check that"
-            " the outline doesn't run over itself"
-        )
-    # The lattice of the snapped walls, so that a plan and its stored copy agree.
-    corners = shapely.total_bounds(snapped.polygons) / first.units_per_m
-    lattice = Lattice.around(tuple(corners.tolist()), cell)
-    shift = lattice.to_lattice((0.0, 0.0))
-    moved = [shapely.transform(polygon, lambda xy: xy + shift) for polygon in snapped.polygons]
-    return lattice, _in_order(moved)
-
-
-def _in_order(polygons: Sequence[Polygon]) -> list[Polygon]:
-    """Return polygons and their rings in one order, however they came about."""
-    canonical = shapely.orient_polygons(shapely.normalize(polygons))
-    return sorted(canonical.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
-
-
-def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:
-    """Move free space [m] to where walls may stand; what stands there already is not touched.
-
-    Snapping is not idempotent (a wall that moves may come near another corner), and a stored plan
-    must come back as it was.
-    """
-    exact = shapely.transform(free, lambda xy: xy * units_per_m)
-    even = shapely.transform(exact, lambda xy: 2 * np.rint(xy / 2))
-    moved = np.abs(shapely.get_coordinates(even) - shapely.get_coordinates(exact)).max()
-    if moved < ON_WALL and even.is_valid:
-        parts = shapely.get_parts(even)
-        return Snapped(parts.tolist(), even.area - exact.area, GRID * exact.length)
-    return snap_polygon(exact)
-
-
-def _part_notes(lattice: Lattice, polygons: list[Polygon]) -> list[str]:
-    if len(polygons) == 1:
-        return []
-    areas = sorted((p.area / lattice.units_per_m**2 for p in polygons), reverse=True)
-    sizes = ", ".join(f"{area:.2f}" for area in areas[:PARTS_LISTED])
-    more = ", …" if len(areas) > PARTS_LISTED else ""
-    return [f"the free space is in {len(areas)} parts that nothing joins: {sizes}{more} m2"]

@@ -253,7 +253,7 @@ def _bounds(plan: FloorPlan, room: Room) -> tuple[slice, slice]:
 
 def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
     """Return the connected part of a mask with the most cells, of those `within` if given."""
-    part = label_parts(mask, False)
+    part = label_parts(np.ascontiguousarray(mask), False)
     sizes = np.bincount(part[mask if within is None else mask & within], minlength=1)
     largest: Bool = mask & (part == int(np.argmax(sizes)))
     return largest

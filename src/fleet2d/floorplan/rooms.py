@@ -12,6 +12,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.regions import LabelledRegion, Region, paint_regions, snap_regions
 from fleet2d.floorplan.vocabulary import UNKNOWN
+from fleet2d.kernels.chambers import fill_beside, label_frames
 from fleet2d.kernels.fields import squared_distance as squared_distance_kernel
 
 __all__ = ["NO_ROOM", "LabelledRegion", "Room", "assign_rooms", "beside_rooms", "make_rooms"]
@@ -93,9 +94,9 @@ def make_rooms(
     index_of[kept] = np.arange(len(kept))
     room_of_cell = index_of[painted]
     names = _names([merged[k] for k in kept])
-    boxes = _cell_boxes(room_of_cell, len(kept))
+    frames = label_frames(room_of_cell.astype(np.int32), len(kept))
     rooms = tuple(
-        _room(lattice, room_of_cell, boxes[i], i, names[i], merged[k]) for i, k in enumerate(kept)
+        _room(lattice, room_of_cell, frames[i], i, names[i], merged[k]) for i, k in enumerate(kept)
     )
     return room_of_cell, rooms
 
@@ -117,35 +118,21 @@ def _names(regions: list[Region]) -> list[str]:
     return names
 
 
-def _cell_boxes(room_of_cell: NDArray[np.int16], count: int) -> NDArray[np.int64]:
-    """Return the first row, first column, last row, last column of each room, (count, 4)."""
-    rows, columns = np.nonzero(room_of_cell != NO_ROOM)
-    rooms = room_of_cell[rows, columns]
-    boxes = np.empty((count, 4), np.int64)
-    boxes[:, :2] = np.iinfo(np.int64).max
-    boxes[:, 2:] = -1
-    np.minimum.at(boxes[:, 0], rooms, rows)
-    np.minimum.at(boxes[:, 1], rooms, columns)
-    np.maximum.at(boxes[:, 2], rooms, rows)
-    np.maximum.at(boxes[:, 3], rooms, columns)
-    return boxes
-
-
 def _room(
     lattice: Lattice,
     room_of_cell: NDArray[np.int16],
-    box: NDArray[np.int64],
+    frame: NDArray[np.int64],
     index: int,
     name: str,
     region: Region,
 ) -> Room:
-    row0, column0, row1, column1 = (int(v) for v in box)
-    inside = room_of_cell[row0 : row1 + 1, column0 : column1 + 1] == index
+    row0, column0, row1, column1 = frame.tolist()
+    inside = room_of_cell[row0:row1, column0:column1] == index
     depth = squared_distance_kernel(np.pad(inside, 1))
     deepest = np.unravel_index(np.argmax(depth), depth.shape)  # the first of equals
     row, column = row0 + int(deepest[0]) - 1, column0 + int(deepest[1]) - 1
     x, y = lattice.to_metres(lattice.cell_centre(row, column)).tolist()
-    corners = np.array([(column0, row0), (column1 + 1, row1 + 1)]) * UNITS_PER_CELL
+    corners = np.array([(column0, row0), (column1, row1)]) * UNITS_PER_CELL
     (x0, y0), (x1, y1) = lattice.to_metres(corners).tolist()
     cells = int(np.count_nonzero(inside))
     return Room(
@@ -179,9 +166,5 @@ def beside_rooms(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
     First of a neighbor to the side, then of one across a corner; west before east, south before
     north.
     """
-    filled = room_of_cell.copy()
-    sides, corners = ((0, -1), (0, 1), (-1, 0), (1, 0)), ((-1, -1), (-1, 1), (1, -1), (1, 1))
-    for row, column in (*sides, *corners):
-        shifted = np.roll(room_of_cell, (-row, -column), axis=(0, 1))  # the margin is never free
-        filled = np.where(filled == NO_ROOM, shifted, filled)
-    return filled.astype(np.int16)
+    filled: NDArray[np.int16] = fill_beside(room_of_cell)
+    return filled

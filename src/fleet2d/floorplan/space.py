@@ -110,6 +110,11 @@ class Space:
             return -1
         return int(self._part_of_triangle[locate(self.mesh, x, y)])
 
+    def part_near(self, x: int, y: int) -> int:
+        """Return the part for a body that stands where it can't be: the nearest one."""
+        near = self.nearest(x, y)
+        return 0 if near is None else self.part_at(*near)
+
     def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
         """Return the cells (n, 2) as (row, column) of a part of the space, in one room if given."""
         mask = self.part_of_cell == part

@@ -34,6 +34,68 @@ def see_each(mesh: Mesh, eyes: NDArray[np.int64], places: NDArray[np.int64]) -> 
 
 
 @kernel
+def label_frames(labels: NDArray[np.int32], count: int) -> NDArray[np.int64]:
+    """Return the smallest box of cells around each label.
+
+    Args:
+        labels: int32 (rows, columns), below `count`, -1 for none.
+        count: How many labels there are.
+
+    Returns:
+        First row, first column, last row and last column, plus one, int64 (count, 4); of a label
+        without cells first ones beyond the last.
+    """
+    rows, columns = labels.shape
+    frames = np.zeros((count, 4), np.int64)
+    frames[:, :2] = max(rows, columns)
+    for row in range(rows):
+        for column in range(columns):
+            label = labels[row, column]
+            if label >= 0:
+                frames[label, 0] = min(frames[label, 0], row)
+                frames[label, 1] = min(frames[label, 1], column)
+                frames[label, 2] = row + 1
+                frames[label, 3] = max(frames[label, 3], column + 1)
+    return frames
+
+
+@kernel
+def fill_beside(labels: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Give cells without a label that of a cell that touches them.
+
+    First of one across a side, then of one across a corner; west before east, south before north.
+
+    Args:
+        labels: int16 (rows, columns), -1 for none.
+
+    Returns:
+        Labels, int16 (rows, columns).
+    """
+    rows, columns = labels.shape
+    filled = labels.copy()
+    for row in range(rows):
+        for column in range(columns):
+            if labels[row, column] != NO_LABEL:
+                continue
+            best = 8
+            for near in range(max(row - 1, 0), min(row + 2, rows)):
+                for beside in range(max(column - 1, 0), min(column + 2, columns)):
+                    if labels[near, beside] == NO_LABEL:
+                        continue
+                    up, east = near - row, beside - column
+                    if up == 0:
+                        rank = 0 if east < 0 else 1
+                    elif east == 0:
+                        rank = 2 if up < 0 else 3
+                    else:
+                        rank = 5 + up + (1 if east > 0 else 0)
+                    if rank < best:
+                        best = rank
+                        filled[row, column] = labels[near, beside]
+    return filled
+
+
+@kernel
 def spread_labels(labels: NDArray[np.int32], mask: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Give every cell of a mask that has no label the nearest one, in steps across sides.
 

@@ -26,7 +26,7 @@ class Synthetic(FloorPlanSource):
 
     Attributes:
         seed: Which of the homes.
-        area_m2: Area of its free space, 30 to 600 m².
+        area_m2: Area of its free space, 30 to 450 m².
         bedrooms: How many, 1 to 8.
         bathrooms: How many, 1 to 6.
         garage: Whether it has one.
@@ -43,7 +43,7 @@ class Synthetic(FloorPlanSource):
 
     seed: int = Field(default=0, ge=0, description="which of the homes")
     area_m2: float | None = Field(
-        default=None, ge=SMALLEST_M2, le=LARGEST_M2, description="free space, 30 to 600 m2"
+        default=None, ge=SMALLEST_M2, le=LARGEST_M2, description="free space, 30 to 450 m2"
     )
     bedrooms: int | None = Field(
         default=None, ge=1, le=MAX_ROOMS_OF_A_KIND, description="how many, 1 to 8"
