@@ -1,24 +1,38 @@
 """How true the people are: simulated time use beside the American Time Use Survey.
 
     python benchmarks/people.py compare [--people 1000] [--weeks 1] [--figure FILE] [--json FILE]
-    python benchmarks/people.py derive SURVEY_FOLDER      # writes routines/survey.json anew
+    python benchmarks/people.py rooms [--figure FILE]      # room_sampling: shares over time
+    python benchmarks/people.py speed [--users N]          # how long people take
+    python benchmarks/people.py derive SURVEY_FOLDER       # writes routines/survey.json anew
 
 `compare` draws the days of that many people of each group of `population`, and prints how far the
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
-the largest difference of each activity. `derive` makes the table that `population` draws from of
-the survey's summary files.
+the largest difference of each activity. `rooms` simulates a user who samples rooms and prints how
+far the shares of time are from the given ones after 1, 2, 4, … days. `speed` times the planning of
+days, the base month with a routine beside the one with a schedule (in processor time: other work
+on the machine doesn't count), and a month of N people. `derive` makes the table that `population`
+draws from of the survey's summary files.
 """
 
 import argparse
 import csv
 import json
+import math
+import resource
 import statistics
+import tempfile
+import time
 from collections import Counter, defaultdict
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+import fleet2d
 import fleet2d.routines.survey as survey
+from fleet2d.routines.life import Life
+from fleet2d.routines.persona import bundled, bundled_persona
 from fleet2d.streams import Draws, stream_key
 
 MONDAY = date(2026, 1, 5).toordinal()
@@ -196,6 +210,101 @@ def draw(found: list[dict[str, Any]], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
+SHARES = {"living_room": 0.4, "bedroom": 0.3, "kitchen": 0.15, "bathroom": 0.05, "away": 0.1}
+DWELL_S = 1800
+
+
+def rooms_over_time(days: int, seeds: int) -> list[tuple[int, float, float]]:
+    """Return days, the mean error of a share over rooms and seeds, and the one to be expected."""
+    errors = defaultdict(list)
+    for seed in range(seeds):
+        user = {"type": "room_sampling", "shares": SHARES}
+        stored = fleet2d.run(
+            {
+                "simulation": {"start": "2026-01-05", "duration": f"{days} d", "seed": seed},
+                "floorplan": {"type": "bundled"},
+                "users": {"ana": user},
+            }
+        )
+        kinds = np.array([room.type for room in stored.plan.rooms] + ["away"])
+        rooms = kinds[stored.path("ana", every=timedelta(minutes=1)).room]
+        for day in (2**k for k in range(days.bit_length())):
+            told = rooms[: day * 1440]
+            told = told[np.isin(told, list(SHARES))]
+            errors[day] += [(np.mean(told == room) - share) ** 2 for room, share in SHARES.items()]
+    spread = 1 + (2 / 3) ** 2
+    variance = statistics.mean(p * (1 - p) for p in SHARES.values()) * spread * DWELL_S / 86_400
+    return [
+        (day, math.sqrt(statistics.mean(squares)), math.sqrt(variance / day))
+        for day, squares in errors.items()
+    ]
+
+
+def draw_rooms(found: list[tuple[int, float, float]], path: Path) -> None:
+    """Draw the error of the shares over time."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6, 4))
+    days, errors, expected = zip(*found, strict=True)
+    axes.loglog(days, errors, "o-", label="simulated")
+    axes.loglog(days, expected, "--", label="standard error of independent visits")
+    axes.set(xlabel="days", ylabel="error of a room's share of time (root mean square)")
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def time_planning() -> None:
+    """Print how long the planning of a day takes."""
+    for name in bundled():
+        life = Life(bundled_persona(name), 4, "users.ana")
+        life.day(MONDAY - 1)
+        began = time.process_time()
+        for ordinal in range(MONDAY, MONDAY + 365):
+            life.day(ordinal)
+        print(f"a day of {name:<16} {(time.process_time() - began) / 0.365:6.3f} ms")
+
+
+def time_month(repeats: int = 5) -> None:
+    """Print how long the base month takes with a schedule, and with routines."""
+    best: dict[str, float] = {}
+    for turn in range(repeats + 1):
+        for who in ("schedule", *bundled()):
+            content = fleet2d.load_scenario("bundled:base").resolved()
+            if who != "schedule":
+                content["users"] = {"ana": {"type": "routine", "persona": who}}
+            with tempfile.TemporaryDirectory() as folder:
+                began = time.process_time()
+                fleet2d.run(content, out=f"{folder}/run")
+                took = time.process_time() - began
+            if turn:
+                best[who] = min(best.get(who, took), took)
+    for who, took in best.items():
+        more = took / best["schedule"] - 1
+        print(f"base month, {who:<16} {took:6.3f} s of processor time, {more:+.0%}")
+
+
+def time_crowd(users: int, days: int) -> None:
+    """Print how long so many people take, and how much memory."""
+    personas = bundled()
+    content = {
+        "simulation": {"start": "2026-01-05", "duration": f"{days} d", "seed": 4},
+        "floorplan": {"type": "bundled", "furnish": True},
+        "users": {
+            f"user_{i}": {"type": "routine", "persona": personas[i % len(personas)]}
+            for i in range(users)
+        },
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        began, cpu = time.perf_counter(), time.process_time()
+        fleet2d.run(content, out=f"{folder}/run")
+        took, cpu = time.perf_counter() - began, time.process_time() - cpu
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(
+        f"{users} users, {days} days: {took:.1f} s, {cpu:.1f} s of processor time, {memory:.2f} GB"
+    )
+
+
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(
@@ -209,7 +318,27 @@ def main() -> None:
     one.add_argument("--json", type=Path, help="write the rows to this file, too")
     two = commands.add_parser("derive")
     two.add_argument("folder", type=Path)
+    three = commands.add_parser("rooms")
+    three.add_argument("--days", type=int, default=64)
+    three.add_argument("--seeds", type=int, default=8)
+    three.add_argument("--figure", type=Path)
+    four = commands.add_parser("speed")
+    four.add_argument("--users", type=int, default=50)
+    four.add_argument("--days", type=int, default=30)
     arguments = parser.parse_args()
+    if arguments.command == "rooms":
+        rooms = rooms_over_time(arguments.days, arguments.seeds)
+        print("days   error of a share   to be expected")
+        for day, error, expected in rooms:
+            print(f"{day:>4}   {error:>16.4f}   {expected:>14.4f}")
+        if arguments.figure:
+            draw_rooms(rooms, arguments.figure)
+        return
+    if arguments.command == "speed":
+        time_planning()
+        time_month()
+        time_crowd(arguments.users, arguments.days)
+        return
     if arguments.command == "derive":
         survey.TABLE.write_text(written(derive(arguments.folder)), encoding="utf-8")
         return

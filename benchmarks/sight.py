@@ -1,12 +1,13 @@
-"""How long sight takes: regions, lines of sight, cells in view, and the seen area over a month.
+"""How long sight takes in homes: regions, lines of sight, cells in view; and what others take.
 
-    python benchmarks/sight.py [--data DIR] [--peers PEERS_PYTHON] [--json FILE] [--no-month]
+    python benchmarks/sight.py [--data DIR] [--peers PEERS_PYTHON] [--json FILE]
 
 Everything runs on one core; times are the best of several runs in this process, compiling left out.
 DIR holds houseexpo/*.json, ros_maps/*/map.yaml and valetudo/*.json. `--peers` names a Python with
-numpy, pyvispoly (CGAL's exact triangular expansion) and tcod (libtcod's symmetric shadow casting)
-installed; they get the same walls, the same poses, and their answers are compared with ours.
-NumPy is always compared with: every wall is tried for every line.
+pyvispoly (CGAL's exact triangular expansion) and tcod (libtcod's symmetric shadow casting) of
+peers_requirements.txt; they get the same walls and poses, and their answers are compared with ours.
+NumPy is always compared with: every wall is tried for every line. sight_month.py measures sight in
+a simulation, sight_proof.py compares many more answers.
 """
 
 import argparse
@@ -45,12 +46,12 @@ class Row:
     all_cells_s: float
     pieces: float  # of a region, mean
     megabytes: float  # of all regions
-    query_ns: float  # one line of sight, from ever new places
-    looked_up_ns: float  # one point in a region that is there already
-    fill_us: float  # cells in view of a pose
-    by_lines_us: float  # the same, by a line of sight to each cell
-    kept_us: float  # the same, of a pose that the flashlight has kept
-    numpy_us: float  # one line of sight, every wall tried
+    query_ns: float = 0.0  # one line of sight, from ever new places
+    looked_up_ns: float = 0.0  # one point in a region that is there already
+    fill_us: float = 0.0  # cells in view of a pose
+    by_lines_us: float = 0.0  # the same, by a line of sight to each cell
+    kept_us: float = 0.0  # the same, of a pose that the flashlight has kept
+    numpy_us: float = 0.0  # one line of sight, every wall tried
     mismatches: dict[str, str] = field(default_factory=dict)
     peers: dict[str, str] = field(default_factory=dict)
 
@@ -129,78 +130,91 @@ def measure(name: str, plan: Any, peers: str | None) -> Row:
     from fleet2d import Home
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.kernels.mesh import rasterize_cells
-    from fleet2d.kernels.region import region_contains_points, regions_of_cells
-    from fleet2d.kernels.seen import Reach, bench_for, cells_in_view
-    from fleet2d.sight.flashlight import Flashlight
-    from fleet2d.sight.line_of_sight import LineOfSight
-    from fleet2d.sight.visibility_polygon import VisibilityPolygon
+    from fleet2d.kernels.region import regions_of_cells
 
-    assert isinstance(plan, FloorPlan)
     bare = Home(FloorPlan.build(name, _free(plan), cell=plan.lattice.cell))  # walls, no furniture
-    plan, walls, mesh = bare.plan, walls_of(bare.plan), bare.walls
-    lattice, rng = plan.lattice, np.random.default_rng(1)
+    mesh, lattice, rng = bare.walls, bare.plan.lattice, np.random.default_rng(1)
     triangles = rasterize_cells(mesh, lattice.rows, lattice.columns)
     cells = np.argwhere(triangles >= 0)
-    start, right, wall = regions_of_cells(mesh, cells, triangles)
+    regions = regions_of_cells(mesh, cells, triangles)
+    start, right, _ = regions
     centres = cells[:, ::-1] * 64 + 33
-
-    eyes, points = some_pairs(centres, lattice.units_per_m, rng)
-    lines = compiled_lines()
-    query = best(lambda: lines(mesh, eyes, points))
-    first, many = centres[0], points[:20_000]
-    piece = slice(0, start[1])
-    looked_up = best(
-        lambda: region_contains_points(mesh, *first.tolist(), right[piece], wall[piece], many)
-    )
-    few = [(eyes[i], points[i : i + SHOWN]) for i in range(0, 40 * SHOWN, SHOWN)]
-    numpy_s = best(lambda: [seen_by_numpy(walls, eye, some) for eye, some in few], 1)
-
-    reach = Reach(0, round(RANGE_M * lattice.units_per_m) ** 2, HALF_ANGLE)
-    poses = [
-        (*xy, int(heading))
-        for xy, heading in zip(
-            rng.choice(centres, EYES).tolist(), rng.integers(0, 4096, EYES), strict=True
-        )
-    ]
-    bench = bench_for(mesh, lattice.rows, lattice.columns)
-    flashlight = Flashlight(memory_mb=500)
-    fill = best(lambda: [cells_in_view(mesh, *pose, reach, bench) for pose in poses])
-    kept = best(lambda: [flashlight.cells(bare, *pose, reach) for pose in poses])
-    some = poses[:20]
-    by_lines = best(lambda: [LineOfSight().cells(bare, *pose, reach) for pose in some], 1)
     row = Row(
         home=name,
-        walls=len(walls),
+        walls=len(walls_of(bare.plan)),
         cells=len(cells),
         all_cells_s=best(lambda: regions_of_cells(mesh, cells, triangles)),
         pieces=len(right) / len(cells),
-        megabytes=(start.nbytes + right.nbytes + wall.nbytes) / 1e6,
-        query_ns=query / len(eyes) * 1e9,
-        looked_up_ns=looked_up / len(many) * 1e9,
-        fill_us=fill / EYES * 1e6,
-        by_lines_us=by_lines / len(some) * 1e6,
-        kept_us=kept / EYES * 1e6,
-        numpy_us=numpy_s / (len(few) * SHOWN) * 1e6,
+        megabytes=sum(array.nbytes for array in regions) / 1e6,
     )
+    pairs = some_pairs(centres, lattice.units_per_m, rng)
+    first = slice(0, start[1])
+    region = (centres[0], *(array[first] for array in regions[1:]))
+    measure_points(row, bare, pairs, region)
+    headings = rng.integers(0, 4096, EYES).tolist()
+    chosen = rng.choice(centres, EYES).tolist()
+    poses = [(*xy, heading) for xy, heading in zip(chosen, headings, strict=True)]
+    measure_cells(row, bare, poses)
+    if peers:
+        compare_peers(row, bare, poses, peers)
+    return row
+
+
+def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[Any, ...]) -> None:
+    """Measure and compare what tells whether a point is visible."""
+    from fleet2d.kernels.region import region_contains_points
+    from fleet2d.sight.line_of_sight import LineOfSight
+    from fleet2d.sight.visibility_polygon import VisibilityPolygon
+
+    (eyes, points), lines, walls = pairs, compiled_lines(), walls_of(home.plan)
+    row.query_ns = best(lambda: lines(home.walls, eyes, points)) / len(eyes) * 1e9
+    (x, y), right, wall = region
+    many = points[:20_000]
+    seconds = best(lambda: region_contains_points(home.walls, x, y, right, wall, many))
+    row.looked_up_ns = seconds / len(many) * 1e9
+    few = [(eyes[i], points[i : i + SHOWN]) for i in range(0, 40 * SHOWN, SHOWN)]
+    seconds = best(lambda: [seen_by_numpy(walls, eye, some) for eye, some in few], 1)
+    row.numpy_us = seconds / (len(few) * SHOWN) * 1e6
+    line = LineOfSight()
     wrong = sum(
-        int((seen_by_numpy(walls, eye, some) != LineOfSight().visible(bare, *eye, some)).sum())
+        int((seen_by_numpy(walls, eye, some) != line.visible(home, *eye, some)).sum())
         for eye, some in few
     )
-    row.mismatches["numpy"] = f"{wrong} of {len(few) * SHOWN} lines"
+    row.mismatches["NumPy and lines"] = f"{wrong} of {len(few) * SHOWN} lines"
     polygons = VisibilityPolygon()
     wrong = sum(
-        int((polygons.visible(bare, *eye, some) != LineOfSight().visible(bare, *eye, some)).sum())
+        int((polygons.visible(home, *eye, some) != line.visible(home, *eye, some)).sum())
         for eye, some in zip(eyes[::SHOWN], points.reshape(-1, SHOWN, 2), strict=True)
     )
-    row.mismatches["polygon, line"] = f"{wrong} of {len(points)}"
+    row.mismatches["polygons and lines"] = f"{wrong} of {len(points)} lines"
+
+
+def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
+    """Measure and compare what finds the cells in view of a pose."""
+    from fleet2d.kernels.seen import bench_for, cells_in_view
+    from fleet2d.sight.flashlight import Flashlight
+    from fleet2d.sight.line_of_sight import LineOfSight
+
+    lattice, reach = home.plan.lattice, reach_in(home)
+    bench = bench_for(home.walls, lattice.rows, lattice.columns)
+    flashlight, line = Flashlight(memory_mb=500), LineOfSight()
+    fill = best(lambda: [cells_in_view(home.walls, *pose, reach, bench) for pose in poses])
+    kept = best(lambda: [flashlight.cells(home, *pose, reach) for pose in poses])
+    some = poses[:20]
+    by_lines = best(lambda: [line.cells(home, *pose, reach) for pose in some], 1)
+    row.fill_us, row.kept_us = fill / len(poses) * 1e6, kept / len(poses) * 1e6
+    row.by_lines_us = by_lines / len(some) * 1e6
     wrong = sum(
-        int((LineOfSight().cells(bare, *p, reach) != flashlight.cells(bare, *p, reach)).sum())
-        for p in some
+        int((line.cells(home, *p, reach) != flashlight.cells(home, *p, reach)).sum()) for p in some
     )
-    row.mismatches["flashlight, line"] = f"{wrong} of {len(some) * plan.free.size} cells"
-    if peers:
-        compare_peers(row, bare, poses, reach, peers)
-    return row
+    row.mismatches["flashlight and lines"] = f"{wrong} of {len(some) * home.plan.free.size} cells"
+
+
+def reach_in(home: Any) -> Any:
+    """Return the camera's range and angle."""
+    from fleet2d.kernels.seen import Reach
+
+    return Reach(0, round(RANGE_M * home.plan.lattice.units_per_m) ** 2, HALF_ANGLE)
 
 
 def _free(plan: Any) -> Any:
@@ -251,26 +265,22 @@ def compiled_lines() -> Callable[..., int]:
 # --- Peers -------------------------------------------------------------------------------------
 
 
-def compare_peers(row: Row, home: Any, poses: list[Any], reach: Any, python: str) -> None:
+def compare_peers(row: Row, home: Any, poses: list[Any], python: str) -> None:
     """Let peers look from the same poses, in a process of theirs, and compare the answers."""
-    from fleet2d.sight.line_of_sight import LineOfSight
-    from fleet2d.sight.region import VisibleRegion
-
-    plan, lattice = home.plan, home.plan.lattice
-    rings = [
-        [np.asarray(r.coords)[:-1].tolist() for r in (p.exterior, *p.interiors)]
-        for p in plan.polygons
-    ]
+    plan = home.plan
     task = {
-        "rings": rings,
+        "rings": [
+            [np.asarray(r.coords)[:-1].tolist() for r in (p.exterior, *p.interiors)]
+            for p in plan.polygons
+        ],
         "free": plan.free.astype(int).tolist(),
         "eyes": [pose[:2] for pose in poses],
-        "radius": round(RANGE_M / lattice.cell),
+        "radius": round(RANGE_M / plan.lattice.cell),
     }
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "task.json"
         path.write_text(json.dumps(task))
-        command = [python, __file__, "--child", str(path)]
+        command = [python, str(Path(__file__).with_name("sight_peers.py")), str(path)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     if done.returncode:
         row.peers["peers"] = f"failed: {done.stderr.strip().splitlines()[-1:]}"
@@ -279,125 +289,37 @@ def compare_peers(row: Row, home: Any, poses: list[Any], reach: Any, python: str
         if "failure" in answer:
             row.peers[name] = answer["failure"]
             continue
-        if name == "CGAL":
-            ours = [
-                VisibleRegion(plan, *lattice.to_metres(pose[:2]).tolist()).area_m2
-                * lattice.units_per_m**2
-                for pose in poses
-            ]
-            off = np.abs(np.array(answer["areas"]) / ours - 1) > 1e-9
-            differ = f"{int(off.sum())} of {len(ours)} areas differ"
-        else:
-            whole = reach._replace(half_angle=4096)
-            ours_cells = [LineOfSight().cells(home, *pose, whole) for pose in poses[:50]]
-            theirs = [np.zeros(plan.free.shape, bool) for _ in ours_cells]
-            for mask, seen in zip(theirs, answer["cells"], strict=True):
-                mask.flat[seen] = True
-                mask &= plan.free  # it shows walls, too
-            off_cells = sum(int((a != b).sum()) for a, b in zip(ours_cells, theirs, strict=True))
-            total = sum(int((a | b).sum()) for a, b in zip(ours_cells, theirs, strict=True))
-            differ = f"{off_cells / total:.2%} of {total} cells differ"
-        row.peers[name] = f"{answer['us']:.1f} us a region, {differ}"
+        differ = areas_differ if name == "CGAL" else cells_differ
+        row.peers[name] = f"{answer['us']:.1f} us a pose, {differ(home, poses, answer)}"
 
 
-def child(path: Path) -> dict[str, Any]:
-    """Look from all poses with each peer that is installed."""
-    task = json.loads(path.read_text())
-    found: dict[str, Any] = {}
-    for name, look in (("CGAL", look_with_cgal), ("libtcod", look_with_tcod)):
-        try:
-            found[name] = look(task)
-        except Exception as error:  # noqa: BLE001, whatever a peer does, the others go on
-            found[name] = {"failure": f"not compared: {type(error).__name__}: {error}"}
-    return found
+def areas_differ(home: Any, poses: list[Any], answer: dict[str, Any]) -> str:
+    """Say how many visible areas differ."""
+    from fleet2d.sight.region import VisibleRegion
+
+    lattice = home.plan.lattice
+    ours = [
+        VisibleRegion(home.plan, *lattice.to_metres(pose[:2]).tolist()).area_m2
+        * lattice.units_per_m**2
+        for pose in poses
+    ]
+    off = np.abs(np.array(answer["areas"]) / ours - 1) > 1e-9
+    return f"{int(off.sum())} of {len(ours)} areas differ"
 
 
-def look_with_cgal(task: dict[str, Any]) -> dict[str, Any]:
-    """Return the areas of the regions, and the time for one."""
-    import pyvispoly as cgal  # type: ignore[import-not-found]
+def cells_differ(home: Any, poses: list[Any], answer: dict[str, Any]) -> str:
+    """Say how many of the cells that either has in view differ."""
+    from fleet2d.sight.line_of_sight import LineOfSight
 
-    calculators = []
-    for rings in task["rings"]:
-        parts = [cgal.Polygon([cgal.Point(x, y) for x, y in ring]) for ring in rings]
-        calculators.append(
-            (parts[0], cgal.VisibilityPolygonCalculator(cgal.PolygonWithHoles(parts[0], parts[1:])))
-        )
-    jobs = []
-    for x, y in task["eyes"]:
-        eye = cgal.Point(x, y)
-        jobs += [(calc, eye) for outer, calc in calculators if outer.contains(eye)][:1]
-    began = time.perf_counter()
-    regions = [calculator.compute_visibility_polygon(eye) for calculator, eye in jobs]
-    elapsed = time.perf_counter() - began
-    areas = [float(region.area()) for region in regions]
-    return {"us": elapsed / len(jobs) * 1e6, "areas": areas}
-
-
-def look_with_tcod(task: dict[str, Any]) -> dict[str, Any]:
-    """Return the cells in range of the first poses, and the time for one."""
-    import tcod  # type: ignore[import-not-found]
-    import tcod.map  # type: ignore[import-not-found]
-
-    free = np.array(task["free"], dtype=bool)
-    eyes = [(y // 64, x // 64) for x, y in task["eyes"]]
-    style = {"radius": task["radius"], "algorithm": tcod.constants.FOV_SYMMETRIC_SHADOWCAST}
-    tcod.map.compute_fov(free, eyes[0], **style)
-    began = time.perf_counter()
-    seen = [tcod.map.compute_fov(free, eye, **style) for eye in eyes]
-    elapsed = time.perf_counter() - began
-    return {
-        "us": elapsed / len(eyes) * 1e6,
-        "cells": [np.flatnonzero(mask).tolist() for mask in seen[:50]],
-    }
-
-
-# --- A month -----------------------------------------------------------------------------------
-
-
-def month(repeats: int = REPEATS) -> dict[str, float]:
-    """Return the time to simulate the base month [s], without and with what robots have seen."""
-    from collections.abc import Set
-    from typing import ClassVar
-
-    import fleet2d
-    from fleet2d.engine.simulation import Simulation
-
-    class Exposed(fleet2d.Algorithm):
-        """Adds up how much of each room was in view."""
-
-        needs: ClassVar[Set[str]] = {"exposure"}
-
-        def start(self, home: Any) -> None:
-            self.sum = 0
-
-        def update(self, history: Any, state: Any) -> None:
-            self.sum = self.sum + history.exposure
-
-    class Idle(fleet2d.Algorithm):
-        """Does nothing: what an algorithm costs that asks for nothing."""
-
-        def update(self, history: Any, state: Any) -> None:
-            return None
-
-    base = fleet2d.load_scenario(None, algorithms={})
-    base = base.model_copy(update={"algorithms": {"idle": Idle()}})
-    layers = fleet2d.load_scenario(None, "floorplan.layers={explored: {}}")
-    layers = layers.model_copy(update={"algorithms": {"exposed": Exposed()}})
-    last = fleet2d.load_scenario(None, "floorplan.layers={explored: {}, last_seen: {}}")
-    last = last.model_copy(update={"algorithms": {"exposed": Exposed()}})
-    cases = {
-        "with an algorithm that does nothing": base,
-        "explored and exposure": layers,
-        "last seen besides": last,
-    }
-    times: dict[str, list[float]] = {name: [] for name in cases}
-    for _ in range(repeats + 1):
-        for name, scenario in cases.items():
-            simulation = Simulation(scenario)
-            began = time.perf_counter()
-            simulation.run()
-            times[name].append(time.perf_counter() - began)
-    return {name: min(taken[1:]) for name, taken in times.items()}
+    whole, free = reach_in(home)._replace(half_angle=4096), home.plan.free
+    off = total = 0
+    for pose, seen in zip(poses, answer["cells"], strict=False):
+        theirs = np.zeros(free.shape, bool)
+        theirs.flat[seen] = True
+        theirs &= free  # it shows walls, too
+        ours = LineOfSight().cells(home, *pose, whole)
+        off, total = off + int((ours != theirs).sum()), total + int((ours | theirs).sum())
+    return f"{off / total:.2%} of {total} cells differ"
 
 
 def show(rows: list[Row]) -> None:
@@ -426,23 +348,14 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--peers", help="a Python with pyvispoly and tcod installed")
     parser.add_argument("--json", type=Path, help="where to store the figures")
-    parser.add_argument("--no-month", action="store_true", help="leave out the month")
-    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.child:
-        print(json.dumps(child(options.child)))
-        return
     print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
     rows = [measure(name, plan, options.peers) for name, plan in homes(options.data).items()]
     show(rows)
     if not options.peers:
         print("  peers: not compared, for --peers names no Python that has them")
-    months = {} if options.no_month else month()
-    for name, seconds in months.items():
-        more = seconds / next(iter(months.values())) - 1
-        print(f"base month, {name}: {seconds:.3f} s ({more:+.0%})")
     if options.json:
-        figures = {"homes": [asdict(row) for row in rows], "month_s": months}
+        figures = {"homes": [asdict(row) for row in rows]}
         options.json.write_text(json.dumps(figures, indent=2) + "\n")
 
 

@@ -58,7 +58,7 @@ class Obey(Behavior):
 
 
 class Scripted(Behavior):
-    """Follow a list of steps: room names, points, seconds to stay, 'leave' and 'home'."""
+    """Follow a list of steps: room names, points, seconds to stay, 'leave', 'home' and 'call'."""
 
     script: tuple[str | float | tuple[float, float], ...] = ()
 
@@ -71,7 +71,9 @@ class Scripted(Behavior):
         self.done = True
         plan = now.plan()
         for item in self.script:
-            if item == "leave":
+            if item == "call":
+                plan.call()
+            elif item == "leave":
                 plan.leave_home()
             elif item == "home":
                 plan.come_home()
@@ -187,3 +189,13 @@ class Bad(Algorithm):
 
     def update(self, history: History, state: Present) -> None:
         raise RuntimeError("no model today")
+
+
+class Fidget(Behavior):
+    """Go somewhere, stand, sit or lie there for a while, doing something, and go on."""
+
+    def decide(self, now: Situation) -> Plan | None:
+        draws = now.random("fidget")
+        plan = now.plan().go_to("hall").take(draws.choice(["stand", "sit", "lie"]))
+        plan.turn_by(draws.uniform()).note("activity", draws.choice(["cook", "read", "sleep"]))
+        return plan.stay(timedelta(seconds=30 + draws.below(60)))

@@ -221,6 +221,7 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
 
     assert own.Own is lookup("gadget", Text("own:Own", folders[0]))
     assert own.Own is not lookup("gadget", Text("own:Own", folders[1]))
+    assert own.Own is lookup("gadget", Text("own.py:Own", folders[0]))
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import pytest
 import shapely
 from tests.engine.test_pace import Wall
 from tests.homes import needs_jit
-from tests.scenes import digests, everything, flat_document, path, run, scenario, table
+from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario, table
 
 import fleet2d
 from fleet2d import FloorPlan, History, Metric, Present
@@ -30,6 +30,7 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.scenario.model import SimulationSettings
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.region import VisibleRegion
+from fleet2d.sight.settings import SightSettings
 
 pytestmark = needs_jit
 
@@ -273,6 +274,7 @@ def life() -> dict[str, Any]:
         },
         artifacts={"trajectories": "30 s"},
         metrics={"room_share": {"period": "5 min"}},
+        sight={},
     )  # fmt: skip
 
 
@@ -289,21 +291,25 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         "period": "3 s", "latency": "2 s", "body_points": 8,
         "perception": {"attributes": {"range_noise": 0.1}},
     },
-    (User, ANA): BODY,
+    (User, ANA): {**BODY, "camera": {"range": [0, 5], "angle_deg": 200}},
     (Robot, "robots.astro"): {
         **BODY, "camera": None, "cameras": {"rear": {"heading_deg": 180}},
         "perception": {"detection": {"distance": [[0, 1], [4, 0.2]]}},
+        "battery": {
+            "driving": "2 h", "standing": "9 h", "charging": "3 h", "charger": "kitchen",
+        },
     },
     (Item, ITEM): {"at": "07:02", "place": "bathroom", "away": True, "dwell": "3 min", "activity": "bake"},
     (Day, "users.ana.behaviors.0.days.0"): {"on": "weekend", "items": [{"at": "06:00", "place": "kitchen"}]},
     (Schedule, "users.ana.behaviors.0"): {
         "days": [{"items": [{"at": "06:00", "away": True}]}], "rest": "kitchen",
+        "when": "23:00-23:30",
     },
     (Patrol, PATROL): {
         "rooms": ["kitchen"], "waypoints": [[1, 3], [7, 1]], "dwell": "25 s", "order": "random",
-        "look_around": False,
+        "look_around": False, "when": "23:00-23:30", "cooldown": "2 min",
     },
-    (Meander, "users.ben.behaviors.0"): {"turn_std_deg": 25},
+    (Meander, "users.ben.behaviors.0"): {"turn_std_deg": 25, "when": "23:00-23:30"},
     (SimulationSettings, "simulation"): {
         "start": "2026-01-05T07:00:30", "duration": "14 min", "step": "2 s", "seed": 5,
     },
@@ -311,14 +317,23 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         "trajectories": "1 min", "key_frames": False, "observations": False, "events": False,
         "outputs": False,
     },
+    (SightSettings, "sight"): {"method": {"type": f"{TESTS.as_posix()}/engine/test_verdicts:XRay"}},
 }  # fmt: skip
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
     (User, "color"): "tests/view: pictures",
     (Robot, "color"): "tests/view: pictures",
     (User, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
+    (Robot, "gives_way"): "tests/engine/test_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
+    (ArtifactSettings, "learned"): "tests/algorithms/test_learned: a file, no table",
+    (Schedule, "cooldown"): "tests/entities/test_arbitration: there is one behavior here",
+    (Meander, "cooldown"): "tests/entities/test_arbitration: a walk is never over",
+    (Schedule, "preempts"): "tests/entities/test_arbitration: there is one behavior here",
+    (Patrol, "preempts"): "tests/entities/test_arbitration: there is one behavior here",
+    (Meander, "preempts"): "tests/entities/test_arbitration: there is one behavior here",
     (SimulationSettings, "max_span"): "test_spans: changes no result by design; see below",
+    (SightSettings, "seen_every"): "tests/engine/test_layers: nobody asks for the seen area here",
     (SimulationSettings, "speedup"): "test_pace: wall time",
 }
 CASES = [

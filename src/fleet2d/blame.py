@@ -48,7 +48,7 @@ class blame:  # noqa: N801  (used as a function)
 def _place(error: BaseException) -> str:
     """Return where in a file outside Fleet2D an error arose: the user's own code."""
     frames = traceback.extract_tb(error.__traceback__)
-    others = (str(Path(__file__).parents[1]), sys.prefix, sys.base_prefix, "<")
+    others = (str(Path(__file__).parent), sys.prefix, sys.base_prefix, "<")
     own = [f for f in frames if not f.filename.startswith(others)]
     if not own:
         return ""

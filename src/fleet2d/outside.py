@@ -47,14 +47,14 @@ def importable(folder: Path) -> Iterator[None]:
 
 
 def import_class(name: str) -> object:
-    """Import what 'folder/package.module:Class' names.
+    """Import what 'folder/package.module:Class' names, or 'folder/module.py:Class'.
 
     Raises:
         BrokenModule: the module fails while it is imported.
         ScenarioError: there is no such module, or no such class in it.
     """
     path, _, qualname = name.rpartition(":")
-    written, slash, module_name = path.rpartition("/")
+    written, slash, module_name = path.removesuffix(".py").rpartition("/")
     folder = (folder_of(name) / (written + slash)).resolve()
     if not all(part.isidentifier() for part in (*module_name.split("."), *qualname.split("."))):
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")

@@ -8,7 +8,7 @@ import yaml
 from tests.calibrate.logs import TRUE, falling, simulated, write
 from tests.homes import needs_jit
 from tests.scenes import run
-from tests.sight.watching import Watch, agree, around
+from tests.sight.watching import LATTICE, Watch, agree, around
 
 from fleet2d.calibrate.command import calibrate_perception, fragment, report
 from fleet2d.calibrate.log import DetectionLog, read_log
@@ -16,8 +16,10 @@ from fleet2d.calibrate.perception import calibrate
 from fleet2d.errors import InputError
 from fleet2d.kernels.look import STEP, USER
 from fleet2d.scenario.model import load_scenario
+from fleet2d.sight.camera import Camera
 from fleet2d.sight.curve import Curve
 from fleet2d.sight.perception import Perception
+from fleet2d.sight.tables import Scene, error_tables
 
 
 def test_factors_without_effect_are_left_out_and_named() -> None:
@@ -69,6 +71,34 @@ def test_identities_are_fitted_by_distance_with_their_confusion() -> None:
     assert section.identity.right is not None
     for x in (0.5, 3.0, 5.5):
         assert section.identity.right.at(x) + section.identity.mistaken.at(x) <= 1
+
+
+def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1() -> None:
+    """Nobody is unknown here, so that right and mistaken add up to 1 everywhere."""
+    rng = np.random.default_rng(15)
+    rows = 8000
+    distance = rng.uniform(0.3, 6, rows)
+    true = rng.choice(["ana", "ben"], rows)
+    right = rng.random(rows) < 0.97 * falling(distance, 3.5, 0.3)
+    taken = np.where(right, true, np.where(true == "ana", "ben", "ana"))
+    every = rng.random(rows) < 0.9
+    log = DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=taken)
+    found = calibrate(log)
+    identity = Perception.model_validate(found.section()).identity
+    assert found.identity is not None
+    assert identity.right is not None
+    estimates = found.identity.right.estimates
+    values = (estimates[name].value for name in ("top", "distance midpoint", "distance width"))
+    top, midpoint, width = values
+    for x in np.linspace(0, 6, 601).tolist():
+        right_there, mistaken = identity.right.at(x), identity.mistaken.at(x)
+        assert top * falling(x, midpoint, width) == pytest.approx(right_there, abs=0.006)
+        assert 0.99 < right_there + mistaken <= 1 + 1e-12
+    error_tables(
+        [Camera().lens(1280, 10**6)], [Perception.model_validate(found.section())],
+        Scene(["ana", "ben"], [256.0] * 2, LATTICE, 10**6, "robots.r"),
+    )  # fmt: skip
+    assert any("ana, ben" in note for note in found.notes)
 
 
 @needs_jit
@@ -158,7 +188,7 @@ def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> 
         ),
         (
             GOOD | {"distance": [1] * (ROWS - 1) + [-1]},
-            ["log.csv:61", "distance", "'-1'", "0 m or more"],
+            ["log.csv:61", "distance", "'-1'", "0 to 100 m"],
         ),
         (GOOD | {"distance": ["nan"] + [1] * (ROWS - 1)}, ["log.csv:2", "'nan'"]),
         (GOOD | {"detected": [2] * ROWS}, ["log.csv:2", "detected", "'2'", "0 or 1"]),
@@ -166,6 +196,11 @@ def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> 
         (GOOD | {"detected": [0] * ROWS}, ["none of 60 rows"]),
         (GOOD | {"bearing": [0] * ROWS}, ["'bearing'", "bearing_deg or bearing_rad"]),
         ({k: v[:3] for k, v in GOOD.items()}, ["3 rows", "50"]),
+        (GOOD | {"distance": [1200] * ROWS}, ["log.csv:2", "'1200'", "0 to 100 m"]),
+        (GOOD | {"bearing_deg": [3350] * ROWS}, ["log.csv:2", "bearing_deg", "-360 to 360"]),
+        (GOOD | {"bearing_rad": [30] * ROWS}, ["log.csv:2", "bearing_rad", "-6.283 to 6.283"]),
+        ({"distance;detected": ["1;0"] * ROWS}, ["no column 'distance'", "commas between"]),
+        (GOOD | {"detected ": GOOD["detected"]}, ["'detected' twice"]),
         (
             GOOD | {"identity": ["ana"] * ROWS, "true_identity": [""] * ROWS},
             ["log.csv:2", "true_identity is empty"],
@@ -179,6 +214,27 @@ def test_wrong_logs_are_errors_that_say_where_and_what(
         read_log(write(tmp_path / "log.csv", **columns))
     for word in words:
         assert word in str(caught.value)
+
+
+def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
+    tmp_path: Path,
+) -> None:
+    log = simulated(16, 50, bearing=True)
+    path = write(
+        tmp_path / "log.csv",
+        distance=log.distance, bearing_deg=log.bearing, detected=log.detected.astype(int),
+    )  # fmt: skip
+    calibrate_perception(path, tmp_path / "a.yaml", tmp_path / "fit.svg")
+    assert (tmp_path / "fit.svg").read_text().startswith("<?xml")
+    with pytest.raises(InputError, match=r"as \.png or \.svg, not as '\.tex'"):
+        calibrate_perception(path, tmp_path / "b.yaml", tmp_path / "fit.tex")
+    assert not (tmp_path / "b.yaml").exists()
+
+
+def test_a_file_that_is_no_text_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_bytes(b"\xff\xfed\x00")
+    with pytest.raises(InputError, match="no text in UTF-8"):
+        read_log(tmp_path / "log.csv")
 
 
 def test_a_log_that_is_not_there_is_an_error(tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ PERCEPTION: dict[str, Any] = {
         "bearing_noise_deg": 2,
         "heading_noise_deg": 10,
         "posture": {"stand": {"sit": 0.1}},
+        "activity": {"wash": {"read": 0.5}, "breakfast": {"unknown": 0.2}},
     },
 }
 CAMERAS: dict[str, Any] = {
@@ -180,10 +181,17 @@ def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it() -> 
     stored = run(content)
     rows = table(stored, "observations")
     told = [part for part, _, _ in Both.seen]
-    for column in ("step", "x", "y", "heading"):
+    for column in ("activity", "true_activity"):  # as pandas has it, what is missing is NaN
+        rows[column] = np.where(rows[column] != rows[column], None, rows[column])
+    for column in ("step", "x", "y", "heading", "activity"):
         expected = rows[column].tolist()
         assert expected == np.concatenate([getattr(o, column) for o in told]).tolist()
         assert expected == np.concatenate([getattr(o, column) for o in Peek.seen]).tolist()
+    activities = {name for name in rows["activity"] if name is not None}
+    assert {"wash", "read", "breakfast"} <= activities
+    assert rows["true_activity"].tolist() == [
+        name for _, truth, _ in Both.seen for name in truth.activity
+    ]
     assert rows["true_x"][~np.isnan(rows["true_x"])].tolist() == [
         x for _, truth, _ in Both.seen for x, u in zip(truth.x, truth.user, strict=True) if u >= 0
     ]
@@ -228,6 +236,7 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
         ),
         ({"perception": {"detection": {"distance": {"midpoint": 3}}}}, ["distance", "width"]),
         ({"perception": {"detection": {"distance": 1.2}}}, ["distance", "0 to 1"]),
+        ({"perception": {"detection": {"light": [[-2, 1], [26, 0]]}}}, ["light", "-2", "0 to 24"]),
         ({"perception": {"detection": {"range": 3}}}, ["unknown key 'range'"]),
         (
             {"perception": {"identity": {"confusion": {"ana": {"ana": 1}}}}},
@@ -242,6 +251,10 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
         ({"perception": {"false_positives": {"looks_like": {"zoe": 1}}}}, ["'zoe'", "ana, ben"]),
         ({"perception": {"false_positives": {"per_hour": 4000}}}, ["4000 per hour", "3600"]),
         ({"perception": {"attributes": {"posture": {"sit": {"sit": 1}}}}}, ["posture.sit"]),
+        (
+            {"perception": {"attributes": {"activity": {"cook": {"read": 0.6, "eat": 0.6}}}}},
+            ["activity.cook", "1.2"],
+        ),
     ],
 )
 def test_wrong_settings_are_errors_that_say_what_is_wanted(

@@ -9,6 +9,7 @@ import pytest
 
 import fleet2d
 from fleet2d import Behavior, Plan, Run, Simulation, Situation
+from fleet2d.entities.entity import Robot
 from fleet2d.errors import ArtifactError
 
 TWO_ROOMS = {"order": "random", "dwell": "20 s", "rooms": ["living_room", "kitchen", "hallway"]}
@@ -64,7 +65,7 @@ class Startled(Behavior):
         if now.events:
             return now.plan().turn_by(0.4).stay(timedelta(seconds=4.5))
         plan = now.plan().meander(self.walk.rule)
-        return plan.interrupt_on("user_seen") if hasattr(now.actor.entity, "camera") else plan
+        return plan.interrupt_on("user_seen") if isinstance(now.actor.entity, Robot) else plan
 
 
 class Stranger(Startled):

@@ -184,7 +184,7 @@ def test_no_eye_in_a_wall_has_a_region() -> None:
 def check_regions_of_cells(home: Home, step: int) -> float:
     """Compare regions with those found one by one; return the mean number of pieces."""
     cell_triangles = rasterize_cells(home.mesh, home.rows, home.columns)
-    cells = np.argwhere(cell_triangles >= 0)[::step]
+    cells = np.ascontiguousarray(np.argwhere(cell_triangles >= 0)[::step])
 
     start, right, wall = regions_of_cells(home.mesh, cells, cell_triangles)
 

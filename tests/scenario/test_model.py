@@ -145,7 +145,7 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
         (["floorplan=null"], "floorplan: missing, and has no default"),
         (["floorplan.path=gone.json"], "floorplan.path: no such file"),
         (["users.ana.sped=1"], "users.ana.sped: unknown key 'sped': did you mean 'speed'? Allowed "
-         "here: color, dwell, opens_doors, radius,"),
+         "here: camera, color, "),
         (["users.ana.stops=hall"], "users.ana.stops: found 'hall'; a list is wanted"),
         (["users.ana.speed=fast"], "users.ana.speed: found 'fast'; a speed is wanted: a number in"),
         (["users.ana.type=wander"], "users.ana.type: there is no behavior 'wander'"),

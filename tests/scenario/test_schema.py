@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from fleet2d.entities.behavior import Behavior
 from fleet2d.scenario.schema import ComponentDescription, describe_components, schema
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
@@ -63,7 +64,11 @@ def test_components_are_described_with_units_and_defaults() -> None:
     assert "A plan in a file." == plan.summary
     assert [("cell", "length [m]", "0.05"), ("path", "path", None), ("border", "whole number", "4")
             ] == [(f.name, f.type, f.default) for f in plan.fields]  # fmt: skip
+    own = [f for f in tour.fields if f.name not in Behavior.model_fields]
     assert [("stops", "list of text", "[]"), ("dwell", "duration [s]", "1 min")] == [
-        (f.name, f.type, f.default) for f in tour.fields
+        (f.name, f.type, f.default) for f in own
     ]
+    assert {"when": "hours", "cooldown": "duration [s]", "preempts": "true | false"} == {
+        f.name: f.type for f in tour.fields if f not in own
+    }
     assert all(isinstance(d, ComponentDescription) for d in described.values())

@@ -1,5 +1,6 @@
 """The methods of fields of view: one answer, whatever is precomputed, kept or shared."""
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -186,3 +187,16 @@ def test_own_method_needs_only_what_is_visible(home: Home) -> None:
 
     assert cells.sum() > LineOfSight().cells(home, *pose, reach).sum()
     assert {"flashlight", "line_of_sight", "visibility_polygon"} <= set(components("sight"))
+
+
+def test_flashlight_takes_the_memory_that_it_says(home: Home) -> None:
+    flashlight, reach = Flashlight(), Reach(0, 5760**2, 1229)
+    poses = [(x, y, heading) for x, y, heading in some_poses(home, 400) if x > 0]
+    flashlight.cells(home, *poses[0], reach)
+    tracemalloc.start()
+    for pose in poses:
+        flashlight.cells(home, *pose, reach)
+    taken, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert taken == pytest.approx(flashlight.kept[1], rel=0.15)

@@ -39,6 +39,11 @@ def hall(*pillars: shapely.Polygon) -> Mesh:
 HALL = hall()
 
 
+def scene(users: Sequence[str] = ("ana", "ben", "cleo"), step_us: int = 10**6) -> Scene:
+    """Return the scene of users of 20 cm."""
+    return Scene(users, [0.2 * UNITS_PER_M] * len(users), LATTICE, step_us, "robots.r")
+
+
 @dataclass
 class Watch:
     """What is watched: poses by step, of the robot (steps, 3) and of each user (users, steps, 3).

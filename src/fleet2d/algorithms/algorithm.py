@@ -3,15 +3,17 @@
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d.algorithms.history import History
+from fleet2d.algorithms.learned import check_shapes, run_state
 from fleet2d.component import Component
 from fleet2d.streams import Draws, stream_key
-from fleet2d.units import PositiveDuration
+from fleet2d.units import InputPath, PositiveDuration
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
@@ -71,6 +73,7 @@ class Algorithm(Component):
     """
 
     kind: ClassVar[str] = "algorithm"
+    looks_back: ClassVar[timedelta] = timedelta(0)  # how far beyond its period; timedelta.max: all
     needs: ClassVar[Set[str]] = (
         frozenset()
     )  # of evidence, exposure, explored, first_seen, last_seen …
@@ -82,8 +85,34 @@ class Algorithm(Component):
         default=(), description="algorithms whose output it uses; they are updated before it"
     )
 
+    learned: InputPath | None = Field(
+        default=None,
+        description="what it starts from: a file of the folder learned/ of another run",
+    )
+
     def start(self, home: "Home") -> None:
         """Prepare for a run."""
+
+    def remember(self) -> Mapping[str, Any]:
+        """Return what it has learned: arrays, numbers and texts, in mappings of any depth.
+
+        Unless a subclass says otherwise, that is all its run state: what it keeps in attributes.
+        """
+        return run_state(self)
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Go on from what `remember` returned in another run; called after `start`.
+
+        Raises:
+            ComponentError: It was learned in a home with other rooms.
+        """
+        check_shapes(run_state(self), learned, type(self).__name__)
+        for name, value in learned.items():
+            setattr(self, name, value)
+
+    def files(self) -> list[Path]:
+        """Return the files that it reads: a run notes their content, to be reproducible."""
+        return [] if self.learned is None else [self.learned]
 
     def update(self, history: History, state: Present) -> Any:
         """Take in the history since the last update; return the output, or None."""

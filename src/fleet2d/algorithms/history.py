@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.evidence import Evidence, cells_of_rooms, count_seen
 from fleet2d.algorithms.observations import (
     NOWHERE,
@@ -111,6 +112,15 @@ class Piece:
     motion: Motion
 
 
+class Event(NamedTuple):
+    """Something that a plan said happens: a row of the table of events."""
+
+    step: int
+    entity: str  # the name of the body
+    event: str
+    detail: str
+
+
 class SensorRow(NamedTuple):
     """A reading of a sensor, as the table of sensors has it."""
 
@@ -129,6 +139,8 @@ class Log:
         self.paths = [actor.path for actor in actors]
         self.pieces: list[list[Piece]] = [[] for _ in actors]
         self.observations: list[NDArray[np.int64]] = []  # (n, OBSERVATION) each
+        self._actors = actors
+        self._events: list[Event] = []  # of plans that were replaced
         self.readings: list[SensorRow] = []
         self.cameras: list[tuple[int, str]] = []  # index of the robot, and name
         self._looks: dict[int, NDArray[np.int64]] = {}
@@ -136,7 +148,9 @@ class Log:
         self.bin_steps = 0  # of the bins of evidence; 0: nobody asks for it
         self._bins: NDArray[np.int64] | None = None  # (bins, robots, rooms), from _first_bin on
         self._first_bin = 0
+        self._cells: NDArray[np.int64] | None = None  # of each room
         self._rooms = NearestRooms(home.plan)
+        self.activities = Activities(0, {})
         self._traced: dict[tuple[str, int, int], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
@@ -147,11 +161,24 @@ class Log:
             del pieces[:keep]
         self.observations = [o for o in self.observations if o[-1, STEP] >= before]
         self.readings = [row for row in self.readings if row.step >= before]
+        self._events = [event for event in self._events if event.step >= before]
         self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
         self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
         if self._bins is not None:
             past = max(0, before // self.bin_steps - self._first_bin)
             self._bins, self._first_bin = self._bins[past:], self._first_bin + past
+
+    def tell(self, actor: "Actor", step: int) -> None:
+        """Keep what the plan of a body said happens up to `step`, at which it is replaced."""
+        if actor.plan.notes:
+            self._events += [event for event in _events(actor) if event.step <= step]
+
+    def events(self, first: int, end: int) -> list[Event]:
+        """Return what plans said happens in the steps from `first` to `end` - 1, in order."""
+        going_on = [event for actor in self._actors for event in _events(actor)]
+        found = [event for event in self._events + going_on if first <= event.step < end]
+        order = self.index
+        return sorted(found, key=lambda event: (event.step, order[event.entity]))
 
     def poses(self, name: str, first: int, end: int) -> BodyPoses:
         """Return the poses of a body in the steps from `first` to `end` - 1."""
@@ -188,7 +215,7 @@ class Log:
 
     def perceived(self, first: int, end: int) -> Observations:
         """Return what was perceived in the steps from `first` to `end` - 1."""
-        return perceived(self.home.plan, self._rooms, self.seen(first, end))
+        return perceived(self.home.plan, self._rooms, self.seen(first, end), self.activities)
 
     def count_looks(self, step: int, counts: Sequence[NDArray[np.int64]]) -> None:
         """Keep how often each robot's cameras have looked and noticed before `step`."""
@@ -230,12 +257,13 @@ class Log:
             )
         begin = first // self.bin_steps - self._first_bin
         bins = self._bins[begin : end // self.bin_steps - self._first_bin]
-        cells = np.maximum(cells_of_rooms(self.home.plan), 1) * self.bin_steps
+        if self._cells is None:
+            self._cells = np.maximum(cells_of_rooms(self.home.plan), 1)
         most = bins.max(axis=1, initial=0)
         seen = count_seen(
             self.perceived(first, end), first, len(bins), self.bin_steps, users, most.shape[1]
         )
-        return Evidence(first, self.bin_steps, most / cells, seen)
+        return Evidence(first, self.bin_steps, most / (self._cells * self.bin_steps), seen)
 
     def exposure(self, first: int, end: int) -> NDArray[np.int64]:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
@@ -250,6 +278,12 @@ class Log:
             )
         before = self._exposures.get(first)
         return self._exposures[end] - (0 if before is None else before)
+
+
+def _events(actor: "Actor") -> list[Event]:
+    """Return what the plan of a body says happens."""
+    at = actor.clock.step_at_or_after
+    return [Event(at(n.time_us), actor.name, n.event, n.detail) for n in actor.plan.notes]
 
 
 @dataclass(frozen=True)
@@ -283,6 +317,32 @@ class History:
     end: int
     step_s: float
     visible: frozenset[str]  # the bodies whose poses may be asked for
+    oldest: int = 0  # the first step that is kept for who looks back
+
+    def between(self, first: int, end: int) -> "History":
+        """Return the history of the steps from `first` to `end` - 1.
+
+        How far back that may be, the component's class says by `looks_back`.
+
+        Raises:
+            ComponentError: These steps are not kept, or are yet to come.
+
+        Example:
+            >>> from datetime import timedelta
+            >>> from fleet2d import Algorithm
+            >>> class Sightings(Algorithm):
+            ...     '''How often somebody was seen in the last day.'''
+            ...     looks_back = timedelta(days=1)
+            ...     def update(self, history, state):
+            ...         day = history.between(max(0, history.end - 86400), history.end)
+            ...         return {"sightings": len(day.observations.step)}
+        """
+        if not self.oldest <= first <= end <= self.end:
+            raise ComponentError(
+                f"the steps from {first} to {end} were asked for, but those from {self.oldest} to"
+                f" {self.end} are kept: say by looks_back in the class how far back you look"
+            )
+        return History(self.log, first, end, self.step_s, self.visible, self.oldest)
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -304,6 +364,12 @@ class History:
         )
 
     @cached_property
+    def events(self) -> list[Event]:
+        """What the plans of bodies said happens, in order of step; algorithms hear of robots'."""
+        found = self.log.events(self.first, self.end)
+        return [event for event in found if event.entity in self.visible]
+
+    @cached_property
     def truth(self) -> Truth:
         """What was really there, row by row of the observations; for metrics.
 
@@ -311,7 +377,8 @@ class History:
             ComponentError: The asker is an algorithm.
         """
         self._check_metric("truth")
-        return truth(self.log.home.plan, self.log.seen(self.first, self.end))
+        log = self.log
+        return truth(log.home.plan, log.seen(self.first, self.end), log.activities)
 
     @cached_property
     def looks(self) -> Looks:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.activities import ROBOT, Activities, Names
 from fleet2d.floorplan.rooms import beside_rooms
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.look import (
@@ -12,7 +13,6 @@ from fleet2d.kernels.look import (
     HEADING,
     IDENTITY,
     POSTURE,
-    SIGHTING,
     STEP,
     TRUE_HEADING,
     TRUE_POSTURE,
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
 
 NOWHERE = -1  # the room of who is away
-# A row of observations: that of the sight kernel, and the robot's index behind it.
-ROBOT = SIGHTING
-OBSERVATION = SIGHTING + 1
+NO_NAMES: Names = np.empty(0, object)
+OBSERVATION = ROBOT + 1  # columns of a row of observations
 
 
 class Observations(NamedTuple):
@@ -50,6 +49,7 @@ class Observations(NamedTuple):
     heading: NDArray[np.float64]  # perceived heading [rad]
     posture: NDArray[np.int8]  # perceived posture: 0 stands, 1 sits, 2 lies
     camera: NDArray[np.int8]  # index among the robot's cameras
+    activity: Names = NO_NAMES  # what somebody is taken to do, str; None where that isn't perceived
 
 
 class Truth(NamedTuple):
@@ -63,6 +63,7 @@ class Truth(NamedTuple):
     y: NDArray[np.float64]
     heading: NDArray[np.float64]  # [rad]
     posture: NDArray[np.int8]
+    activity: Names = NO_NAMES  # what the user did, as far as behaviors tell; None: not told
 
 
 class Looks(NamedTuple):
@@ -95,7 +96,9 @@ class NearestRooms:
         return found
 
 
-def perceived(plan: "FloorPlan", rooms: NearestRooms, rows: NDArray[np.int64]) -> Observations:
+def perceived(
+    plan: "FloorPlan", rooms: NearestRooms, rows: NDArray[np.int64], activities: Activities
+) -> Observations:
     """Return rows of observations as what was perceived."""
     xy = plan.lattice.to_metres(rows[:, [X, Y]])
     return Observations(
@@ -108,10 +111,11 @@ def perceived(plan: "FloorPlan", rooms: NearestRooms, rows: NDArray[np.int64]) -
         in_radians(rows[:, HEADING]),
         rows[:, POSTURE].astype(np.int8),
         rows[:, CAMERA].astype(np.int8),
+        activities.perceived(rows),
     )
 
 
-def truth(plan: "FloorPlan", rows: NDArray[np.int64]) -> Truth:
+def truth(plan: "FloorPlan", rows: NDArray[np.int64], activities: Activities) -> Truth:
     """Return rows of observations as what was there."""
     xy = plan.lattice.to_metres(rows[:, [TRUE_X, TRUE_Y]])
     return Truth(
@@ -120,4 +124,5 @@ def truth(plan: "FloorPlan", rows: NDArray[np.int64]) -> Truth:
         xy[:, 1],
         in_radians(rows[:, TRUE_HEADING]),
         rows[:, TRUE_POSTURE].astype(np.int8),
+        activities.true(rows),
     )

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 FLOORPLAN_NAME = "floorplan.json"
+LEARNED_NAME = "learned"  # the folder of what algorithms have learned
 """The floor plan in a run directory, in our own format."""
 
 

@@ -46,3 +46,8 @@ class ArtifactSettings(Settings):
     outputs: bool = Field(
         default=True, description="Store what algorithms and metrics put out, one table each."
     )
+    learned: bool = Field(
+        default=False,
+        description="Store what each algorithm has learned at the end, learned/NAME.npz: another "
+        "run can start from it.",
+    )

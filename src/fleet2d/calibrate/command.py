@@ -65,6 +65,10 @@ def calibrate_perception(
     from fleet2d.calibrate.perception import calibrate
     from fleet2d.errors import InputError
 
+    if picture is not None:
+        from fleet2d.view.floorplan import check_picture
+
+        check_picture(picture)
     found = calibrate(read_log(path))
     try:
         out.write_text(fragment(found, robot, extends), encoding="utf-8")

@@ -14,6 +14,8 @@ from fleet2d.errors import InputError
 F64 = NDArray[np.float64]
 
 LEAST_ROWS = 50
+MOST_METRES = 100.0  # farther away in a home means another unit
+MOST_DEGREES = 360.0
 TRUE, FALSE = frozenset({"1", "true", "yes"}), frozenset({"0", "false", "no"})
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
 
@@ -62,16 +64,13 @@ def read_log(path: Path) -> DetectionLog:
             columns = [name.strip() for name in reader.fieldnames or ()]
             reader.fieldnames = columns
             rows = [(reader.line_num, row) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path} can't be read: {error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is no text in UTF-8: save it as a CSV file in UTF-8") from None
+    except (OSError, csv.Error) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"{path} can't be read: {why}") from None
+    _check_columns(path, columns)
     table = _Table(path, columns, rows)
-    for wanted in ("distance", "detected"):
-        if not table.has(wanted):
-            raise InputError(
-                f"{path} has no column {wanted!r}; it has: {', '.join(columns) or 'none'}. Wanted"
-                " are distance [m] and detected (0 or 1), and if known bearing_deg,"
-                " orientation_deg, identity, true_identity"
-            )
     if len(rows) < LEAST_ROWS:
         raise InputError(f"{path} has {len(rows)} rows: a fit needs {LEAST_ROWS} at the least")
     who = table.has("identity") and table.has("true_identity")
@@ -94,6 +93,29 @@ def read_log(path: Path) -> DetectionLog:
             " times in view without a detection logged, too?"
         )
     return log
+
+
+def recognized(log: DetectionLog) -> NDArray[np.bool_]:
+    """Return for each detection of a log with identities whether it was of the right person."""
+    assert log.identity is not None
+    assert log.true_identity is not None
+    right: NDArray[np.bool_] = np.equal(log.true_identity, log.identity)[log.detected]
+    return right
+
+
+def _check_columns(path: Path, columns: list[str]) -> None:
+    """Refuse a heading line that lacks a column, or names one twice."""
+    for name in columns:
+        if columns.count(name) > 1:
+            raise InputError(f"{path} names the column {name!r} twice: name each once")
+    for wanted in ("distance", "detected"):
+        if wanted not in columns:
+            apart = any(mark in name for name in columns for mark in ";\t")
+            raise InputError(
+                f"{path} has no column {wanted!r}; it has: {', '.join(columns) or 'none'}. Wanted"
+                " are distance [m] and detected (0 or 1), and if known bearing_deg,"
+                f" orientation_deg, identity, true_identity{', with commas between' * apart}"
+            )
 
 
 class _Table:
@@ -129,7 +151,7 @@ class _Table:
         """Return the size of an angle in degrees, 0 to 180, from the column that tells its unit."""
         for unit, factor in (("deg", 1.0), ("rad", 180 / math.pi)):
             if self.has(f"{name}_{unit}"):
-                turned = self.column(f"{name}_{unit}", _number) * factor
+                turned = self.column(f"{name}_{unit}", _within(MOST_DEGREES / factor)) * factor
                 size: F64 = np.abs((turned + 180) % 360 - 180)
                 return size
         if self.has(name):
@@ -156,9 +178,21 @@ def _number(text: str) -> float:
 
 def _distance(text: str) -> float:
     value = _number(text)
-    if value < 0:
-        raise ValueError("a distance of 0 m or more")
+    if not 0 <= value <= MOST_METRES:
+        raise ValueError(f"a distance from 0 to {MOST_METRES:g} m")
     return value
+
+
+def _within(most: float) -> Callable[[str], float]:
+    """Return what reads an angle of at most so much to either side."""
+
+    def read(text: str) -> float:
+        value = _number(text)
+        if abs(value) > most + 1e-3:
+            raise ValueError(f"an angle from -{most:.4g} to {most:.4g}")
+        return value
+
+    return read
 
 
 def _flag(text: str) -> float:

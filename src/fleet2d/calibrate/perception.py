@@ -16,12 +16,12 @@ from fleet2d.calibrate.likelihood import (
     chi_square_tail,
     wilson,
 )
-from fleet2d.calibrate.log import DetectionLog
+from fleet2d.calibrate.log import DetectionLog, recognized
 
 GROUPS = 10
 WORTH = 0.05  # a factor is kept if chance alone would improve the fit so much less often than this
 LEAST_KNOWN = 20  # detections with an identity that are needed to fit it
-ROWS_BY_DISTANCE = 6
+MOST_ROWS = 60  # of a curve by distance
 
 
 @dataclass(frozen=True)
@@ -103,12 +103,18 @@ class Calibration:
         return section
 
     def _identity(self, who: WhoIsWho) -> dict[str, Any]:
-        places = np.linspace(0, float(self.log.distance.max()), ROWS_BY_DISTANCE)
-        mistaken = [
-            [_short(x), _short(who.mistaken.value * (1 - _at(who.right.estimates, x)))]
-            for x in places.tolist()
+        """Return the section as tables of the same distances, whose sum is nowhere above 1."""
+        estimates, farthest = who.right.estimates, float(self.log.distance.max())
+        # So dense that straight lines between rows stay within 0.3 % of the logistic.
+        width = estimates["distance width"].value if "distance width" in estimates else farthest
+        rows = min(MOST_ROWS, 2 + int(2 * farthest / width))
+        places = [_short(x) for x in np.linspace(0, farthest, rows).tolist()]
+        shares = [round(_at(estimates, x), 4) for x in places]
+        right = [[x, share] for x, share in zip(places, shares, strict=True)]
+        mistaken = [  # rounded down
+            [x, int(who.mistaken.value * (1 - share) * 10_000) / 10_000]
+            for x, share in zip(places, shares, strict=True)
         ]
-        right = [[_short(x), _short(_at(who.right.estimates, x))] for x in places.tolist()]
         confusion = {
             user: {name: share for name, share in others.items() if share}
             for user, others in who.confusion.items()
@@ -162,7 +168,7 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> WhoIsWho | None:
     if log.identity is None or log.true_identity is None:
         return None
     true, found = log.true_identity[log.detected], log.identity[log.detected]
-    right = true == found
+    right = recognized(log)
     if len(true) < LEAST_KNOWN or right.all() or not right.any():
         notes.append(
             f"identity: left out: {int(right.sum())} of {len(true)} detections are recognized,"
@@ -180,6 +186,11 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> WhoIsWho | None:
         names, counts = np.unique(found[mistaken & (true == user)], return_counts=True)
         if len(names):
             confusion[user] = _whole(dict(zip(names.tolist(), counts.tolist(), strict=True)))
+    if confusion:
+        notes.append(
+            f"identity: the confusion is of the log's people, {', '.join(sorted(set(true)))}: name"
+            " the scenario's users so, or take it out"
+        )
     return WhoIsWho(curves, wilson(int(mistaken.sum()), int(wrong.sum())), confusion)
 
 

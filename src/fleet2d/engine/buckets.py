@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.activities import ActivitySense
+from fleet2d.blame import blame
+from fleet2d.engine.verdicts import points_seen
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.entity import Robot
 from fleet2d.entities.plan import Plan, State
 from fleet2d.errors import ScenarioError
 from fleet2d.kernels.look import (
@@ -24,6 +26,9 @@ from fleet2d.kernels.look import (
 )
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.perception import ABOUT, DRAWN_AT, IN_VIEW, MOST_GHOSTS, NOTICED, TRACKED
+from fleet2d.sight.fov import FieldOfView
+from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import Scene, error_tables, is_perfect, stack_lenses
 from fleet2d.streams import stream_key
 
@@ -31,7 +36,6 @@ from fleet2d.streams import stream_key
 BLOCK_VALUES = 1 << 17
 # With many actors the work of a span outweighs the cache.
 LEAST_STEPS = 4096
-EVENT_NAMES = ("user_lost", "user_seen")
 DAY_US = 86_400_000_000
 # What draws are for, in the order of fleet2d.kernels.perception.
 ABOUT_USERS = ("detect", "attend", "identify", "whom", "range", "bearing", "heading", "posture")
@@ -79,37 +83,63 @@ class PoseBlock:
             self.posture[index] = 0
             self._postured[index] = False
 
-    def crowd(self, users: int, count: int) -> Crowd:
-        """Return the first `count` poses of the users, which stand first."""
+    def crowd(self, rows: slice, count: int) -> Crowd:
+        """Return the first `count` poses of some actors."""
         return Crowd(
-            self.x[:users, :count],
-            self.y[:users, :count],
-            self.heading[:users, :count],
-            self.away[:users, :count],
-            self.posture[:users, :count],
+            self.x[rows, :count],
+            self.y[rows, :count],
+            self.heading[rows, :count],
+            self.away[rows, :count],
+            self.posture[rows, :count],
         )
 
 
 class Eye:
-    """A robot's cameras in a run: what they carry from span to span, and their latest findings.
+    """The cameras of a body in a run: what they carry from span to span, and their latest findings.
+
+    Robots look at users. A user who has a camera looks at robots.
 
     Attributes:
-        robot: Whose cameras.
+        owner: Whose cameras.
         row: Its row in a PoseBlock.
-        index: Its index among the robots.
-        users: Who can be seen.
+        index: Its index among the robots, or among the users.
+        others: Who can be seen.
         cameras: Names of the cameras.
         errs: Whether what is perceived can differ from the truth.
+        activity_senses: How each camera tells activities.
         memory: All that is carried along.
         perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
     """
 
-    def __init__(self, robot: Actor, row: int, users: Sequence[Actor], capacity: int) -> None:
-        assert isinstance(robot.entity, Robot)
-        self.robot, self.row, self.index = robot, row, row - len(users)
-        self.users = users
+    def __init__(
+        self,
+        row: int,
+        actors: Sequence[Actor],
+        users: int,
+        capacity: int,
+        method: FieldOfView | None = None,
+    ) -> None:
+        """Open the cameras of one body.
+
+        Args:
+            row: Its row in a PoseBlock.
+            actors: Everybody, users first.
+            users: How many of them are users.
+            capacity: Steps in a PoseBlock.
+            method: What tells who is in view; None: lines of sight.
+
+        Raises:
+            ScenarioError: A period is no multiple of the step, or somebody unknown is named.
+        """
+        self.owner, self.row = actors[row], row
+        # Lines of sight are compiled into the look.
+        self._method = None if isinstance(method, LineOfSight) else method
+        is_robot = row >= users
+        self.index = row - users if is_robot else row
+        self._rows = slice(0, users) if is_robot else slice(users, len(actors))
+        self.others = actors[self._rows]
         self._set_up()
-        count = len(users)
+        count = len(self.others)
         self.perceived = np.zeros((count + 1, 2), np.int64)
         rows = capacity * len(self.cameras) * max(1, count) + self.rule.burst
         self.sightings = np.empty((rows, SIGHTING), np.int64)
@@ -120,30 +150,31 @@ class Eye:
         self.found = self.happened = 0
 
     def _set_up(self) -> None:
-        robot, lattice, clock = self.robot, self.robot.home.plan.lattice, self.robot.clock
-        assert isinstance(robot.entity, Robot)
-        named = robot.entity.eyes
+        owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
+        named = owner.entity.eyes
         self.cameras = tuple(named)
         try:
             lenses = [camera.lens(lattice.units_per_m, clock.step_us) for camera in named.values()]
         except ValueError as error:
-            raise ScenarioError(f"{robot.path}: {error}") from None
-        perceptions = [camera.perception or robot.entity.perception for camera in named.values()]
+            raise ScenarioError(f"{owner.path}: {error}") from None
+        common = getattr(owner.entity, "perception", None)  # users see what is there
+        perceptions = [camera.perception or common for camera in named.values()]
         wrong = [not is_perfect(perception) for perception in perceptions]
         self.errs = any(wrong)
         scene = Scene(
-            [user.name for user in self.users],
-            [user.entity.radius * lattice.units_per_m for user in self.users],
+            [other.name for other in self.others],
+            [other.entity.radius * lattice.units_per_m for other in self.others],
             lattice,
             clock.step_us,
-            robot.path,
+            owner.path,
         )
         self.lenses = stack_lenses(lenses, wrong, scene)
         self.errors = error_tables(
             lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], scene
         )
         self._draw_streams()
-        count = len(self.users)
+        self._sense_activities(perceptions)
+        count = len(self.others)
         bursts = count + MOST_GHOSTS * self.errors.haunted
         midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
         since_midnight = clock.start - midnight
@@ -160,22 +191,40 @@ class Eye:
 
     def _draw_streams(self) -> None:
         """Give every draw a stream of its own, by name: a user more leaves the others' alone."""
-        robot, errors = self.robot, self.errors
+        owner, errors = self.owner, self.errors
         for c, camera in enumerate(self.cameras):
             of = "" if len(self.cameras) == 1 and camera == "camera" else f"{camera}: "
-            for u, user in enumerate(self.users):
+            for u, other in enumerate(self.others):
                 for i, purpose in enumerate(ABOUT_USERS if self.errs else ABOUT_USERS[:1]):
-                    key = stream_key(robot.seed, robot.path, f"{of}{purpose} {user.name}")
+                    key = stream_key(owner.seed, owner.path, f"{of}{purpose} {other.name}")
                     errors.keys[c, u, i] = key
             for i, purpose in enumerate(ABOUT_GHOSTS):
                 name = f"{of}{purpose}, false positives"
-                errors.ghost_keys[c, i] = stream_key(robot.seed, robot.path, name)
+                errors.ghost_keys[c, i] = stream_key(owner.seed, owner.path, name)
+
+    def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
+        """Note which cameras tell activities, and for what they take them."""
+        self.activity_senses: list[ActivitySense] = []
+        for c, (name, perception) in enumerate(zip(self.cameras, perceptions, strict=True)):
+            keys = [
+                stream_key(self.owner.seed, self.owner.path, f"{name}: activity {other.name}")
+                for other in self.others
+            ]
+            confusion = perception.attributes.activity if perception else None
+            latency = int(self.lenses.latency[c])
+            sense = ActivitySense(latency, np.array(keys, np.uint64), confusion)
+            self.activity_senses.append(sense)
+
+    @property
+    def event_names(self) -> tuple[str, str]:
+        """What is called when somebody is lost, and when somebody is seen."""
+        return self.owner.entity.sight_events
 
     @property
     def stops(self) -> tuple[bool, bool]:
-        """Whether (user_lost, user_seen) end the span."""
-        wanted = self.robot.plan.interrupts
-        return EVENT_NAMES[USER_LOST] in wanted, EVENT_NAMES[USER_SEEN] in wanted
+        """Whether it ends the span when somebody is lost, and when somebody is seen."""
+        wanted, names = self.owner.plan.interrupts, self.event_names
+        return names[USER_LOST] in wanted, names[USER_SEEN] in wanted
 
     @property
     def counts(self) -> I64:
@@ -185,18 +234,25 @@ class Eye:
 
     def name_of(self, identity: int) -> str:
         """Return the name of an identity; that of somebody unknown is empty."""
-        return self.users[identity].name if identity < len(self.users) else ""
+        return self.others[identity].name if identity < len(self.others) else ""
 
     def look(self, block: PoseBlock, first: int, count: int) -> int:
-        """Look at all users for `count` steps; return the steps done."""
+        """Look at all others for `count` steps; return the steps done."""
         lost, seen = self.stops
+        home, poses = self.owner.home, block.row(self.row, count)
+        crowd = block.crowd(self._rows, count)
+        if self._method is not None:
+            step_us = self.owner.clock.step_us
+            with blame("sight.method", first):
+                shown = points_seen(self._method, home, self.lenses, poses, crowd, first, step_us)
+            crowd = crowd._replace(shown=shown)
         done, self.found, self.happened = look(
-            self.robot.home.walls,
+            home.walls,
             self.lenses,
             self.errors,
             self.rule._replace(stop_lost=lost, stop_seen=seen),
-            block.row(self.row, count),
-            block.crowd(len(self.users), count),
+            poses,
+            crowd,
             first,
             self.memory,
             self.sightings,
@@ -209,6 +265,23 @@ class Eye:
         identity = self.sightings[: self.found, IDENTITY]  # -1, somebody unknown, is the last row
         self.perceived[identity, 0] = self.sightings[: self.found, X]
         self.perceived[identity, 1] = self.sightings[: self.found, Y]
+
+
+def open_eyes(
+    users: Sequence[Actor], robots: Sequence[Actor], block: PoseBlock, method: FieldOfView
+) -> tuple[list[Eye], list[Eye]]:
+    """Return the cameras of users and those of robots, if there is anybody to be seen."""
+    if not users or not robots:
+        return [], []
+    with blame("sight.method", None):
+        method.start(users[0].home)
+    actors, count = [*users, *robots], len(users)
+    eyes = [
+        Eye(row, actors, count, block.capacity, method)
+        for row, actor in enumerate(actors)
+        if actor.entity.eyes
+    ]
+    return [eye for eye in eyes if eye.row < count], [eye for eye in eyes if eye.row >= count]
 
 
 def new_memory(cameras: int, users: int, backlog: int) -> Memory:

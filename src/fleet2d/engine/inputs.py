@@ -10,8 +10,10 @@ from fleet2d.scenario.model import Scenario
 
 def input_files(scenario: Scenario) -> list[Path]:
     """Return the floor plan's files and the modules of the user's own components, sorted."""
-    files = set(scenario.floorplan.files())
+    files: set[Path] = set()
     for component in _components(scenario):
+        reads = getattr(component, "files", None)
+        files |= set(reads()) if reads else set()
         if not type(component).__module__.startswith("fleet2d."):
             source = inspect.getsourcefile(type(component))
             if source:

@@ -35,7 +35,8 @@ def lay_layers(home: Home, source: FloorPlanSource) -> None:
     costs = layers.pop(COSTMAP, None)
     if source.costmap is not None or costs is not None:
         layer = home.layers.add_layer(COSTMAP, _kept(_COSTS, costs or LayerSettings(store=False)))
-        layer.values = costs_of(home.plan, source.costmap or CostmapSettings())
+        solid = [thing.footprint for thing in home.objects if thing.blocks != "nothing"]
+        layer.values = costs_of(home.plan, source.costmap or CostmapSettings(), solid)
     for name, settings in layers.items():
         if name not in SEEN_LAYERS:
             home.layers.add_layer(name, settings)
@@ -74,6 +75,8 @@ class LayerBook:
         self._robots, self._first_robot = len(scenario.robots), len(scenario.users)
         learners = [*scenario.algorithms.values(), *scenario.metrics.values()]
         needed = {need for learner in learners for need in _needs_of(learner)}
+        behaviors = [behavior for actor in actors for behavior in actor.behaviors]
+        needed |= {need for behavior in behaviors for need in behavior.needs}
         wanted = {*needed, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
         self._exposes = "exposure" in needed
         self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0

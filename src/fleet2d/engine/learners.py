@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History, Log
+from fleet2d.algorithms.learned import load_learned, save_learned
 from fleet2d.algorithms.output import to_columns
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
@@ -36,6 +38,7 @@ class Learner:
         table: The name of the table of what it puts out.
         kinds: The kinds of that table's columns; empty before the first output.
         since: First step of its next history.
+        back: How many steps before that it may look back.
     """
 
     name: str
@@ -45,6 +48,12 @@ class Learner:
     table: str
     kinds: dict[str, Kind] = field(default_factory=dict)
     since: int = 0
+    back: int = 0
+
+    @property
+    def oldest(self) -> int:
+        """The first step that it may still ask for."""
+        return max(0, self.since - self.back)
 
     @property
     def due(self) -> int:
@@ -92,7 +101,7 @@ class Learners:
 
     def earliest_needed(self) -> int:
         """Return the first step that is still part of somebody's next history."""
-        return min(learner.since for learner in self.all)
+        return min(learner.oldest for learner in self.all)
 
     def update(self, end: int, log: Log) -> None:
         """Update everybody whose period ends before step `end`."""
@@ -122,6 +131,20 @@ class Learners:
                     results[learner.name] = checked_result(learner.component.result())
         return results
 
+    def remember(self, directory: Path) -> list[str]:
+        """Write what each algorithm has learned to a file of its own; return what can't be kept."""
+        notes = []
+        for learner in self.all:
+            if isinstance(learner.component, Algorithm):
+                try:
+                    directory.mkdir(exist_ok=True)
+                    with blame(learner.path, None):
+                        state = learner.component.remember()
+                        save_learned(state, directory / f"{learner.name}.npz", learner.path)
+                except (ComponentError, OSError) as error:
+                    notes.append(f"what {learner.path} has learned is not stored: {error}")
+        return notes
+
     def _add(self, name: str, path: str, component: Algorithm | Metric) -> None:
         every, rest = divmod(micros(component.period), self.clock.step_us)
         if rest or not every:
@@ -132,17 +155,21 @@ class Learners:
         component = component.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
+            if isinstance(component, Algorithm) and component.learned is not None:
+                component.recall(load_learned(component.learned))
         # Metrics and algorithms may share a name; some file systems take A and a for one.
         taken = {*_FIXED, *(learner.table.casefold() for learner in self.all)}
         table = name
         while table.casefold() in taken:
             table = f"{path.partition('.')[0]}_{table}"
-        self.all.append(Learner(name, path, component, every, table))
+        back = -(micros(component.looks_back) // -self.clock.step_us)
+        self.all.append(Learner(name, path, component, every, table, back=back))
 
     def _update(self, learner: Learner, end: int, log: Log, outputs: Mapping[str, Any]) -> Any:
         knows_truth = isinstance(learner.component, Metric)
         visible = frozenset((*self.users, *self.robots) if knows_truth else self.robots)
-        history = History(log, learner.since, end, self.clock.step_us / 1e6, visible)
+        step_s = self.clock.step_us / 1e6
+        history = History(log, learner.since, end, step_s, visible, learner.oldest)
         state = Present(
             learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
             self.users, self.robots, MappingProxyType({**outputs}), self.seed

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.activities import ROBOT, TOLD, Activities
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import (
     OBSERVATION,
-    ROBOT,
     NearestRooms,
     perceived,
     truth,
@@ -24,7 +24,7 @@ from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock
+from fleet2d.engine.buckets import Eye, PoseBlock
 from fleet2d.engine.changes import Happened
 from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.actor import Actor
@@ -64,6 +64,7 @@ def table_specs(
     *,
     changes: bool = False,
     cameras: Sequence[str] = (),
+    activities: bool = False,
 ) -> list[TableSpec]:
     """Return the tables that a run with these settings stores; `cameras` are told_cameras()."""
     entity = Column("entity", "category", categories=(*users, *robots))
@@ -76,7 +77,7 @@ def table_specs(
         kind = Column("kind", "category", categories=KEY_KINDS)
         specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
     if settings.observations and users and robots:
-        specs.append(_observation_table(users, robots, room, cameras))
+        specs.append(_observation_table(users, robots, room, cameras, activities))
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=tuple(users))
@@ -100,8 +101,18 @@ def told_cameras(eyes: Sequence[Eye]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for eye in eyes for name in eye.cameras))
 
 
+def activities_of(eyes: Sequence[Eye], users: int) -> Activities:
+    """Return what users do, and what each camera takes it for: nothing known yet."""
+    senses = {(eye.index, c): sense for eye in eyes for c, sense in enumerate(eye.activity_senses)}
+    return Activities(users, senses)
+
+
 def _observation_table(
-    users: Sequence[str], robots: Sequence[str], room: Column, cameras: Sequence[str]
+    users: Sequence[str],
+    robots: Sequence[str],
+    room: Column,
+    cameras: Sequence[str],
+    activities: bool,
 ) -> TableSpec:
     """Return the table of what was perceived; where that can be wrong, with the truth beside it."""
     robot = Column("robot", "category", categories=tuple(robots))
@@ -115,6 +126,10 @@ def _observation_table(
         }
         camera = Column("camera", "category", categories=tuple(cameras))
         columns += [HEADING, posture, camera, *true.values()]
+    if activities:
+        doing = "what the user does, as far as a behavior tells"
+        for name in ("activity", "true_activity"):
+            columns.append(Column(name, "category", nullable=True, description=doing))
     return TableSpec("observations", tuple(columns))
 
 
@@ -167,7 +182,10 @@ class Recorder:
         self._keeps_keys = "key_frames" in tables
         self._keeps_observations = "observations" in tables
         self._keeps_events = "events" in tables
-        self._has_users = any(actor.path.startswith("users.") for actor in actors)
+        users = sum(actor.path.startswith("users.") for actor in actors)
+        self._has_users = users > 0
+        self.activities = activities_of(eyes, users)
+        self._tells_activities = self.activities.are_told
         self._every = _steps_between_samples(settings, clock)
         self._object_rows = {name: len(actors) + i for i, name in enumerate(objects)}
         # A random walk is rebuilt by walking it again between walls that haven't changed since;
@@ -230,15 +248,30 @@ class Recorder:
         self._gathered += len(rows)
 
     def span(
-        self, block: PoseBlock, first: int, count: int, eyes: Sequence[Eye]
+        self,
+        block: PoseBlock,
+        first: int,
+        count: int,
+        eyes: Sequence[Eye],
+        gazes: Sequence[Eye] = (),
     ) -> NDArray[np.int64] | None:
-        """Gather a span; return its observations, (n, OBSERVATION)."""
+        """Gather a span; return its observations, (n, OBSERVATION).
+
+        Args:
+            block: The poses of the span.
+            first: Its first step.
+            count: How many steps it has.
+            eyes: The cameras of robots.
+            gazes: Those of users, of which only the events are kept.
+        """
         for row in range(len(self.actors)):
             self._tell_plan(row, first + count - 1)
         if self._every:
             self._sample(block, first, count)
         if self._keeps_keys:
             self._key_walks(block, first, count)
+        if self._keeps_events:
+            self._tell_sights([*eyes, *gazes])
         observations = self._observe(eyes) if eyes else None
         if self._gathered + len(self._events) + 8 * len(self._keys) > GATHERED:
             self.drain()
@@ -268,7 +301,7 @@ class Recorder:
         """Gather key frames and notes of the present plan up to a step."""
         actor = self.actors[row]
         moment = step * self.clock.step_us
-        if self._keeps_events:
+        if self._keeps_events or self._tells_activities:
             notes = actor.plan.notes
             while (
                 self._notes_told[row] < len(notes)
@@ -276,7 +309,10 @@ class Recorder:
             ):
                 note = notes[self._notes_told[row]]
                 at = self.clock.step_at_or_after(note.time_us)
-                self._events.append((at, row, 0, note.event, -1, note.detail))
+                if self._keeps_events:
+                    self._events.append((at, row, 0, note.event, -1, note.detail))
+                if note.event == TOLD and row < self.activities.users:
+                    self.activities.begin(row, at, note.detail)
                 self._notes_told[row] += 1
         if self._keeps_keys and isinstance(actor.motion, Track):
             track = actor.motion.breakpoints
@@ -327,7 +363,7 @@ class Recorder:
 
     def _observe(self, eyes: Sequence[Eye]) -> NDArray[np.int64]:
         """Join the findings of all cameras, in order of step and robot."""
-        if not any(eye.found or eye.happened for eye in eyes):
+        if not any(eye.found for eye in eyes):
             return np.empty((0, OBSERVATION), np.int64)
         rows = np.empty((sum(eye.found for eye in eyes), OBSERVATION), np.int64)
         end = 0
@@ -340,15 +376,19 @@ class Recorder:
         if self._keeps_observations and len(rows):
             self._observations.append(rows)
             self._gathered += len(rows)
-        if self._keeps_events:
-            for eye in eyes:
-                for i in range(eye.happened):
-                    event = EVENT_NAMES[eye.events.kind[i]]
-                    who = int(eye.events.user[i])
-                    if who == len(eye.users):
-                        who = -1  # somebody unknown
-                    self._events.append((int(eye.events.step[i]), eye.row, 1, event, who, ""))
         return rows
+
+    def _tell_sights(self, eyes: Sequence[Eye]) -> None:
+        """Gather who came into view of whom, and who was lost."""
+        for eye in eyes:
+            for i in range(eye.happened):
+                event = eye.event_names[eye.events.kind[i]]
+                who, detail = int(eye.events.user[i]), ""
+                if who == len(eye.others):
+                    who = -1  # somebody unknown
+                if event.startswith("robot"):
+                    who, detail = -1, eye.name_of(who)
+                self._events.append((int(eye.events.step[i]), eye.row, 1, event, who, detail))
 
     # Storing
 
@@ -397,7 +437,7 @@ class Recorder:
             return
         rows = np.concatenate(self._observations)
         self._observations = []
-        o = perceived(self.home.plan, self._rooms, rows)
+        o = perceived(self.home.plan, self._rooms, rows, self.activities)
         columns: dict[str, Any] = {
             **self._when(o.step),
             "robot": o.robot,
@@ -407,7 +447,7 @@ class Recorder:
             "room": o.room.astype(np.int32),
         }
         if self._camera_codes:
-            t = truth(self.home.plan, rows)
+            t = truth(self.home.plan, rows, self.activities)
             real = t.user >= 0
             columns |= {
                 "heading": o.heading,
@@ -419,6 +459,8 @@ class Recorder:
                 "true_heading": np.where(real, t.heading, np.nan),
                 "true_posture": np.where(real, t.posture, -1).astype(np.int32),
             }
+            if self._tells_activities:
+                columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
         self.store.append("observations", **columns)
 
     def _cameras(self, robot: NDArray[np.int32], camera: NDArray[np.int8]) -> NDArray[np.int32]:

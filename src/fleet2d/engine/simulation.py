@@ -12,19 +12,24 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from pydantic import ValidationError
 
+from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.history import Log, Piece
 from fleet2d.artifacts.manifest import Status
-from fleet2d.artifacts.reader import Run
+from fleet2d.artifacts.reader import LEARNED_NAME, Run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import EVENT_NAMES, Eye, PoseBlock, look_together
+from fleet2d.engine.buckets import Eye, PoseBlock, look_together, open_eyes
 from fleet2d.engine.changes import Changes
+from fleet2d.engine.clearance import Clearance
+from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.keeping import (
     deferred_interrupt,
     describe_end,
@@ -34,11 +39,10 @@ from fleet2d.engine.keeping import (
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.pace import Pace
-from fleet2d.engine.recorder import Recorder, sensor_table, table_specs, told_cameras
+from fleet2d.engine.recorder import Recorder, activities_of, sensor_table, table_specs, told_cameras
 from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import SightEvent
-from fleet2d.entities.entity import Robot
+from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import InputError, PlacementError, ScenarioError
 from fleet2d.floorplan.change import HomeChange, HomeChanges
@@ -93,7 +97,13 @@ class Simulation:
         self._robots = self._actors("robots", self.scenario.robots)
         self._all = [*self._users, *self._robots]
         self._block = PoseBlock(self._all)
-        self._eyes = self._open_eyes()
+        sight = self.scenario.sight.method.model_copy()
+        self._gazes, self._eyes = open_eyes(self._users, self._robots, self._block, sight)
+        for eye in [*self._gazes, *self._eyes]:
+            eye.owner.in_view = partial(_in_view, eye)
+        self._check_reads()
+        self._encounters = Encounters(self._users, self._robots)
+        self._clearance = Clearance(self._users, self._robots)
         changes = self.scenario.changes
         self._changes = Changes(self.scenario.objects, changes, self.home, self.clock)
         with self._placing("objects"):
@@ -116,6 +126,7 @@ class Simulation:
         self._learners = self._start_learners()
         self._log = Log(self.home, self._all) if self._learners.all else None
         if self._log:
+            self._log.activities = self._recorder.activities
             self._log.cameras = [(eye.index, name) for eye in self._eyes for name in eye.cameras]
         self._pending: dict[int, list[SightEvent]] = {}  # events that interrupted a robot's plan
         self._max_span = min(simulation.max_span or self._block.capacity, self._block.capacity)
@@ -168,6 +179,15 @@ class Simulation:
         """The newest output of each algorithm, by name."""
         return dict(self._learners.outputs)
 
+    @property
+    def algorithms(self) -> dict[str, Algorithm]:
+        """The algorithms in the run, by name: configuration, and what they have learned."""
+        return {
+            learner.name: learner.component
+            for learner in self._learners.all
+            if isinstance(learner.component, Algorithm)
+        }
+
     # Running
 
     def advance(self, steps: int = 1) -> None:
@@ -216,7 +236,7 @@ class Simulation:
             raise ScenarioError(
                 f"there is nobody named {name!r}{hint} There are: {', '.join(actors)}"
             )
-        actors[name].ask_at = self.step
+        actors[name].ask_at, actors[name].arbiter.wake_step = self.step, None
         self._steered()
 
     def change(self, change: HomeChange | None = None, /, **what: Any) -> None:
@@ -275,6 +295,7 @@ class Simulation:
         self._recorder.end(self.step)
         if status != "failed":
             self._layers.finish(self.step)
+            self._keep_learned()
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
         wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
@@ -283,6 +304,12 @@ class Simulation:
         self._run = self._store.run()
         self._run.plan = self.home.plan
         return self._run
+
+    def _keep_learned(self) -> None:
+        """Store what algorithms have learned; of one that can't be kept, the run says so."""
+        if self._store.directory is not None and self.scenario.artifacts.learned:
+            notes = self._learners.remember(self._store.directory / LEARNED_NAME)
+            self._store.manifest.notes += notes
 
     def _steered(self) -> None:
         notes, text = self._store.manifest.notes, "steered by a script: reproduce it by that script"
@@ -339,14 +366,19 @@ class Simulation:
                 self._log.pieces[row].append(Piece(first, actor.state, actor.motion))
             actor.motion.trace(first, actor.state, self._block.row(row, count + 1))
             self._block.take_postures(row, first, count, actor.plan, self.clock.step_us)
-        if self._eyes:
-            count = look_together(self._eyes, self._block, first, count)
-        observations = self._recorder.span(self._block, first, count, self._eyes)
+        count = self._clearance.limit(self._block, first, count)
+        count = self._encounters.limit(self._block, first, count)
+        if self._eyes or self._gazes:
+            count = look_together([*self._eyes, *self._gazes], self._block, first, count)
+        observations = self._recorder.span(self._block, first, count, self._eyes, self._gazes)
         self._sense(first, count)
         self._layers.span(self._block, first, count)
         for row, actor in enumerate(self._all):
             actor.state = self._block.state(row, count)
         self._interrupt(first + count - 1)
+        for row, user, event in self._encounters.take(self._block, first, count):
+            self._pending.setdefault(row, []).append(event)
+            user.ask_at = first + count
         self.step = first + count
         if self._log:
             if observations is not None and len(observations):
@@ -375,13 +407,35 @@ class Simulation:
                 self._recorder.changed(self._changes.make(step, self._all))
 
     def _decide(self, step: int) -> None:
-        """Ask everybody whose plan is over: users, then robots."""
+        """Ask everybody whose plan is over, or who would drive at somebody: users, then robots."""
         for row, actor in enumerate(self._all):
-            if actor.ask_at is not None and actor.ask_at <= step:
-                self._recorder.before_plan(row, step)
-                actor.decide(step, tuple(self._pending.pop(row, ())), self._learners.readable)
+            due = actor.ask_at is not None and actor.ask_at <= step
+            whom = None
+            if due:
+                events = tuple(self._pending.pop(row, ()))
+                now = Situation(actor, step, events, self._learners.readable)
+                due = not actor.goes_on(now)
+            if due:
+                self._end_plan(row, step)
+                actor.decide(now)
+            if self._clearance.robots:
+                whom = self._clearance.in_way(row, step)
+            if whom is not None:
+                if not due:
+                    self._end_plan(row, step)
+                now = Situation(actor, step, (), self._learners.readable)
+                actor.give_way(now, whom.name, self._clearance.people(actor))
+            if due or whom is not None:
                 self._changes.expect(row, actor)
                 self._recorder.after_plan(row, step)
+
+    def _end_plan(self, row: int, step: int) -> None:
+        """Tell of a plan what happened up to the step at which it is replaced."""
+        actor = self._all[row]
+        self._recorder.before_plan(row, step)
+        if self._log:
+            self._log.tell(actor, step)
+        self._encounters.before_plan(row, actor, step)
 
     def _take_up_changes(self) -> None:
         """Let what algorithms just put out to change the home happen at the next step."""
@@ -414,19 +468,19 @@ class Simulation:
         self._layers.expose(self.step, log)
 
     def _interrupt(self, step: int) -> None:
-        """End the plans of robots that an event of the span's last step interrupts."""
+        """End the plans of bodies that a sight of the span's last step interrupts."""
         lattice = self.home.plan.lattice
-        for eye in self._eyes:
+        for eye in [*self._gazes, *self._eyes]:
             eye.remember()
             stops = eye.stops
             events = eye.events
             for i in range(eye.happened):
                 if events.step[i] == step and stops[events.kind[i]]:
-                    user = int(events.user[i])
-                    x, y = lattice.to_metres(eye.perceived[user]).tolist()
-                    event = SightEvent(EVENT_NAMES[events.kind[i]], eye.name_of(user), x, y)
+                    who = int(events.user[i])
+                    x, y = lattice.to_metres(eye.perceived[who]).tolist()
+                    event = SightEvent(eye.event_names[events.kind[i]], eye.name_of(who), x, y)
                     self._pending.setdefault(eye.row, []).append(event)
-                    eye.robot.ask_at = step + 1
+                    eye.owner.ask_at = step + 1
 
     # Set-up and closing
 
@@ -466,14 +520,16 @@ class Simulation:
                 actors.append(Actor(name, path, entity, self.home, self.clock, self.seed))
         return actors
 
-    def _open_eyes(self) -> list[Eye]:
-        if not self._users:
-            return []
-        return [
-            Eye(robot, len(self._users) + i, self._users, self._block.capacity)
-            for i, robot in enumerate(self._robots)
-            if isinstance(robot.entity, Robot) and robot.entity.eyes
-        ]
+    def _check_reads(self) -> None:
+        """Refuse behaviors that go by an algorithm that there isn't."""
+        known = self.scenario.algorithms
+        for actor in self._all:
+            for read in (read for behavior in actor.behaviors for read in behavior.reads()):
+                if read not in known:
+                    raise ScenarioError(
+                        f"{actor.path} goes by {read!r}, which is no algorithm of the scenario"
+                        f"{did_you_mean(read, known)} There are: {', '.join(known) or 'none'}"
+                    )
 
     @property
     def _may_change(self) -> bool:
@@ -491,6 +547,7 @@ class Simulation:
             list(self.scenario.objects),
             changes=self._may_change,
             cameras=told_cameras(self._eyes),
+            activities=activities_of(self._eyes, len(users)).are_told,
         )
         if self._sensors.names:
             specs.append(sensor_table(self._sensors))
@@ -530,3 +587,12 @@ class Simulation:
             "room": room.name if room else None,
             "away": bool(state.away),
         }
+
+
+def _in_view(eye: Eye) -> dict[str, tuple[float, float]]:
+    """Return whom the cameras of a body have in view, and where each was perceived last [m]."""
+    lattice, found = eye.owner.home.plan.lattice, {}
+    for who in np.flatnonzero(eye.memory.seen).tolist():
+        x, y = lattice.to_metres(eye.perceived[who]).tolist()
+        found[eye.name_of(who)] = (x, y)
+    return found

@@ -1,14 +1,22 @@
-"""Who is in view by a method that is not compiled: asked in Python, once per change of poses."""
+"""Who is in view by a method that is not compiled into the look: asked, and nothing twice."""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels.lens import Lenses, camera_pose
+from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import Crowd
+from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.points import BODY, BODY_X, BODY_Y, EYE_HEADING, questions
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.fov import FieldOfView
+
+# A method may round points to cells: it is asked about those so far beside the field of view, too.
+SLACK = 2 * SUB
 
 
 def points_seen(
@@ -20,55 +28,57 @@ def points_seen(
     first: int,
     step_us: int,
 ) -> NDArray[np.uint8]:
-    """Return how many points of each user's body are in view of each camera at each step.
+    """Return how many points of each body are in view of each camera at each step.
 
     Args:
         method: What tells whether a point is in view.
         home: The home.
-        lenses: The robot's cameras.
-        robot: Its poses, n of them.
-        crowd: The users.
+        lenses: The cameras.
+        robot: The poses of whoever has them, n of them.
+        crowd: The others.
         first: The step of the first pose.
         step_us: Length of a step.
 
     Returns:
-        uint8 (cameras, users, n).
+        uint8 (cameras, bodies, n).
+
+    Raises:
+        ComponentError: The method answers with something else than a bool for each point.
     """
-    cameras, users = lenses.widest.shape
-    steps = len(robot.x)
-    seen = np.zeros((cameras, users, steps), np.uint8)
-    begins = _changes(lenses, robot, crowd, first, step_us)
-    for begin, end in zip(begins, [*begins[1:], steps], strict=True):
-        if robot.away[begin]:
-            continue
-        at = (int(robot.x[begin]), int(robot.y[begin]), int(robot.heading[begin]))
-        xy = np.stack([crowd.x[:, begin], crowd.y[:, begin]], axis=1)
-        for camera in range(cameras):
-            x, y, heading = camera_pose(lenses, camera, *at, (first + begin) * step_us)
-            reach = Reach(
-                int(lenses.near_squared[camera]),
-                int(lenses.far_squared[camera]),
-                int(lenses.half_angle[camera]),
-            )
-            near = ((xy - (x, y)) ** 2).sum(axis=1) <= lenses.widest[camera]
-            for user in np.flatnonzero(near & (crowd.away[:, begin] == 0)).tolist():
-                body = lenses.bodies[camera, user, : int(lenses.points[camera]) + 1]
-                found = method.sees(home, int(x), int(y), int(heading), reach, xy[user] + body)
-                seen[camera, user, begin:end] = np.count_nonzero(found)
+    widest = np.array(
+        [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
+        np.int64,
+    ).reshape(lenses.widest.shape)
+    # Of one layout, however many they are, so that the kernel is compiled once.
+    x, y = (np.ascontiguousarray(column) for column in (crowd.x, crowd.y))
+    away = np.ascontiguousarray(crowd.away)
+    asked, number = questions(lenses, widest, SLACK, robot, x, y, away, first, step_us)
+    answers = np.zeros(len(asked) + 1, np.uint8)
+    moved = asked[1:, : EYE_HEADING + 1] != asked[:-1, : EYE_HEADING + 1]
+    moved[:, BODY] = False
+    begins = [0, *(np.flatnonzero(moved.any(axis=1)) + 1).tolist()] if len(asked) else []
+    for begin, end in zip(begins, [*begins[1:], len(asked)], strict=False):
+        answers[begin + 1 : end + 1] = _answers(method, home, lenses, asked[begin:end])
+    return answers[number]
+
+
+def _answers(
+    method: FieldOfView, home: Home, lenses: Lenses, asked: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return how many points of each body are in view, for one pose of one camera."""
+    camera, _, x, y, heading = asked[0, : EYE_HEADING + 1].tolist()
+    reach = Reach(
+        int(lenses.near_squared[camera]),
+        int(lenses.far_squared[camera]),
+        int(lenses.half_angle[camera]),
+    )
+    bodies = lenses.bodies[camera, asked[:, BODY], : int(lenses.points[camera]) + 1]
+    points = (bodies + asked[:, None, [BODY_X, BODY_Y]]).reshape(-1, 2)
+    found: object = method.sees(home, x, y, heading, reach, points)  # a user's own may err
+    if not isinstance(found, np.ndarray) or found.dtype != bool or found.shape != (len(points),):
+        raise ComponentError(
+            f"{type(method).__name__} answered {found!r} for {len(points)} points: an array with a"
+            " bool for each is wanted"
+        )
+    seen: NDArray[np.int64] = found.reshape(len(asked), -1).sum(axis=1)
     return seen
-
-
-def _changes(lenses: Lenses, robot: Poses, crowd: Crowd, first: int, step_us: int) -> list[int]:
-    """Return the columns at which the robot, a user or a camera has moved, and the first one."""
-    steps = len(robot.x)
-    moments = (first + np.arange(steps)) * step_us
-    state = [robot.x, robot.y, robot.heading, robot.away, *crowd.x, *crowd.y, *crowd.away]
-    state += [
-        moments // lenses.pan_us[camera] for camera in np.flatnonzero(lenses.pan_count).tolist()
-    ]
-    moved = np.zeros(steps, np.bool_)
-    moved[:1] = True
-    for values in state:
-        moved[1:] |= np.diff(values.astype(np.int64)) != 0
-    changes: list[int] = np.flatnonzero(moved).tolist()
-    return changes

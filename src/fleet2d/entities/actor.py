@@ -1,28 +1,47 @@
 """An entity in a run: its body, its place in the home, and the plan that it follows."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.arbitration import Arbiter
+from fleet2d.entities.battery import Charge
+from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.entity import Entity
+from fleet2d.entities.giving_way import JUST_WAITED, Waiting
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, State
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws, stream_key
+from fleet2d.units import micros
 
 # Nobody has a plan: stand still this long, then ask again.
 PAUSE = timedelta(minutes=1)
 # A shut door is in the way: wait this long, then ask again.
 AT_A_DOOR = timedelta(seconds=10)
+
+
+class PlaceAt(NamedTuple):
+    """A place to use an object from, on the lattice."""
+
+    thing: PlacedObject
+    name: str
+    x: int
+    y: int
+    heading: int
+    posture: Posture
+    approach: tuple[int, int]
 
 
 @dataclass(eq=False)
@@ -50,15 +69,26 @@ class Actor:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self._space: tuple[int, Space] = self.home.version, self._present_space()
+        self._space: tuple[tuple[int, int], Space] = self._arrangement, self._present_space()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
+        self._places: tuple[Space, dict[tuple[str, int], PlaceAt]] = self._space[1], {}
+        self.in_view: Callable[[], Mapping[str, Point]] = dict  # set where it has cameras
         self.behaviors = [behavior.model_copy(deep=True) for behavior in self.entity.behaviors]
         with blame(self.path, None):
             self.state = self._begin()
+            battery = getattr(self.entity, "battery", None)
+            self.charge = None if battery is None else Charge(battery, self)
             for behavior in self.behaviors:
                 behavior.start(self)
+            pays = ((behavior, behavior.attention(self)) for behavior in self.behaviors)
+            self._attentive = next((pair for pair in pays if pair[1] is not None), None)
+        self.arbiter = Arbiter(self.behaviors)
+        self._chosen: Plan | None = None
+        self._waiting: Waiting | None = None
+        self._waited = (0, -1)  # since when it last waited, and up to which step that counts
+        self.pushes_until = 0  # before that step it doesn't give way
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
@@ -67,23 +97,35 @@ class Actor:
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
-        if self._space[0] != self.home.version:
-            self._space = self.home.version, self._present_space()
+        if self._space[0] != self._arrangement:
+            self._space = self._arrangement, self._present_space()
             self.part = self._present_part()
         return self._space[1]
 
+    @property
+    def _arrangement(self) -> tuple[int, int]:
+        """What its space depends on: it is another whenever that is."""
+        return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
+
     def _present_space(self) -> Space:
         entity = self.entity
-        return self.home.space(entity.radius, opens_doors=entity.opens_doors)
+        space = self.home.space(entity.radius, opens_doors=entity.opens_doors)
+        return self.home.costed(space) if entity.minds_costs else space
 
     def _present_part(self) -> int:
         """Return the part of a changed space that it is in, or nearest to."""
         space, x, y = self._space[1], self.state.x, self.state.y
         part = space.part_at(x, y)
-        if part < 0:
-            near = space.nearest(x, y)
-            part = 0 if near is None else space.part_at(*near)
-        return part
+        return part if part >= 0 else space.part_near(x, y)
+
+    @property
+    def attention(self) -> Attention | None:
+        """What of robots interrupts its plans: that of the first behavior that pays any."""
+        return self._attentive[1] if self._attentive else None
+
+    def heeds(self, event: SightEvent, step: int) -> bool:
+        """Tell whether it reacts to what a robot does."""
+        return self._attentive is not None and self._attentive[0].heeds(self, event, step)
 
     @property
     def way_out(self) -> tuple[int, int]:
@@ -96,6 +138,30 @@ class Actor:
         if plan is None or not (plan.postures or plan.posture != "stand"):
             return 0
         return int(plan.posture_at(np.array([time_us]))[0])
+
+    def place_at(self, thing: PlacedObject | str, place: int) -> PlaceAt:
+        """Return a place to use an object from, and remember it while the home stays as it is.
+
+        Raises:
+            PlacementError: There is no such object, or no place to use it from.
+        """
+        if self._places[0] is not self.space:
+            self._places = self.space, {}
+        name = thing if isinstance(thing, str) else thing.name
+        known = self._places[1].get((name, place))
+        if known is not None and (isinstance(thing, str) or known.thing is thing):
+            return known
+        home, lattice = self.home, self.home.plan.lattice
+        thing = home.object(thing) if isinstance(thing, str) else thing
+        if not thing.uses:
+            raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")
+        use = thing.uses[place % len(thing.uses)]
+        x, y = lattice.to_lattice((use.x, use.y)).tolist()
+        heading = round(use.heading / (2 * np.pi) * TURN) % TURN
+        approach = home.approach(use, self.space, self.part)
+        found = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
+        self._places[1][name, place] = found
+        return found
 
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
@@ -162,11 +228,11 @@ class Actor:
             return x, y
         near = self.space.nearest(x, y, self.part)
         there = None if near is None else self._shown(near)
-        why = (
-            "can't be reached from where it starts"
-            if part >= 0
-            else f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
-        )
+        why = f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
+        if part >= 0:
+            why = "can't be reached from where it starts"
+        elif self.home.space(self.entity.radius).part_at(x, y) >= 0:
+            why = "is where the costmap lets no way lead"
         raise PlacementError(
             f"{self.path}: the point {list(xy)} {why}; the nearest free point is {there}"
         )
@@ -180,15 +246,33 @@ class Actor:
         exact: list[float] = lattice.to_metres(point).round(4).tolist()
         return exact
 
-    def decide(self, step: int, events: tuple[object, ...], outputs: Mapping[str, object]) -> None:
-        """Ask the behaviors, in order, for a plan that begins at `step`."""
-        now = Situation(self, step, events, outputs)  # type: ignore[arg-type]
-        plan = None
+    def goes_on(self, now: Situation) -> bool:
+        """Tell whether, of those who want to be asked at a step, nobody has anything better to do.
+
+        If somebody has, that plan is what `decide` takes.
+        """
+        if self.charge is not None:
+            self.charge.follow(self.motion, now.step * self.clock.step_us)
+            if self.charge.is_empty:
+                return False
+        with blame(self.path, now.step):
+            found = self.arbiter.goes_on(now, self.plan, self._asked)
+            if found is True:
+                self._watch(now, fresh=False)
+                return True
+        self._chosen = found if isinstance(found, Plan) else None
+        return False
+
+    def decide(self, now: Situation) -> None:
+        """Ask the behaviors, in order, for a plan that begins now."""
+        step, (plan, self._chosen) = now.step, (self._chosen, None)
+        if self.charge is not None and self.charge.is_empty:
+            plan = now.plan().stay()
+        waiting, self._waiting = self._waiting, None
+        if plan is None and waiting is not None and not now.events:
+            plan = waiting.go_on(now)
         with blame(self.path, step):
-            for behavior in self.behaviors:
-                plan = self._asked(behavior, now)
-                if plan is not None:
-                    break
+            plan = plan or self.arbiter.choose(now, self.plan, self._asked)
         if plan is None:
             plan = now.plan()
             plan = plan.stay(PAUSE) if self.behaviors else plan.stay()
@@ -202,16 +286,58 @@ class Actor:
                 " by now.plan()"
             )
         self.plan, self.motion, self.planned_at = plan, plan.finish(), step
-        # A plan that takes no time would be asked for again and again at the same step.
-        over = max(self.clock.step_at_or_after(plan.time_us), step + 1)
-        self.ask_at = None if plan.endless else over
+        if self.charge is not None:
+            self.charge.tell(plan)
+        with blame(self.path, step):
+            self._watch(now, fresh=True)
+
+    def give_way(self, now: Situation, whom: str, people: NDArray[np.int64]) -> None:
+        """Stop before somebody at whom the plan would drive now; in the end go round, or on.
+
+        Args:
+            now: The situation.
+            whom: Who is in the way.
+            people: Where people are, and how far to keep from each [lattice], int64 (n, 3).
+        """
+        step, just = now.step, micros(JUST_WAITED) // self.clock.step_us + 1
+        since = self._waited[0] if step <= self._waited[1] else step
+        waits = Waiting(self.plan, step, since, self.arbiter.own)
+        self._waited = since, step + just
+        patience = micros(self.entity.gives_way.patience)  # type: ignore[attr-defined]
+        plan: Plan | None
+        if (step - since) * self.clock.step_us < patience:
+            plan, self._waiting = waits.wait(now, whom), waits
+        else:
+            self.pushes_until = step + just
+            plan = waits.go_on(now, people)
+        if plan is not None:
+            if self.plan.began[0] == step:  # it has begun, and is over at once
+                begun = [n for n in self.plan.notes if n.time_us <= step * self.clock.step_us]
+                plan.notes[:0] = begun
+            self.plan, self.motion, self.planned_at = plan, plan.finish(), step
+            self._watch(now, fresh=True)
+        elif self.plan.began[0] != step:
+            self.decide(now)
+
+    def _watch(self, now: Situation, *, fresh: bool) -> None:
+        """Set when it is asked again: the plan is over, or somebody may want to break in."""
+        if self.charge is not None and self.charge.is_empty:
+            self.ask_at = None  # it stands there for good
+            return
+        self.arbiter.watch(now, self.plan, fresh=fresh)
+        steps = [s for s in (self.plan.over_at, self.arbiter.wake_step) if s is not None]
+        if self.charge is not None:
+            empty_us = self.charge.falls_to(0.0, self.motion)
+            if empty_us is not None:
+                steps.append(max(self.clock.step_at_or_after(empty_us), now.step + 1))
+        self.ask_at = min(steps, default=None)
 
     def _asked(self, behavior: Behavior, now: Situation) -> Plan | None:
-        """Return a behavior's plan; where a shut door is in its way, wait a little instead."""
+        """Return a behavior's plan; where a shut door or a cost is in its way, wait a little."""
         try:
             return behavior.decide(now)
         except (PlacementError, NoWayError) as error:
-            if not self.home.shut:
+            if not self.home.hinders:
                 raise
             return now.plan().note("way_blocked", str(error)).stay(AT_A_DOOR)
 

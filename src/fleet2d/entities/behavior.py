@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from pydantic import Field
+
 from fleet2d.component import Component
+from fleet2d.entities.hours import Hours
 from fleet2d.entities.plan import Plan
 from fleet2d.streams import Draws
+from fleet2d.units import Duration
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -16,12 +20,32 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import Room
 
 
-class SightEvent(NamedTuple):
-    """Somebody came into view of a camera, or was lost from it."""
+class Attention(NamedTuple):
+    """What somebody takes notice of in robots: distances [lattice units] between the bodies.
 
-    event: str  # user_seen | user_lost
-    user: str  # for whom somebody was taken; empty for somebody not recognized
-    x: float  # where the user was perceived last [m]
+    Attributes:
+        notices: Nearer robots in sight are noticed: the event robot_near.
+        in_way: Nearer robots that drive up to somebody who stands are in the way: robot_coming.
+        too_close: Nearer ones are too close, when that lasts: robot_close.
+        patience: For so many steps.
+        hears: Within that a call is heard: robot_calls.
+    """
+
+    notices: int
+    in_way: int
+    too_close: int
+    patience: int
+    hears: int
+
+
+class SightEvent(NamedTuple):
+    """Somebody came into view of a camera, or was lost from it; or a robot met somebody."""
+
+    # user_seen | user_lost; of a user's camera, robot_seen | robot_lost; of Attention, robot_near |
+    # robot_coming | robot_close | robot_calls
+    event: str
+    user: str  # for whom somebody was taken; empty for somebody not recognized; or the robot
+    x: float  # where that was perceived last [m]
     y: float
 
 
@@ -61,6 +85,14 @@ class Situation:
     def room(self) -> "Room | None":
         """The room that the body is in; None when it is away."""
         return None if self.actor.state.away else self.home.plan.room_at(*self.xy)
+
+    @property
+    def in_view(self) -> Mapping[str, "Point"]:
+        """Whom the body's cameras have in view, and where each was perceived last [m].
+
+        Somebody counts as in view until lost. The empty name is somebody not recognized.
+        """
+        return self.actor.in_view()
 
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
@@ -102,6 +134,22 @@ class Behavior(Component):
     """
 
     kind: ClassVar[str] = "behavior"
+    # Whether, broken off by one before it, it later goes on with the rest of its plan.
+    resumes: ClassVar[bool] = False
+    # Layers of what its robot has seen that it goes by: explored, first_seen, last_seen …
+    needs: ClassVar[frozenset[str]] = frozenset()
+    # Events of its cameras at which it may break in on those behind it.
+    listens: ClassVar[frozenset[str]] = frozenset()
+
+    when: Hours = Field(
+        default=(), description="the hours in which it may have its way; left out: at all times"
+    )
+    cooldown: Duration = Field(
+        default=timedelta(0), description="how long it isn't asked again after it had its way"
+    )
+    preempts: bool = Field(
+        default=True, description="whether it may break in on behaviors behind it; else it waits"
+    )
 
     def start(self, actor: "Actor") -> None:
         """Prepare for a run; check here that the places it names exist."""
@@ -109,6 +157,29 @@ class Behavior(Component):
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
         """Return where the body is when the run begins; None leaves it to chance, () is away."""
         return None
+
+    def attention(self, actor: "Actor") -> Attention | None:
+        """Return what of robots interrupts any plan of the body; None: nothing does."""
+        return None
+
+    def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
+        """Tell whether something that it pays attention to interrupts the plan."""
+        return True
+
+    def give_up(self, now: Situation) -> None:
+        """Don't go on with what one is doing, when the next plan is made."""
+
+    def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
+        """Return when it wants to be asked while the body follows the plan of one behind it."""
+        return None
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithms that it goes by: a scenario without one of them is refused."""
+        return ()
+
+    def busy(self) -> bool:
+        """Tell whether it is in the middle of something, which neither hours nor cooldown end."""
+        return False
 
     def decide(self, now: Situation) -> Plan | None:
         """Return what to do from now on; None leaves it to the next behavior."""

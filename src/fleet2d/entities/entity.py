@@ -1,12 +1,14 @@
-"""Entities as a scenario declares them: a body, its behaviors, and a robot's camera."""
+"""Entities as a scenario declares them: a body, its behaviors, and its cameras."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from fleet2d.component import OneOf, Settings
+from fleet2d.entities.battery import Battery
 from fleet2d.entities.behavior import Behavior
+from fleet2d.entities.giving_way import GivesWay
 from fleet2d.entities.place import Place
 from fleet2d.problems import problem_at
 from fleet2d.sight.camera import Camera
@@ -41,14 +43,39 @@ class Entity(Settings):
         default=(),
         description="what decides where it goes: the first that has a plan; none: it stays still",
     )
+    # Whether its ways are the cheapest by the costmap, if there is one, and not the shortest.
+    minds_costs: ClassVar[bool] = False
+    # What happens when its cameras lose somebody, and when they see somebody.
+    sight_events: ClassVar[tuple[str, str]]
+
+    @property
+    def eyes(self) -> dict[str, Camera]:
+        """Its cameras by name; a body of no kind has none."""
+        return {}
 
 
 class User(Entity):
-    """A person who lives in the home."""
+    """A person who lives in the home, and may be asked which robots are in view."""
 
     opens_doors: bool = Field(
         default=True, description="opens doors in the way; else a shut door is a wall to it"
     )
+    camera: Camera | None = Field(
+        default=None,
+        description="what the user could see: with it, robots that come into view are events",
+    )
+    sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
+
+    @model_validator(mode="after")
+    def _sees_what_is_there(self) -> Self:
+        if self.camera is not None and self.camera.perception is not None:
+            raise problem_at(("camera", "perception"), "users see robots as they are: leave it out")
+        return self
+
+    @property
+    def eyes(self) -> dict[str, Camera]:
+        """The user's field of view, if it is asked for."""
+        return {} if self.camera is None else {"camera": self.camera}
 
 
 class Robot(Entity):
@@ -70,6 +97,16 @@ class Robot(Entity):
         default=None,
         description="how all its cameras err that don't say so themselves; null: they don't",
     )
+
+    minds_costs: ClassVar[bool] = True
+    battery: Battery | None = Field(
+        default=None, description="what it drives on, for the behavior dock; null: it never tires"
+    )
+    gives_way: GivesWay | None = Field(
+        default=None,
+        description="how it keeps clear of people; null: it drives on, and people go round it",
+    )
+    sight_events: ClassVar[tuple[str, str]] = ("user_lost", "user_seen")
 
     @model_validator(mode="before")
     @classmethod

@@ -3,12 +3,13 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from math import ceil
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.errors import ComponentError, NoWayError, PlacementError
+from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
@@ -26,10 +27,8 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.place import Point, RoomChoice
 
-# What can interrupt a plan: the sight events of the body's own camera.
-INTERRUPTS = frozenset({"user_seen", "user_lost"})
-
 I64 = NDArray[np.int64]
+Row = tuple[int, int, int, int, int]  # time, x, y, heading, away
 
 
 class State(NamedTuple):
@@ -107,35 +106,43 @@ class Plan:
         state = actor.state
         self._actor = actor
         self.began = (step, state)
-        self._rows: list[I64] = []
+        self._rows: list[I64 | Row] = []  # breakpoints, in blocks and one by one
         self._motion: Motion | None = None
         self.time_us = step * actor.clock.step_us
         self.x, self.y, self.heading, self.away = state
         self.notes: list[Note] = []
         self.interrupts: frozenset[str] = frozenset()
+        self._asks_us: int | None = None
         self.endless = False
         self._posture_before = actor.posture_code(self.time_us)
         self.posture: Posture = POSTURES[self._posture_before]
         self.postures: list[tuple[int, int]] = []
+        self._posture_begins, self._posture_codes = np.empty(0, np.int64), np.empty(0, np.int8)
         self._mark()
+
+    @property
+    def step_us(self) -> int:
+        """Length of a step [us]."""
+        return self._actor.clock.step_us
 
     @property
     def time(self) -> datetime:
         """The local time up to which it is planned."""
-        clock = self._actor.clock
-        return clock.start + timedelta(microseconds=self.time_us)
+        return self._actor.clock.start + timedelta(microseconds=self.time_us)
 
     def go_to(
         self, place: "RoomChoice | Point | str | Iterable[object]", purpose: str = "spot"
     ) -> Self:
         """Walk to a place by the shortest path, turning on the spot towards every leg.
 
+        A robot takes the cheapest path where the home has a costmap.
+
         In a room, the place is a spot drawn from its free cells; `purpose` names the random stream.
         """
         return self.go_to_point(*self._actor.find(place, self.time_us, purpose))
 
-    def go_to_point(self, x: int, y: int) -> Self:
-        """Walk to a lattice point by the shortest path.
+    def go_to_point(self, x: int, y: int, *, route: I64 | None = None) -> Self:
+        """Walk to a lattice point by the shortest path, or by a route (n, 2) that leads there.
 
         Raises:
             NoWayError: There is no way to it, or none at present.
@@ -144,17 +151,21 @@ class Plan:
         self._check_goes_on()
         actor = self._actor
         self._get_up()
-        route = actor.space.route((self.x, self.y), (x, y))
+        if route is None:
+            route = actor.space.route((self.x, self.y), (x, y))
         if route is None:
             at = actor.home.plan.lattice.to_metres([x, y]).round(2).tolist()
             raise NoWayError(f"{actor.path}: there is no way to {at} for a body of its radius")
-        rows = np.empty((2 * len(route), 4), np.int64)
+        self._walk(route)
+        return self
+
+    def _walk(self, route: I64) -> None:
+        actor, rows = self._actor, np.empty((2 * len(route), 4), np.int64)
         count = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate, rows)
         block = np.zeros((count - 1, 5), np.int64)
         block[:, :4] = rows[1:count]
         self._rows.append(block)
         self.time_us, self.x, self.y, self.heading = rows[count - 1].tolist()
-        return self
 
     def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
         """Walk to an object and use it: step to one of its places, face and sit as one does there.
@@ -170,19 +181,13 @@ class Plan:
             PlacementError: There is no such object, or no place to use it from.
             NoWayError: There is no way to it, or none at present.
         """
-        home, lattice = self._actor.home, self._actor.home.plan.lattice
-        thing = home.object(thing) if isinstance(thing, str) else thing
-        if not thing.uses:
-            raise PlacementError(f"{self._actor.path}: {thing.name} has no place to use it from")
-        use = thing.uses[place % len(thing.uses)]
-        x, y = lattice.to_lattice((use.x, use.y)).tolist()
-        if self.away or (self.x, self.y) != (x, y):
-            self.go_to_point(*home.approach(use, self._actor.space, self._actor.part))
-            self._step_to(x, y)
-        turn = turn_between(self.heading, round(use.heading / (2 * np.pi) * TURN) % TURN)
-        self.turn_by(turn / TURN)
-        self.take(use.posture)
-        return self.note("uses", thing.name)
+        at = self._actor.place_at(thing, place)
+        if self.away or (self.x, self.y) != (at.x, at.y):
+            self.go_to_point(*at.approach)
+            self._step_to(at.x, at.y)
+        self.turn_by(turn_between(self.heading, at.heading) / TURN)
+        self.take(at.posture)
+        return self.note("uses", at.name)
 
     def take(self, posture: Posture) -> Self:
         """Stand, sit or lie from the moment up to which it is planned; walking makes one stand."""
@@ -192,10 +197,16 @@ class Plan:
         return self
 
     def posture_at(self, times_us: I64) -> NDArray[np.int8]:
-        """Return the posture at moments within the plan, by its number in POSTURES, int8."""
-        begins = np.array([time for time, _ in self.postures], np.int64)
-        codes = np.array([self._posture_before, *(code for _, code in self.postures)], np.int8)
-        taken: NDArray[np.int8] = codes[np.searchsorted(begins, times_us, side="right")]
+        """Return the posture at rising moments within the plan, by number in POSTURES, int8."""
+        if len(self._posture_codes) <= len(self.postures):  # first asked since it grew
+            self._posture_begins = np.array([time for time, _ in self.postures], np.int64)
+            codes = [code for _, code in self.postures]
+            self._posture_codes = np.array([self._posture_before, *codes], np.int8)
+        begins, known = self._posture_begins, self._posture_codes
+        first, last = (int(begins.searchsorted(t, "right")) for t in (times_us[0], times_us[-1]))
+        if first == last:  # mostly: nobody sits down all the time
+            return np.full(len(times_us), known[first])
+        taken: NDArray[np.int8] = known[np.searchsorted(begins, times_us, side="right")]
         return taken
 
     def _get_up(self) -> None:
@@ -207,15 +218,8 @@ class Plan:
 
     def _step_to(self, x: int, y: int) -> None:
         """Go straight to a point, whatever is in the way."""
-        if (x, y) == (self.x, self.y):
-            return
-        actor, rows = self._actor, np.empty((4, 4), np.int64)
-        route = np.array([(self.x, self.y), (x, y)], np.int64)
-        count = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate, rows)
-        block = np.zeros((count - 1, 5), np.int64)
-        block[:, :4] = rows[1:count]
-        self._rows.append(block)
-        self.time_us, self.x, self.y, self.heading = rows[count - 1].tolist()
+        if (x, y) != (self.x, self.y):
+            self._walk(np.array([(self.x, self.y), (x, y)], np.int64))
 
     def reaches(self, x: int, y: int) -> bool:
         """Tell whether there is a way to a lattice point from where the plan ends at present."""
@@ -252,7 +256,7 @@ class Plan:
         while left > 0:  # a third of a turn at most, so that the shorter way is the one meant
             part = min(left, TURN // 3)
             left -= part
-            self.time_us += int(np.ceil(part * 1e6 / self._actor.turn_rate))
+            self.time_us += ceil(part * 1e6 / self._actor.turn_rate)
             self.heading = (self.heading + sign * part) % TURN
             self._mark()
         return self
@@ -273,6 +277,14 @@ class Plan:
         else:
             self.endless = True
         self._mark()
+        return self
+
+    def stay_until(self, time_us: int) -> Self:
+        """Stay until a moment [us since the start]; at once over if that is past."""
+        self._check_goes_on()
+        if time_us > self.time_us:
+            self.time_us = time_us
+            self._mark()
         return self
 
     def leave_home(self) -> Self:
@@ -296,7 +308,7 @@ class Plan:
         """Walk at random, for good; must be all that the plan does."""
         self.come_home()
         self._check_goes_on()
-        if len(self._rows) > 2 or self.time_us != self._rows[0][0, 0]:
+        if len(self._rows) > 2 or self.time_us != self.began[0] * self._actor.clock.step_us:
             raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
         home, actor = self._actor.home, self._actor
         # Who wanders about takes a shut door for a wall.
@@ -309,29 +321,56 @@ class Plan:
         self.notes.append(Note(self.time_us, event, detail))
         return self
 
+    def call(self, user: str = "") -> Self:
+        """Call somebody by name, or whoever is near: people who react to robots may come."""
+        return self.note("calls", user)
+
     def interrupt_on(self, *events: str) -> Self:
-        """Ask the behavior again as soon as one of these events happens.
+        """Ask the behavior again as soon as one of these events of its camera happens.
+
+        Of a robot they are user_seen and user_lost, of a user with a camera robot_seen and
+        robot_lost.
 
         Raises:
             ComponentError: There is no such event, or the body has no camera to notice it.
         """
-        if not getattr(self._actor.entity, "eyes", None):
+        entity = self._actor.entity
+        if not entity.eyes:
             raise ComponentError(
                 f"{self._actor.path}: a camera interrupts plans by what it sees, but there is none"
             )
-        unknown = set(events) - INTERRUPTS
+        unknown = set(events) - set(entity.sight_events)
         if unknown:
-            allowed = ", ".join(sorted(INTERRUPTS))
+            allowed = ", ".join(sorted(entity.sight_events))
             raise ComponentError(
                 f"{self._actor.path}: no event {sorted(unknown)[0]!r}; there are: {allowed}"
             )
         self.interrupts |= frozenset(events)
         return self
 
+    def ask_by(self, time: datetime) -> Self:
+        """Ask the behavior again at a local time at the latest, wherever the body is by then."""
+        asks_us = self._actor.clock.elapsed(time)
+        self._asks_us = asks_us if self._asks_us is None else min(asks_us, self._asks_us)
+        return self
+
+    @property
+    def over_at(self) -> int | None:
+        """The step at which it is over, not the one at which it began; None: never."""
+        ends = [] if self.endless else [self.time_us]
+        ends += [] if self._asks_us is None else [self._asks_us]
+        # One that takes no time would be asked for again and again at the same step.
+        clock, least = self._actor.clock, self.began[0] + 1
+        return max(clock.step_at_or_after(min(ends)), least) if ends else None
+
+    def is_over(self, step: int) -> bool:
+        """Tell whether it is over at a step."""
+        return self.over_at is not None and self.over_at <= step
+
     def finish(self) -> Motion:
         """Return the motion of the plan."""
         if self._motion is None:
-            rows = np.concatenate(self._rows)
+            rows = self._breakpoints()
             time, x, y, heading = (np.ascontiguousarray(rows[:, i]) for i in range(4))
             track = Breakpoints(time, x, y, heading, rows[:, 4].astype(np.uint8))
             self._motion = Track(track, self._actor.clock.step_us)
@@ -345,6 +384,17 @@ class Plan:
             )
 
     def _mark(self) -> None:
-        self._rows.append(
-            np.array([[self.time_us, self.x, self.y, self.heading, self.away]], np.int64)
-        )
+        self._rows.append((self.time_us, self.x, self.y, self.heading, self.away))
+
+    def _breakpoints(self) -> I64:
+        blocks: list[I64] = []
+        single: list[Row] = []
+        for row in (*self._rows, np.empty((0, 5), np.int64)):
+            if isinstance(row, tuple):
+                single.append(row)
+                continue
+            if single:
+                blocks.append(np.array(single, np.int64))
+                single.clear()
+            blocks.append(row)
+        return np.concatenate(blocks)

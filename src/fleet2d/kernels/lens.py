@@ -90,12 +90,11 @@ def points_in_view(
     """Return how many points of a user's body are in view, the user's centre being at (dx, dy)."""
     near, far = lenses.near_squared[camera], lenses.far_squared[camera]
     half_angle, body = lenses.half_angle[camera], lenses.bodies[camera, user]
+    vertices, triangles, neighbors = walls.vertices, walls.triangles, walls.neighbors
     shown = 0
     for i in range(lenses.points[camera] + 1):
         px, py = dx + body[i, 0], dy + body[i, 1]
         if near <= px * px + py * py <= far and in_wedge(heading, half_angle, px, py):
-            if walk_line_of_sight(
-                walls.vertices, walls.triangles, walls.neighbors, x, y, triangle, x + px, y + py
-            ):
+            if walk_line_of_sight(vertices, triangles, neighbors, x, y, triangle, x + px, y + py):
                 shown += 1
     return shown

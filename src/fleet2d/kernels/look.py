@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels._jit import kernel
-from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.lens import Lenses, camera_pose, in_wedge, near_wedge, points_in_view
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.perception import (
-    AT_SEEMS,
+    AT_LIGHT,
     DETECT,
     FACES,
     HEADING_NOISE,
@@ -21,9 +21,7 @@ from fleet2d.kernels.perception import (
     MINUTES,
     NOBODY,
     NOTICED,
-    POSTURES,
     SEEMS,
-    SHIFT,
     TURNED,
     WHERE,
     WHICH,
@@ -31,17 +29,21 @@ from fleet2d.kernels.perception import (
     attention,
     bell,
     blurred,
+    distance_entry,
     ghost_place,
     identify,
     notice_chance,
     pick,
     random_share,
+    seeming,
+    steady_chance,
 )
 from fleet2d.kernels.random import random_below, random_bits
 from fleet2d.kernels.sight import walk_line_of_sight
 
 I64 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
+U64 = NDArray[np.uint64]
 
 USER_LOST = 0
 USER_SEEN = 1
@@ -53,6 +55,14 @@ TRUE_X, TRUE_Y, TRUE_HEADING, TRUE_POSTURE = range(8, 12)
 SIGHTING = 12
 MINUTE_US = 60_000_000
 
+# What is kept of the last look at a user: from where, at where, points in view; and if the camera
+# errs, the way the user stood and how surely one is noticed then; -1: not yet told.
+AT_X, AT_Y, AT_HEADING, TO_X, TO_Y, SHOWN, FACED, POSED, STEADY = range(9)
+GLANCE = 9
+
+
+NOT_GIVEN = np.zeros((0, 0, 0), np.uint8)
+
 
 class Crowd(NamedTuple):
     """All users over the span: row u is user u, column j is step first + j."""
@@ -62,6 +72,7 @@ class Crowd(NamedTuple):
     heading: I64
     away: U8
     posture: NDArray[np.int8]
+    shown: U8 = NOT_GIVEN  # (cameras, users, steps): points in view, where others than we tell
 
 
 class Memory(NamedTuple):
@@ -99,41 +110,30 @@ class Rule(NamedTuple):
 
 @kernel
 def perceive(
-    errors: ErrorTables,
+    table: I64,
+    whom: I64,
+    keys: U64,
     about: I64,
-    rule: Rule,
     camera: int,
     user: int,
-    heading: int,
-    chance: int,
+    now: int,
     dx: int,
     dy: int,
-    shown: int,
-    now: int,
+    patience: int,
     row: I64,
-) -> bool:
-    """Decide whether a user in view at (dx, dy) is noticed, and as what: IDENTITY … of `row`.
+) -> None:
+    """Write as what a noticed user at (dx, dy) from the camera is perceived: IDENTITY to POSTURE.
 
-    `row` holds the truth; X and Y come out from the camera.
+    `row` is a sighting that holds the truth.
     """
-    table, keys = errors.table, errors.keys
-    distance = int(np.sqrt(np.float64(dx * dx + dy * dy)))
-    at = distance >> table[camera, SHIFT]
-    bearing = turn_between(heading, heading_of(dx, dy)) if distance > 0 else 0
-    facing = abs(turn_between(heading_of(-dx, -dy), row[TRUE_HEADING])) if distance > 0 else 0
-    posture = row[TRUE_POSTURE]
-    minute = (rule.start_us + now * rule.step_us) // MINUTE_US % MINUTES
-    likely = notice_chance(table, camera, chance, at, bearing, facing, posture, shown, minute)
-    if attention(table, keys, about, camera, user, now) >= likely:
-        return False
-    row[IDENTITY] = identify(table, errors.whom, keys, about, camera, user, now, at, rule.patience)
-    row[X], row[Y] = blurred(table, keys, camera, user, now, dx, dy, distance)
+    entry = distance_entry(table, camera, dx, dy)
+    row[IDENTITY] = identify(table, whom, keys, about, camera, user, now, entry, patience)
+    x, y = blurred(table, keys, camera, user, now, dx, dy)
+    row[X], row[Y] = row[TRUE_X] + x - dx, row[TRUE_Y] + y - dy
     turned = bell(keys[camera, user, TURNED], now, table[camera, HEADING_NOISE])
     row[HEADING] = (row[TRUE_HEADING] + turned) & (TURN - 1)
-    seems = AT_SEEMS + POSTURES * posture
     draw = random_share(keys[camera, user, SEEMS], now)
-    row[POSTURE] = pick(table[camera, seems : seems + POSTURES], draw)
-    return True
+    row[POSTURE] = seeming(table, camera, row[TRUE_POSTURE], draw)
 
 
 @kernel
@@ -166,7 +166,7 @@ def imagine(
         )  # fmt: skip
         if not found:
             continue
-        row = append(memory, camera)
+        row = append(memory.backlog, memory.waiting, camera)
         like = random_share(random_bits(keys[LOOKS_LIKE], now), k)
         who = pick(errors.looks_like[camera], like)
         row[STEP], row[CAMERA] = now + lenses.latency[camera], camera
@@ -178,12 +178,11 @@ def imagine(
 
 
 @kernel
-def append(memory: Memory, camera: int) -> I64:
+def append(backlog: I64, waiting: I64, camera: int) -> I64:
     """Return a new row at the end of a camera's backlog."""
-    rows = memory.backlog.shape[1]
-    end = memory.waiting[camera, 0] + memory.waiting[camera, 1]
-    memory.waiting[camera, 1] += 1
-    row: I64 = memory.backlog[camera, end % rows]
+    end = waiting[camera, 0] + waiting[camera, 1]
+    waiting[camera, 1] += 1
+    row: I64 = backlog[camera, end % backlog.shape[1]]
     return row
 
 
@@ -229,10 +228,14 @@ def look(
     period, points, reach, moves = lenses.period, lenses.points, lenses.reach, lenses.moves
     haunted, ghosts, ghost_keys = errors.haunted, errors.ghosts, errors.ghost_keys
     chance, latency, errs = lenses.chance, lenses.latency, lenses.errs
-    user_heading, posture, about, keys = crowd.heading, crowd.posture, memory.about, errors.keys
-    last, seen, waiting = memory.noticed, memory.seen, memory.waiting
+    user_heading, posture, about = crowd.heading, crowd.posture, memory.about
+    table, whom, keys = errors.table, errors.whom, errors.keys
+    last, seen, waiting, backlog = memory.noticed, memory.seen, memory.waiting, memory.backlog
     vertices, triangles, neighbors = walls.vertices, walls.triangles, walls.neighbors
     cameras, users = far.shape
+    # Most looks are from where the last one was at somebody who is still there.
+    glances = np.full((cameras, users, GLANCE), -1, np.int64)
+    given, is_given = crowd.shown, crowd.shown.shape[0] > 0
     found = happened = 0
     awake = int(seen.sum())
     for j in range(robot_x.shape[0]):
@@ -247,47 +250,70 @@ def look(
             for u in range(users):
                 dx, dy = user_x[u, j] - x, user_y[u, j] - y
                 squared = dx * dx + dy * dy
-                if user_away[u, j] or squared > far[c, u]:
+                if user_away[u, j] or (squared > far[c, u] and not is_given):
                     continue
-                if points[c] == 0:
-                    if squared < near[c] or not in_wedge(heading, half_angle[c], dx, dy):
-                        continue
+                same = (
+                    glances[c, u, AT_X] == x and glances[c, u, AT_Y] == y
+                    and glances[c, u, AT_HEADING] == heading
+                    and glances[c, u, TO_X] == dx and glances[c, u, TO_Y] == dy
+                )  # fmt: skip
+                if is_given:
+                    shown = int(given[c, u, j])
+                elif same:
+                    shown = glances[c, u, SHOWN]
+                elif near_wedge(heading, half_angle[c], dx, dy, reach[c, u]):
                     if triangle < 0:
                         triangle = locate(walls, x, y)
-                    shown = int(
-                        walk_line_of_sight(
-                            vertices, triangles, neighbors, x, y, triangle, x + dx, y + dy
+                    if points[c] > 0:
+                        shown = points_in_view(walls, lenses, c, u, x, y, heading, triangle, dx, dy)
+                    elif squared >= near[c]:
+                        shown = int(
+                            walk_line_of_sight(
+                                vertices, triangles, neighbors, x, y, triangle, x + dx, y + dy
+                            )
                         )
-                    )
-                else:
-                    if not near_wedge(heading, half_angle[c], dx, dy, reach[c, u]):
-                        continue
-                    if triangle < 0:
-                        triangle = locate(walls, x, y)
-                    shown = points_in_view(walls, lenses, c, u, x, y, heading, triangle, dx, dy)
-                if shown > 0:
-                    about[c, u, IN_VIEW] += 1
-                    if errs[c] == 0:
-                        bits = random_bits(keys[c, u, DETECT], now) >> np.uint64(11)
-                        if np.int64(bits) >= chance[c]:
-                            continue
-                    row = append(memory, c)
-                    row[STEP], row[CAMERA], row[USER] = now + latency[c], c, u
-                    row[TRUE_X], row[TRUE_Y] = user_x[u, j], user_y[u, j]
-                    row[TRUE_HEADING] = user_heading[u, j]
-                    row[TRUE_POSTURE] = posture[u, j]
-                    if errs[c] == 0:
-                        row[IDENTITY] = u
-                        row[X:TRUE_X] = row[TRUE_X:]
-                    elif perceive(
-                        errors, about, rule, c, u, heading, chance[c], dx, dy, shown, now, row
-                    ):
-                        row[X] += x
-                        row[Y] += y
                     else:
-                        waiting[c, 1] -= 1  # the row isn't used
-                        continue
-                    about[c, u, NOTICED] += 1
+                        shown = 0
+                else:
+                    shown = 0
+                if not same or shown != glances[c, u, SHOWN]:
+                    glances[c, u, AT_X], glances[c, u, AT_Y] = x, y
+                    glances[c, u, AT_HEADING], glances[c, u, SHOWN] = heading, shown
+                    glances[c, u, TO_X], glances[c, u, TO_Y] = dx, dy
+                    glances[c, u, STEADY] = -1
+                if shown == 0:
+                    continue
+                about[c, u, IN_VIEW] += 1
+                faces, poses = user_heading[u, j], int(posture[u, j])
+                if errs[c] == 0:
+                    bits = random_bits(keys[c, u, DETECT], now) >> np.uint64(11)
+                    noticed = np.int64(bits) < chance[c]
+                else:
+                    if (
+                        glances[c, u, STEADY] < 0
+                        or glances[c, u, FACED] != faces or glances[c, u, POSED] != poses
+                    ):  # fmt: skip
+                        glances[c, u, FACED], glances[c, u, POSED] = faces, poses
+                        glances[c, u, STEADY] = steady_chance(
+                            table, c, heading, dx, dy, faces, poses, shown
+                        )
+                    minute = (rule.start_us + now * rule.step_us) // MINUTE_US % MINUTES
+                    likely = notice_chance(
+                        glances[c, u, STEADY], table[c, AT_LIGHT + minute], chance[c]
+                    )
+                    noticed = attention(table, keys, about, c, u, now) < likely
+                if not noticed:
+                    continue
+                about[c, u, NOTICED] += 1
+                row = append(backlog, waiting, c)
+                row[STEP], row[CAMERA], row[USER] = now + latency[c], c, u
+                row[TRUE_X], row[TRUE_Y] = x + dx, y + dy
+                row[TRUE_HEADING], row[TRUE_POSTURE] = faces, poses
+                if errs[c] == 0:
+                    row[IDENTITY] = u
+                    row[X:TRUE_X] = row[TRUE_X:]
+                else:
+                    perceive(table, whom, keys, about, c, u, now, dx, dy, rule.patience, row)
             if haunted[c] != 0:
                 ghost = random_share(ghost_keys[c, HOW_MANY], now)
                 if ghost >= ghosts[c, 0]:  # seldom: there are any

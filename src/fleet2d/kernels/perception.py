@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels._jit import kernel
-from fleet2d.kernels.headings import HALF_TURN, QUARTER, TURN, UNIT, half_sine
+from fleet2d.kernels.headings import (
+    HALF_TURN,
+    QUARTER,
+    TURN,
+    UNIT,
+    half_sine,
+    heading_of,
+    turn_between,
+)
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.random import random_bell, random_below, random_bits
 from fleet2d.kernels.sight import walk_line_of_sight
@@ -56,7 +64,7 @@ BEARING_NOISE = SHIFT + 4  # 2**-16 / 8192 of a turn per unit of random_bell
 HEADING_NOISE = SHIFT + 5  # 2**-16 headings per unit of random_bell
 TABLE = SHIFT + 6
 
-# What is carried along about each user, by camera.
+# What is carried along about each user, by camera, from look to look.
 DRAWN, DRAWN_AT, TAKEN_FOR, TRACKED, IN_VIEW, NOTICED = range(6)
 ABOUT = 6
 
@@ -85,6 +93,15 @@ def random_share(key: np.uint64, counter: int) -> int:
 
 
 @kernel
+def random_shares(key: np.uint64, counters: I64) -> I64:
+    """Return the integer in [0, ONE) of each counter."""
+    shares = np.empty(counters.shape[0], np.int64)
+    for i in range(counters.shape[0]):
+        shares[i] = random_share(key, counters[i])
+    return shares
+
+
+@kernel
 def pick(cumulative: I64, draw: int) -> int:
     """Return the first outcome whose cumulative probability is above `draw`; their number if none.
 
@@ -110,30 +127,56 @@ def lasting(table: I64, camera: int, steps: int) -> int:
 
 
 @kernel
-def notice_chance(
+def length(dx: int, dy: int) -> int:
+    """Return how long (dx, dy) is [lattice units], rounded down."""
+    return int(np.sqrt(np.float64(dx * dx + dy * dy)))
+
+
+@kernel
+def distance_entry(table: I64, camera: int, dx: int, dy: int) -> int:
+    """Return the entry of the tables by distance that (dx, dy) belongs to."""
+    return int(min(length(dx, dy) >> table[camera, SHIFT], BINS - 1))
+
+
+@kernel
+def steady_chance(
     table: I64,
     camera: int,
-    chance: int,
-    distance: int,
-    bearing: int,
-    facing: int,
+    heading: int,
+    dx: int,
+    dy: int,
+    faces: int,
     posture: int,
     shown: int,
-    minute: int,
 ) -> int:
-    """Return the probability [2**-53] that a camera notices a user in view.
+    """Return the product of all factors but light [2**-31] for a user at (dx, dy) from the camera.
 
-    `chance` [2**-53] is the camera's own, `distance` the entry of the tables by distance, `bearing`
-    the signed turn from the optical axis to the user, `facing` the turn between where the user
-    faces and the camera.
+    Args:
+        table: The cameras' tables.
+        camera: Which camera.
+        heading: Where it looks.
+        dx: Where the user is, from the camera [lattice units].
+        dy: The same.
+        faces: Where the user faces.
+        posture: 0 stands, 1 sits, 2 lies.
+        shown: How many points of the body are in view.
     """
-    share = table[camera, AT_DISTANCE + distance]
+    bearing = turned = 0
+    if dx != 0 or dy != 0:
+        towards = heading_of(dx, dy)
+        bearing = turn_between(heading, towards)
+        turned = abs(turn_between(towards + HALF_TURN, faces))
+    share = table[camera, AT_DISTANCE + distance_entry(table, camera, dx, dy)]
     share = (share * table[camera, AT_BEARING + HALF_TURN + bearing]) >> BITS
-    share = (share * table[camera, AT_FACING + facing]) >> BITS
+    share = (share * table[camera, AT_FACING + turned]) >> BITS
     share = (share * table[camera, AT_POSTURE + posture]) >> BITS
-    share = (share * table[camera, AT_SHOWN + shown]) >> BITS
-    share = (share * table[camera, AT_LIGHT + minute]) >> BITS
-    return int(((chance >> (53 - BITS)) * share) >> (2 * BITS - 53))
+    return int((share * table[camera, AT_SHOWN + shown]) >> BITS)
+
+
+@kernel
+def notice_chance(steady: int, light: int, chance: int) -> int:
+    """Return the probability to notice [2**-53], from [2**-31], [2**-31] and the camera's own."""
+    return int(((chance >> (53 - BITS)) * ((steady * light) >> BITS)) >> (2 * BITS - 53))
 
 
 @kernel
@@ -207,16 +250,26 @@ def turn_and_stretch(dx: int, dy: int, turn: int, distance: int, wanted: int) ->
 
 @kernel
 def blurred(
-    table: I64, keys: U64, camera: int, user: int, now: int, dx: int, dy: int, distance: int
+    table: I64, keys: U64, camera: int, user: int, now: int, dx: int, dy: int
 ) -> tuple[int, int]:
-    """Return where a user at (dx, dy) from the camera, `distance` away, is perceived from there."""
+    """Return where a user at (dx, dy) from the camera is perceived, from there."""
+    distance, turning = length(dx, dy), table[camera, BEARING_NOISE]
     noise = table[camera, RANGE_NOISE] + ((table[camera, RANGE_SHARE] * distance) >> 16)
-    turning = table[camera, BEARING_NOISE]
     if distance == 0 or (noise == 0 and turning == 0):
         return dx, dy
     wanted = max(0, distance + bell(keys[camera, user, RANGE], now, noise))
     turn = bell(keys[camera, user, BEARING], now, turning)
     return turn_and_stretch(dx, dy, turn, distance, wanted)
+
+
+@kernel
+def seeming(table: I64, camera: int, posture: int, draw: int) -> int:
+    """Return the posture that a posture is taken for."""
+    first = AT_SEEMS + POSTURES * posture
+    found = 0
+    while found < POSTURES - 1 and draw >= table[camera, first + found]:
+        found += 1
+    return found
 
 
 @kernel

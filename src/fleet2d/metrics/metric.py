@@ -23,6 +23,7 @@ class Metric(Component):
     """
 
     kind: ClassVar[str] = "metric"
+    looks_back: ClassVar[timedelta] = timedelta(0)  # how far beyond its period; timedelta.max: all
     needs: ClassVar[Set[str]] = frozenset()  # of exposure, explored, first_seen, last_seen …
     unit: ClassVar[str] = ""  # of its result, for people to read
 

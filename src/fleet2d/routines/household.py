@@ -2,12 +2,13 @@
 
 Every member works out the days of all, from the same streams: they agree without a word, and
 nothing depends on the order in which they are asked. In the order of the members, a day is drawn
-for each, with what they do together as appointments, and round the times at which those before them
-use what only one can use at a time.
+for each, with what they do together as appointments, and round the times at which others use what
+only one can use at a time: those before them, and all whose day before isn't over yet.
 """
 
 from collections.abc import Mapping, Sequence
-from datetime import date
+from datetime import date, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -20,17 +21,21 @@ from fleet2d.problems import Location, did_you_mean, problem, problem_at, shown
 from fleet2d.routines.activity import AnyTakes, find_activity
 from fleet2d.routines.laws import uniform
 from fleet2d.routines.life import Life
-from fleet2d.routines.periods import AnyPeriod
+from fleet2d.routines.periods import AnyPeriod, without
 from fleet2d.routines.persona import AnyPersona, Dates, OnDays, Timing, holds_on, weekdays_of
-from fleet2d.routines.planner import MILLION, NEVER, DayPlan, Doing, Job
+from fleet2d.routines.planner import DAY_S, MILLION, NEVER, NO_GAP_S, SLEEP, DayPlan, Doing, Job
 from fleet2d.routines.templates import starts
 from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import Share
 
-# So many days are remembered, of those that were asked for.
+# So many days are remembered.
 REMEMBERED = 8
+# Somebody is welcomed after so long a time.
+LONG_GONE_S = 1800
+WELCOME = "welcome"
+WELCOME_S = 90
 
 
 class Together(Timing):
@@ -70,12 +75,24 @@ class Household(Settings):
         default_factory=dict, description="what several of them do together, by name"
     )
     away: tuple[AnyPeriod, ...] = Field(default=(), description="when nobody is at home")
+    trips: dict[str, tuple[AnyPeriod, ...]] = Field(
+        default_factory=dict, description="when some members are away, by name"
+    )
+    visits: dict[str, tuple[AnyPeriod, ...]] = Field(
+        default_factory=dict, description="members who are there in these periods only, by name"
+    )
+    welcome: Share = Field(
+        default=0.0,
+        description="how likely those at leisure come to the door when somebody comes home",
+    )
 
     @model_validator(mode="after")
     def _names_members(self) -> Self:
         named: list[tuple[Location, str]] = []
         named += [(("couples", i), n) for i, pair in enumerate(self.couples) for n in pair]
         named += [(("together", k, "who"), n) for k, t in self.together.items() for n in t.who]
+        named += [(("trips", n), n) for n in self.trips]
+        named += [(("visits", n), n) for n in self.visits]
         for where, name in named:
             if name not in self.members:
                 hint = did_you_mean(name, self.members)
@@ -121,9 +138,19 @@ AnyHousehold = Annotated[Household, BeforeValidator(read_household), OrWritten("
 
 
 class Lives:
-    """The days of all members of a household."""
+    """The days of all members of a household, from the day before a run begins.
 
-    def __init__(self, household: Household, seed: int) -> None:
+    A day depends on the one before: who is up all night is in the bathroom when others get up.
+    """
+
+    def __init__(self, household: Household, seed: int, first: int) -> None:
+        """Prepare to draw days.
+
+        Args:
+            household: Whose.
+            seed: Of the run.
+            first: The ordinal of the first day.
+        """
         self.household = household
         self._seed = seed
         self._path = f"household.{household.name}"
@@ -132,29 +159,101 @@ class Lives:
             for name, persona in household.members.items()
         }
         self._known: dict[int, Mapping[str, Sequence[Doing]]] = {}
+        self._first = self._next = first
 
     def day(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
-        """Return what each member does on the day of a date's ordinal."""
-        if ordinal not in self._known:
-            if len(self._known) >= REMEMBERED:
-                self._known.clear()
-            self._known[ordinal] = self._draw(ordinal)
+        """Return what each member does on the day of a date's ordinal.
+
+        Raises:
+            ValueError: It is before the first day.
+        """
+        if ordinal < self._first:
+            raise ValueError(f"the days of a household are known from {self._first} on")
+        if ordinal < self._next and ordinal not in self._known:  # forgotten: begin again
+            self._known.clear()
+            self._next = self._first
+        while self._next <= ordinal:
+            self._known.pop(self._next - REMEMBERED, None)
+            self._known[self._next] = self._draw(self._next)
+            self._next += 1
         return self._known[ordinal]
+
+    def in_use(self, ordinal: int, member: str) -> list[tuple[int, int]]:
+        """Return when others use what only one can use at a time, on a date [s of its midnight]."""
+        return [
+            (doing.begin + shift, doing.end + shift)
+            for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
+            if day >= self._first
+            for name, doings in self.day(day).items()
+            for doing in doings
+            if name != member and self._is_exclusive(name, doing)
+        ]
+
+    def _is_exclusive(self, name: str, doing: Doing) -> bool:
+        return find_activity(doing.activity, self.household.members[name].activities).exclusive
+
+    def _is_out(self, name: str, doing: Doing) -> bool:
+        return find_activity(doing.activity, self.household.members[name].activities).away
 
     def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
         joint = self._together(ordinal)
-        busy: list[tuple[int, int]] = []
+        before = self._known.get(ordinal - 1, {})
+        busy = sorted(
+            (doing.begin - DAY_S, doing.end - DAY_S)
+            for name, doings in before.items()
+            for doing in doings
+            if doing.end > DAY_S and self._is_exclusive(name, doing)
+        )
         days: dict[str, Sequence[Doing]] = {}
         for name, life in self._lives.items():
             plan = life.template(ordinal)
             for job, who in joint:
                 if not who or name in who:
                     plan = _with(plan, job)
-            days[name] = life.draw_day(ordinal, plan, busy)
-            persona = self.household.members[name]
-            busy += [(d.begin, d.end) for d in days[name] if persona.activity(d.activity).exclusive]
+            days[name] = self._there(name, life.draw_day(ordinal, plan, busy), ordinal)
+            busy += [(d.begin, d.end) for d in days[name] if self._is_exclusive(name, d)]
             busy.sort()
-        return days
+        return self._welcomed(ordinal, days) if self.household.welcome else days
+
+    def _there(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+        """Return a member's day, out of the home when it is on a trip or not on a visit."""
+        household = self.household
+        away = (*household.away, *household.trips.get(name, ()))
+        visits = household.visits.get(name, ())
+        if not away and not visits:
+            return day
+        return without(day, datetime.fromordinal(ordinal), away, visits)
+
+    def _welcomed(
+        self, ordinal: int, days: Mapping[str, Sequence[Doing]]
+    ) -> Mapping[str, Sequence[Doing]]:
+        """Let those who are at leisure come to the door when somebody comes home."""
+        key = stream_key(self._seed, self._path, "welcome")
+        draws = Draws(key, ordinal)
+        result = dict(days)
+        for comer, doings in days.items():
+            for gone, back in pairwise(doings):
+                comes_home = self._is_out(comer, gone) and not self._is_out(comer, back)
+                if not comes_home or gone.end - gone.begin < LONG_GONE_S:
+                    continue
+                for name in result:
+                    comes = draws.below(MILLION) < self.household.welcome * MILLION
+                    if name == comer or comes:
+                        result[name] = self._interrupted(name, result[name], back.begin)
+        return result
+
+    def _interrupted(self, name: str, day: Sequence[Doing], at: int) -> Sequence[Doing]:
+        """Return a day in which a member comes to the door, if it is at home, at leisure."""
+        for i, doing in enumerate(day):
+            over = at + WELCOME_S
+            if doing.begin <= at < doing.end:
+                busy = doing.task or doing.activity == SLEEP or self._is_out(name, doing)
+                if busy or doing.end - over < NO_GAP_S:
+                    return day
+                before = [doing._replace(end=at)] if doing.begin < at else []
+                welcome, after = Doing(WELCOME, at, over), doing._replace(begin=over)
+                return [*day[:i], *before, welcome, after, *day[i + 1 :]]
+        return day
 
     def _together(self, ordinal: int) -> list[tuple[Job, tuple[str, ...]]]:
         """Draw what is done together on a day: a job, and whose."""

@@ -19,6 +19,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at, shown
 from fleet2d.routines.activity import Activity, AnyTakes, find_activity
+from fleet2d.routines.manners import Manners
 from fleet2d.routines.planner import REST, SLEEP, DayPlan
 from fleet2d.routines.templates import check, day_plans
 from fleet2d.routines.written import OrWritten
@@ -207,6 +208,10 @@ class Persona(Settings):
     about: str = Field(default="", description="who this is, for people to read")
     pace: float = Field(
         default=1.0, ge=0.1, le=3, description="walking speed, as a multiple of the body's"
+    )
+    manners: Manners = Field(
+        default=Manners(),
+        description="how it reacts to robots where it has the behavior `reactions`",
     )
     activities: dict[str, Activity] = Field(
         default_factory=dict, description="activities of its own, or changed ones"

@@ -129,10 +129,7 @@ def plan_day(
     now = wake
     for i, job in enumerate(chain.jobs):
         end_by = min(job.until, chain.latest[i + 1])
-        begin = max(now, chain.wished[i])
-        if begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now):
-            begin = now
-        begin = min(begin, chain.latest[i])
+        begin = min(_next_begin(job, now, chain.wished[i]), chain.latest[i])
         if job.exclusive and busy:
             free = _free_time(busy, begin, chain.latest[i], job.takes.shortest, end_by)
             if free is None:  # others are in there all the time: the day goes on without
@@ -147,6 +144,13 @@ def plan_day(
     _fill(plan.fills, day, draws, now, bed)
     day.append(Doing(SLEEP, bed, next_wake))
     return day
+
+
+def _next_begin(job: Job, now: int, wished: int) -> int:
+    """Return when a job would begin: as wished, and at once rather than after a short wait."""
+    begin = max(now, wished)
+    at_once = begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now)
+    return now if at_once else begin
 
 
 def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> Chain:
@@ -213,11 +217,17 @@ def draw_chain(
             i,
         )
     order = sorted(wished, key=lambda i: ranks[i])
-    latest = [latest_bed]
-    for i in reversed(order):
-        job, last = plan.jobs[i], min(plan.jobs[i].until, latest[-1]) - plan.jobs[i].takes.shortest
+    jobs = [plan.jobs[i] for i in order]
+    return Chain(jobs, [*(wished[i] for i in order), bed], _latest(jobs, latest_bed))
+
+
+def _latest(jobs: Sequence[Job], bed: int) -> list[int]:
+    """Return how late each job may begin so that the rest still fits before `bed`; that last."""
+    latest = [bed]
+    for job in reversed(jobs):
+        last = min(job.until, latest[-1]) - job.takes.shortest
         latest.append(last if job.starts is None else min(last, job.starts.longest))
-    return Chain([plan.jobs[i] for i in order], [*(wished[i] for i in order), bed], latest[::-1])
+    return latest[::-1]
 
 
 def fits(plan: DayPlan, chain: Chain, wake: int) -> bool:
@@ -239,6 +249,8 @@ def _free_time(
     for first, last in busy:
         if last <= begin:
             continue
+        if begin > latest:
+            return None
         if begin + shortest <= first:
             return begin, min(end_by, first)
         begin = last

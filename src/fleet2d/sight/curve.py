@@ -16,6 +16,11 @@ from fleet2d.problems import problem, problem_at
 from fleet2d.units import Share
 
 EXACT = 20  # digits: far more than a probability of 2**-31 needs
+LIMIT = 200  # beyond exp(-200) or exp(200) a probability is 0 or 1
+# The natural logarithm of 2, so short that whole multiples of it are exact; and what that lacks.
+LN_2 = int(Decimal(2).ln() * 2**32) / 2**32
+LN_2_REST = float(Decimal(2).ln() - Decimal(LN_2))
+TERMS = 15  # of the series of exp, up to half of LN_2: more than a double can tell
 
 
 class Curve(Settings):
@@ -99,16 +104,15 @@ class Curve(Settings):
     def _shares(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities at many places, the same on every machine."""
         if self.midpoint is not None and self.width is not None:
-            with localcontext(prec=EXACT):
-                top, middle, width = map(Decimal, (self.top, self.midpoint, self.width))
-                steps = [(Decimal(x) - middle) / width for x in places.tolist()]
-                # Not math.exp, which differs between machines in the last bit.
-                return np.array([float(top / (1 + _exp(step))) for step in steps])
+            fallen: NDArray[np.float64] = self.top / (
+                1 + exponential((places - self.midpoint) / self.width)
+            )
+            return fallen
         x, y = np.array(self.points).T
         behind = np.minimum(np.searchsorted(x, places, side="right"), len(x) - 1)
         before = np.maximum(behind - 1, 0)
         run = np.where(behind > before, x[behind] - x[before], 1.0)
-        along = np.clip((places - x[before]) / run, 0.0, 1.0)
+        along = np.clip(places - x[before], 0.0, run) / run
         shares: NDArray[np.float64] = y[before] + (y[behind] - y[before]) * along
         return shares
 
@@ -116,8 +120,9 @@ class Curve(Settings):
         """Return the same over hours from -24 to 48, so that the day's end meets its beginning."""
         if len(self.points) < 2:
             return self
-        days = [(hour + day, p) for day in (-24, 0, 24) for hour, p in self.points]
-        return Curve(points=tuple(days))
+        days = tuple((hour + day, p) for day in (-24, 0, 24) for hour, p in self.points)
+        # Unchecked: rows at 0 and at 24 meet, and it jumps there.
+        return Curve.model_construct(points=days, midpoint=None, width=None)
 
 
 def chance(share: float) -> int:
@@ -139,9 +144,27 @@ def decay(steps: Decimal) -> float:
         return float(_exp(-steps))
 
 
+def exponential(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return exp(x), cut where a probability would be 0 or 1, the same on every machine.
+
+    np.exp differs between machines in the last bit; sums and products don't.
+
+    >>> exponential(np.array([0.0, 1.0])).round(12).tolist()
+    [1.0, 2.718281828459]
+    """
+    x = np.clip(x, -LIMIT, LIMIT)
+    doublings = np.rint(x / LN_2)
+    rest = x - doublings * LN_2 - doublings * LN_2_REST
+    value = np.ones_like(x)
+    for term in range(TERMS, 0, -1):
+        value = 1 + rest * value / term
+    powers: NDArray[np.float64] = np.ldexp(value, doublings.astype(np.int32))
+    return powers
+
+
 def _exp(x: Decimal) -> Decimal:
     """Return exp(x), cut where a probability would be 0 or 1."""
-    limit = Decimal(200)
+    limit = Decimal(LIMIT)
     return (limit if x > limit else -limit if x < -limit else x).exp()
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
 
 # What an entry takes besides its bits: keys, tuple and array.
-ENTRY_BYTES = 400
+ENTRY_BYTES = 450
 
 
 class Spot(NamedTuple):
@@ -35,7 +35,7 @@ class Flashlight(FieldOfView):
     """Keep the set of cells in view of each pose, and look points up by the cell that holds them.
 
     A point is in view if the centre of its cell is, so it is exact for the centres of cells, and
-    elsewhere up to half a cell. A pose takes about 2 kB with a range of 4.5 m and cells of 5 cm.
+    elsewhere up to half a cell. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
     """
 
     memory_mb: float = Field(

@@ -3,8 +3,9 @@
 Every part is perfect unless the scenario says otherwise.
 """
 
+from collections.abc import Mapping
 from datetime import timedelta
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -54,6 +55,15 @@ class Detection(Settings):
         description="time constant of misses: after it, a draw is still the last one with"
         " probability 1/e; 0: each look is drawn anew",
     )
+
+    @model_validator(mode="after")
+    def _is_within_a_day(self) -> Self:
+        for hour, _ in self.light.points:
+            if not 0 <= hour <= 24:
+                raise problem_at(
+                    ("light",), f"{hour:g} is no time of day: 0 to 24 hours are wanted"
+                )
+        return self
 
 
 class Spot(Settings):
@@ -137,15 +147,24 @@ class Attributes(Settings):
         default={},
         description="what a posture is taken for, with which probability; the rest is right",
     )
+    activity: dict[str, dict[str, Share]] | None = Field(
+        default=None,
+        description="what an activity is taken for, with which probability; the rest is right;"
+        " null: activities aren't perceived",
+        examples=[{"cook": {"breakfast": 0.2}}],
+    )
 
     @model_validator(mode="after")
     def _are_distributions(self) -> Self:
-        for posture, others in self.posture.items():
-            if posture in others:
-                raise problem_at(
-                    ("posture", posture), f"what isn't confused is {posture!r}: leave it out"
-                )
-            _check_sum(("posture", posture), sum(others.values()))
+        confusions: dict[str, Mapping[Any, Mapping[Any, float]]] = {
+            "posture": self.posture,
+            "activity": self.activity or {},
+        }
+        for key, confusion in confusions.items():
+            for true, others in confusion.items():
+                if true in others:
+                    raise problem_at((key, true), f"what isn't confused is {true!r}: leave it out")
+                _check_sum((key, true), sum(others.values()))
         return self
 
 

@@ -134,7 +134,7 @@ def _region_of(walls: Mesh, x: int, y: int) -> Pieces:
 def _regions_of(home: "Home") -> Regions:
     lattice = home.plan.lattice
     triangles = rasterize_cells(home.walls, lattice.rows, lattice.columns)
-    cells = np.argwhere(triangles >= 0)
+    cells = np.ascontiguousarray(np.argwhere(triangles >= 0))
     start, right, wall = regions_of_cells(home.walls, cells, triangles)
     return Regions(_numbers(triangles), start.astype(np.int32), right, wall)
 

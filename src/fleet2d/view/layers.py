@@ -3,11 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -24,7 +25,8 @@ from fleet2d.view.floorplan import (
     save_figure,
 )
 
-COLORS = "viridis"
+# The brighter part of viridis: names of rooms are written over it.
+COLORS = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.35, 1.0, 256)))
 SEEN_COLOR = (0.12, 0.53, 0.54)
 SOLID = 0.75
 BAR_IN = 0.95  # beside the plan: the scale of the colours and its words

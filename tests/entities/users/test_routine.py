@@ -15,6 +15,7 @@ from tests.scenes import OWN, digests, path, run, scenario, table
 import fleet2d
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
+from fleet2d.routines.activity import catalogue
 from fleet2d.routines.persona import bundled
 
 HOME = {"floorplan": {"type": "bundled", "furnish": True}}
@@ -22,6 +23,13 @@ FAMILY = {
     "members": {"ana": "works_outside", "ben": "works_from_home", "cleo": "child"},
     "couples": [["ana", "ben"]],
     "together": {"dinner": {"at": "18:45", "spread": "10 min", "on": "daily", "takes": "35 min"}},
+}
+# Everybody is up at night, and often.
+RESTLESS = {
+    "sleep": {
+        **catalogue()["sleep"].model_dump(mode="json", exclude_none=True),
+        "fetches": "1 h 30 min",
+    }
 }
 SHORT = {
     "days": {
@@ -277,3 +285,33 @@ def test_it_begins_where_the_hour_suggests() -> None:
         state = Simulation(content).state["ana"]
         assert away == state["away"]
     assert datetime(2026, 1, 7).weekday() == 2
+
+
+@needs_jit
+def test_nobody_comes_into_the_bathroom_while_another_is_there() -> None:
+    persona = {"extends": "works_outside", "activities": RESTLESS}
+    members = dict.fromkeys(("ana", "ben", "cleo", "dan"), persona)
+    users = {n: {"type": "routine", "household": {"members": members}} for n in members}
+    stored = run(scenario("7 d", users=users))
+    bathroom = stored.plan.room_at(6, 5.5).index
+    inside = [path(stored, name).room == bathroom for name in members]
+    night = (np.arange(len(inside[0])) // 3600 + 7) % 24 < 6
+    assert all((there & night).any() for there in inside)
+    together = sum(there.astype(int) for there in inside) > 1
+    # One leaves as the other enters: ways through the door, of some seconds.
+    edges = np.flatnonzero(np.diff(np.r_[False, together, False].astype(int)))
+    assert max(np.diff(edges)[::2], default=0) < 30
+
+
+@needs_jit
+def test_a_plan_goes_on_over_midnight_without_telling_it_twice() -> None:
+    stored = run(lives(duration="4 d"))
+    told = table(stored, "events", entity="ana", event="activity")
+    assert all(a != b for a, b in itertools.pairwise(told["detail"].tolist()))
+    assert not (told["step"] % 86400 == 17 * 3600).any()  # it begins at 07:00: that is midnight
+
+
+def test_a_member_says_in_its_household_when_it_is_away() -> None:
+    user = {"type": "routine", "household": FAMILY, "away": [["2026-01-06", "2026-01-07"]]}
+    with pytest.raises(InputError, match="'trips' and 'visits'"):
+        fleet2d.load_scenario(scenario(users={"ana": user}))

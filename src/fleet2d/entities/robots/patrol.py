@@ -1,7 +1,7 @@
 """Patrol: a robot's rounds through rooms or along waypoints."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -22,6 +22,8 @@ class Patrol(Behavior):
     In a room the robot stops at the point farthest from its walls. Stops behind a shut door are
     left out of a round.
     """
+
+    resumes: ClassVar[bool] = True
 
     rooms: Literal["all"] | tuple[Place, ...] = Field(
         default="all", description="the rooms of a round; all: every room that it can enter"
@@ -65,8 +67,8 @@ class Patrol(Behavior):
             stops = now.random("order").shuffled(stops)
         plan, begun = now.plan(), False
         for stop in stops:
-            if now.home.shut and not plan.reaches(*stop):
-                continue  # behind a shut door; another round may find it open
+            if now.home.hinders and not plan.reaches(*stop):
+                continue  # another round may find its door open, or its costs lower
             plan.go_to_point(*stop)
             if self.look_around:
                 plan.turn_by(1.0)

@@ -1,11 +1,10 @@
 """Inhabitant: what behaviors share that live by activities: where one does them, and how."""
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
 from pydantic import Field
 
 from fleet2d.entities.behavior import Behavior, Situation
@@ -13,24 +12,28 @@ from fleet2d.entities.place import matching_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Seat, Spot, Spots
 from fleet2d.errors import PlacementError
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import KNOTS, Law, exponential
-from fleet2d.routines.planner import SLEEP, Doing
+from fleet2d.routines.planner import NO_GAP_S, REST, SLEEP, Doing
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
+    from fleet2d.clock import Clock
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.place import RoomChoice
     from fleet2d.floorplan.plan import Room
 
 SECOND_US = 1_000_000
-# A day has fewer activities than that: a draw's address is the day's number times this.
+# A day has fewer activities than half of that: a draw's address is the day's number times this.
 DOINGS_A_DAY = 1024
+# What goes on after midnight has draws of its own.
+GOING_ON = DOINGS_A_DAY // 2
 # Nobody sets out for another spot when what they do is over sooner than that.
 NEARLY_OVER_US = 90 * SECOND_US
-# How far one turns from side to side, at most.
-SIDEWAYS = TURN // 8
+# One turns to the side by up to half of two to the power of that: an eighth of a turn.
+SIDEWAYS_BITS = 10
+DRAWN_BITS = 30
 
 
 class Setting(NamedTuple):
@@ -53,6 +56,23 @@ class Setting(NamedTuple):
     fetch_takes: Law
 
 
+@dataclass
+class _Last:
+    """What was done last.
+
+    Attributes:
+        which: The day's ordinal and the number of the doing.
+        place: Where.
+        step: Up to which step that was planned.
+        given_up: What is not to be gone on with.
+    """
+
+    which: tuple[int, int] | None = None
+    place: Spot | Seat | None = None
+    step: int = -1
+    given_up: tuple[int, int] | None = None
+
+
 class Inhabitant(Behavior):
     """Base of behaviors that live by activities: a subclass says what is done on a day."""
 
@@ -64,6 +84,10 @@ class Inhabitant(Behavior):
     def day(self, ordinal: int) -> Sequence[Doing]:
         """Return what is done on the day of a date's ordinal, from its beginning to the next's."""
         raise NotImplementedError
+
+    def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
+        """Return how long to wait before one may use a room [us]; None: better not at all."""
+        return 0
 
     def settle(
         self,
@@ -86,37 +110,70 @@ class Inhabitant(Behavior):
             PlacementError: The home has none of an activity's rooms.
         """
         self.key = actor.stream("activity")
-        self.turn_rate = actor.turn_rate
+        self.last = _Last()
+        self.clock = actor.clock
         self.spots = spots
         self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
+        exclusive = (s for s in self.settings.values() if s.activity.exclusive)
+        self.private_rooms = {room.index for setting in exclusive for room in setting.rooms}
         if sleeps_in is not None:
             self.settings[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
 
     def decide(self, now: Situation) -> Plan:
-        """Plan the rest of the day."""
-        ordinal = now.time.toordinal()
-        midnight = datetime.fromordinal(ordinal)
-        if (now.time - midnight) < timedelta(seconds=self.day(ordinal)[0].begin):
-            ordinal -= 1
-        midnight_us = now.actor.clock.elapsed(datetime.fromordinal(ordinal))
-        plan = now.plan()
-        for i, doing in enumerate(self.day(ordinal)):
-            end_us = midnight_us + doing.end * SECOND_US
+        """Plan the rest of the date.
+
+        All plans end at midnight, so that many bodies decide at the same step: the engine then has
+        few spans to take.
+        """
+        plan, clock = now.plan(), now.actor.clock
+        midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
+        for ordinal, i, doing in self._doings(now.time):
+            day_us = clock.elapsed(datetime.fromordinal(ordinal))
+            if plan.time_us >= midnight_us or day_us + doing.begin * SECOND_US >= midnight_us:
+                break
+            end_us = min(day_us + doing.end * SECOND_US, midnight_us)
             if plan.time_us < end_us:  # else the way to it took longer than it lasts
-                draws = Draws(self.key, ordinal * DOINGS_A_DAY + i)
-                self._do(plan, doing.activity, end_us, draws)
+                self._do(plan, doing, (ordinal, i), end_us)
+        self.last.step = clock.step_at_or_after(plan.time_us)
         return plan
 
-    def _do(self, plan: Plan, name: str, end_us: int, draws: Draws) -> None:
-        setting = self.settings[name]
-        if setting.activity.away:
-            plan.leave_home().note("activity", name)
-        else:
-            place = self._go(plan, setting, draws)
-            plan.note("activity", name)
-            if self.small_moves and setting.restless:
-                self._fidget(plan, setting, place, end_us, draws)
-        _stay_until(plan, end_us)
+    def give_up(self, now: Situation) -> None:
+        """Rest instead of what one is doing, from the next plan on."""
+        for ordinal, i, doing in self._doings(now.time):
+            day_us = now.actor.clock.elapsed(datetime.fromordinal(ordinal))
+            if day_us + doing.end * SECOND_US > now.step * now.actor.clock.step_us:
+                self.last.given_up = (ordinal, i)
+                return
+
+    def _doings(self, time: datetime) -> Iterator[tuple[int, int, Doing]]:
+        """Yield what is done from a time on: the day's ordinal, the number in it, the doing."""
+        ordinal = time.toordinal()
+        if time < datetime.fromordinal(ordinal) + timedelta(seconds=self.day(ordinal)[0].begin):
+            ordinal -= 1
+        while True:
+            yield from ((ordinal, i, doing) for i, doing in enumerate(self.day(ordinal)))
+            ordinal += 1
+
+    def _do(self, plan: Plan, doing: Doing, which: tuple[int, int], end_us: int) -> None:
+        """Do something until `end_us`; which doing it is names its random draws."""
+        last = self.last
+        if which == last.given_up:
+            doing = doing._replace(activity=REST)
+        setting = self.settings[doing.activity]
+        goes_on = last.which == which and plan.began[0] == last.step
+        number = which[0] * DOINGS_A_DAY + which[1]
+        draws = Draws(self.key, number + GOING_ON if goes_on else number)
+        if not goes_on:
+            last.place = None
+            if setting.activity.away:
+                plan.leave_home()
+            elif doing.activity != REST or doing.end - doing.begin >= NO_GAP_S:
+                last.place = self._go(plan, setting, draws)
+            plan.note("activity", doing.activity)
+        if last.place is not None and self.small_moves and setting.restless:
+            last.place = self._fidget(plan, setting, last.place, end_us, draws)
+        last.which = which
+        plan.stay_until(end_us)
 
     def _go(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
         """Go to where the activity is done: a place at its furniture, else a spot in its room."""
@@ -129,28 +186,32 @@ class Inhabitant(Behavior):
 
     def _fidget(
         self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
-    ) -> None:
-        """Turn, move and fetch things at the activity's rates until it is nearly over."""
-        next_us = [plan.time_us + _wait_us(law, draws) for _, law in setting.restless]
-        turns = _Turns(plan, self.turn_rate)
+    ) -> Spot | Seat:
+        """Turn, move and fetch things at the activity's rates until it is nearly over.
+
+        Returns:
+            The place that one ends at.
+        """
+        bits = _Bits(draws)
+        next_us = [plan.time_us + bits.wait_us(law) for _, law in setting.restless]
+        facing = plan.heading
         end_us -= NEARLY_OVER_US
         while True:
             k = min(range(len(next_us)), key=next_us.__getitem__)
             if next_us[k] >= end_us:
-                turns.add_to_plan()
-                return
+                return place
             what, law = setting.restless[k]
+            plan.stay_until(next_us[k])
             if what == "shifts":
-                turns.turn(next_us[k], draws.below(2 * SIDEWAYS + 1) - SIDEWAYS)
+                aside = bits.take(SIDEWAYS_BITS) - (1 << SIDEWAYS_BITS) // 2
+                plan.turn_by(turn_between(plan.heading, (facing + aside) % TURN) / TURN)
+            elif what == "moves":
+                place = self._go_elsewhere(plan, setting, place, draws)
+                facing = plan.heading
             else:
-                turns.add_to_plan()
-                _stay_until(plan, next_us[k])
-                if what == "moves":
-                    place = self._go_elsewhere(plan, setting, place, draws)
-                else:
-                    self._fetch(plan, setting, place, end_us, draws)
-                turns = _Turns(plan, self.turn_rate)
-            next_us[k] = turns.time_us + _wait_us(law, draws)
+                self._fetch(plan, setting, place, end_us, draws)
+                facing = plan.heading
+            next_us[k] = plan.time_us + bits.wait_us(law)
 
     def _go_elsewhere(
         self, plan: Plan, setting: Setting, place: Spot | Seat, draws: Draws
@@ -167,8 +228,11 @@ class Inhabitant(Behavior):
     ) -> None:
         """Go to another room, stay a moment, and come back, if there is time for that."""
         takes_us = setting.fetch_takes.draw(draws) * SECOND_US
-        spot = draws.choice(self.spots.in_room(draws.choice(setting.stores)))
-        if plan.time_us + takes_us < end_us:
+        room = draws.choice(setting.stores)
+        spot = draws.choice(self.spots.in_room(room))
+        wait_us = self.wait_for(room.index, self.clock, plan.time_us, takes_us)
+        if wait_us is not None and plan.time_us + wait_us + takes_us < end_us:
+            plan.stay_until(plan.time_us + wait_us)
             spot.walk(plan)
             plan.stay(timedelta(microseconds=takes_us))
             _settle_at(plan, setting, place)
@@ -224,11 +288,6 @@ def rooms_at(doings: Iterable[Doing], time_s: int, activities: dict[str, Activit
     return ("any",)
 
 
-def _wait_us(law: Law, draws: Draws) -> int:
-    """Draw one of a law's quantiles [us]: fine enough for when somebody stirs."""
-    return law.knots[draws.below(KNOTS)] * SECOND_US
-
-
 def _settle_at(plan: Plan, setting: Setting, place: Spot | Seat) -> None:
     """Go to a place and sit or lie down as the activity wants; on foot, as the furniture does."""
     place.walk(plan)
@@ -236,34 +295,22 @@ def _settle_at(plan: Plan, setting: Setting, place: Spot | Seat) -> None:
         plan.take(setting.activity.posture)
 
 
-class _Turns:
-    """Turns on the spot, gathered before they are added to a plan all at once: most of them all."""
+class _Bits:
+    """Small draws, several from each draw of a stream."""
 
-    def __init__(self, plan: Plan, turn_rate: float) -> None:
-        self.time_us = plan.time_us
-        self._plan = plan
-        self._turn_rate = turn_rate  # headings per second
-        self._heading = plan.heading
-        self._rows: list[tuple[int, int, int, int, int]] = []
+    def __init__(self, draws: Draws) -> None:
+        self._draws = draws
+        self._left = self._bits = 0
 
-    def turn(self, time_us: int, aside: int) -> None:
-        """Turn to so many headings beside the one in which it all began."""
-        plan = self._plan
-        heading = (plan.heading + aside) % TURN
-        turn = abs((heading - self._heading + TURN // 2) % TURN - TURN // 2)
-        began_us = max(time_us, self.time_us)
-        self.time_us = began_us + math.ceil(turn * SECOND_US / self._turn_rate)
-        self._rows.append((began_us, plan.x, plan.y, self._heading, 0))
-        self._rows.append((self.time_us, plan.x, plan.y, heading, 0))
-        self._heading = heading
+    def take(self, count: int) -> int:
+        """Return a number from 0 to 2**count - 1, all equally likely."""
+        if self._left < count:
+            self._bits, self._left = self._draws.below(1 << DRAWN_BITS), DRAWN_BITS
+        value = self._bits & ((1 << count) - 1)
+        self._bits >>= count
+        self._left -= count
+        return value
 
-    def add_to_plan(self) -> None:
-        """Let the plan turn."""
-        if self._rows:
-            self._plan.follow(np.array(self._rows, np.int64))
-            self._rows.clear()
-
-
-def _stay_until(plan: Plan, time_us: int) -> None:
-    if time_us > plan.time_us:
-        plan.stay(timedelta(microseconds=time_us - plan.time_us))
+    def wait_us(self, law: Law) -> int:
+        """Return one of a law's quantiles [us]: fine enough for when somebody stirs."""
+        return law.knots[self.take(KNOTS.bit_length() - 1)] * SECOND_US

@@ -12,7 +12,7 @@ from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.laws import weighted
-from fleet2d.routines.planner import Doing
+from fleet2d.routines.planner import REST, Doing
 from fleet2d.routines.timeuse import activities, told_apart, works_at_home
 from fleet2d.streams import Draws, stream_key
 
@@ -45,7 +45,9 @@ class Population(Inhabitant):
         self.states = [survey.first_state(self.people, draws, self.first)]
         self.known: dict[int, Sequence[Doing]] = {}
         known = catalogue()
-        self.settle(actor, {name: known[name] for name in activities(self.people)}, Spots(actor))
+        self.settle(
+            actor, {name: known[name] for name in (*activities(self.people), REST)}, Spots(actor)
+        )
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
         """Return where one likely is at that time."""

@@ -7,20 +7,26 @@ from typing import TYPE_CHECKING, Self
 from pydantic import Field, model_validator
 
 from fleet2d.component import register
-from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
+from fleet2d.entities.users.inhabitant import SECOND_US, Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.errors import PlacementError
 from fleet2d.problems import did_you_mean, problem
 from fleet2d.routines.activity import Activity, catalogue
-from fleet2d.routines.household import AnyHousehold, Lives
+from fleet2d.routines.household import WELCOME, AnyHousehold, Lives
 from fleet2d.routines.life import Life
 from fleet2d.routines.periods import AWAY, AnyPeriod, without
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import DAY_S, Doing
 
 if TYPE_CHECKING:
+    from fleet2d.clock import Clock
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.place import Point, RoomChoice
+
+# Members of a household may go to the bathroom at night for so long, one after the other.
+TURN_US = 900 * SECOND_US
+# A way there takes less than that.
+WAY_US = 60 * SECOND_US
 
 
 @register("behavior", "routine")
@@ -52,6 +58,11 @@ class Routine(Inhabitant):
     def _is_one_person(self) -> Self:
         if self.persona is not None and self.household is not None:
             raise problem("a member of a household has the persona that the household gives it")
+        if self.household is not None and (self.away or self.visits):
+            raise problem(
+                "when a member of a household is away, or on a visit, is said in the household, by"
+                " 'trips' and 'visits': the others have to know it"
+            )
         return self
 
     def start(self, actor: "Actor") -> None:
@@ -67,7 +78,7 @@ class Routine(Inhabitant):
                     f"{actor.path}: it is no member of its household"
                     f"{did_you_mean(actor.name, members)} Its members are: {', '.join(members)}"
                 )
-            self.lives = Lives(self.household, actor.seed)
+            self.lives = Lives(self.household, actor.seed, actor.clock.start.toordinal() - 1)
             spots = Spots(actor, members.index(actor.name), len(members))
             sleeps_in = self.household.bedrooms()[actor.name]
             side = self.household.side_of_bed(actor.name)
@@ -87,7 +98,7 @@ class Routine(Inhabitant):
         if self.household is not None:
             joint = self.household.together
             names = [fields.activity or name for name, fields in joint.items()]
-            used |= {name: self.who.activity(name) for name in names}
+            used |= {name: self.who.activity(name) for name in (*names, WELCOME)}
         return used
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
@@ -102,10 +113,35 @@ class Routine(Inhabitant):
         """Return what is done on the day of a date's ordinal."""
         if self.household is None:
             return self._there(self.life.day(ordinal), ordinal)
-        return self._there(self.lives.day(ordinal)[self.name], ordinal)
+        return self.lives.day(ordinal)[self.name]
+
+    def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
+        """Return how long to wait before it may use a room [us]; None: better not at all.
+
+        Members of a household take turns at what only one can use at a time: short ways there have
+        a quarter of an hour for each of them in turn, and keep clear of what others do there.
+        """
+        if self.household is None or room not in self.private_rooms:
+            return 0
+        rank, members = self.spots.rank, self.spots.members
+        turn = begin_us // TURN_US
+        begins_us = max(begin_us, (turn + (rank - turn) % members) * TURN_US)
+        ends_us = begins_us + takes_us + 2 * WAY_US
+        if ends_us > (begins_us // TURN_US + 1) * TURN_US:
+            begins_us = (begins_us // TURN_US + members) * TURN_US
+            ends_us = begins_us + takes_us + 2 * WAY_US
+        if ends_us - begins_us > TURN_US:
+            return None
+        date = clock.start + timedelta(microseconds=begins_us)
+        midnight_us = clock.elapsed(datetime.fromordinal(date.toordinal()))
+        for begin, end in self.lives.in_use(date.toordinal(), self.name):
+            if begins_us - WAY_US < midnight_us + end * SECOND_US and (
+                midnight_us + begin * SECOND_US < ends_us
+            ):
+                return None
+        return begins_us - begin_us
 
     def _there(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
-        away = self.away if self.household is None else (*self.away, *self.household.away)
-        if not away and not self.visits:
+        if not self.away and not self.visits:
             return day
-        return without(day, datetime.fromordinal(ordinal), away, self.visits)
+        return without(day, datetime.fromordinal(ordinal), self.away, self.visits)

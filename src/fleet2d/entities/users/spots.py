@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
+from fleet2d.streams import Draws
+
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
@@ -13,6 +15,8 @@ T = TypeVar("T")
 
 # Between two spots [m]: two bodies of the usual radius of 0.2 m stand clear of each other.
 SPACING = 0.6
+# Of the spots of a room that are its own, a body has so many that it uses.
+HABITUAL = 8
 
 
 class Spot(NamedTuple):
@@ -59,12 +63,14 @@ class Spots:
         self._version = -1  # of the home that the spots were found in
 
     def in_room(self, room: "Room") -> list[Spot]:
-        """Return the body's own spots of a room as it is at present, at least one."""
+        """Return the body's habitual spots of a room as it is at present, at least one."""
         if self._version != self._actor.home.version:  # furniture was moved, a door was shut
             self._version = self._actor.home.version
             self._of_room.clear()
         if room.index not in self._of_room:
-            self._of_room[room.index] = _shared(self._grid(room), self.rank, self.members)
+            own = _shared(self._grid(room), self.rank, self.members)
+            draws = Draws(self._actor.stream(f"spots of {room.name}"), 0)
+            self._of_room[room.index] = draws.shuffled(own)[:HABITUAL]
         return self._of_room[room.index]
 
     def at_furniture(

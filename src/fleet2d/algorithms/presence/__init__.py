@@ -1,0 +1,1 @@
+"""Where people are: over weeks (long-term presence), and now (real-time presence)."""

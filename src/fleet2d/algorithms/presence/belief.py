@@ -1,0 +1,230 @@
+"""Presence: where people are believed to be, as algorithms put it out and others read it."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.errors import ComponentError
+from fleet2d.problems import did_you_mean
+
+F64 = NDArray[np.float64]
+
+ANYONE = "anyone"
+AWAY = "away"
+HOURS = 168  # of a week, from Monday 00:00
+SUM_ERROR = 1e-6  # by which a distribution's sum may miss one
+
+
+class Track(NamedTuple):
+    """What was believed in each bin of a period, from the evidence up to the end of that bin.
+
+    Attributes:
+        begin: Step at which the first bin begins.
+        bin_steps: Steps of a bin.
+        home: float64 (bins, users + 1, rooms), as `Presence.share`.
+        away: float64 (bins, users + 1), as `Presence.away`.
+    """
+
+    begin: int
+    bin_steps: int
+    home: F64
+    away: F64
+
+
+class Presence:
+    """For each user, and for anyone, the probability of each room given at home, and of away.
+
+    It never changes. *Anyone* is in every room with somebody in it: `share("anyone")` is the time
+    that each room has somebody in it, divided by the sum over rooms, and `away("anyone")` is the
+    share of time with nobody at home.
+
+    Attributes:
+        users: Names of the users; `anyone` comes behind them.
+        time: The local time it is of.
+        track: What was believed bin by bin on the way here, of real-time presence; else None.
+
+    Raises:
+        ComponentError: Shapes don't fit, a value isn't finite, or rooms don't sum to one.
+
+    Example:
+        >>> from datetime import datetime
+        >>> home = np.array([[0.75, 0.25], [0.75, 0.25]])
+        >>> presence = Presence(("ana",), home, np.array([0.5, 0.5]), datetime(2026, 1, 5))
+        >>> presence.share("ana"), presence.away("ana"), presence.with_away("ana")
+        (array([0.75, 0.25]), 0.5, array([0.375, 0.125, 0.5  ]))
+    """
+
+    def __init__(
+        self,
+        users: Sequence[str],
+        home: F64,
+        away: F64,
+        time: datetime,
+        interval: tuple[F64, F64] | None = None,
+        track: Track | None = None,
+    ) -> None:
+        """Keep the arrays, which nobody may change any more.
+
+        Args:
+            users: Names of the users.
+            home: float64 (users + 1, rooms), each row sums to one; the last is of anyone.
+            away: float64 (users + 1,).
+            time: The local time it is of.
+            interval: Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
+            track: What was believed bin by bin.
+        """
+        self.users, self.time, self.track = tuple(users), time, track
+        self._home, self._away, self._interval = home, away, interval
+        self._check()
+        for array in (home, away, *(interval or ())):
+            array.setflags(write=False)
+
+    def _check(self) -> None:
+        rows = len(self.users) + 1
+        if self._home.ndim != 2 or self._home.shape[0] != rows or self._away.shape != (rows,):
+            raise ComponentError(
+                f"presence of {rows - 1} users and anyone needs {rows} rows of shares and as many"
+                f" numbers of away; found shapes {self._home.shape} and {self._away.shape}"
+            )
+        total = self._home.sum(axis=1)
+        good = (np.abs(total - 1) <= SUM_ERROR) & (self._home >= 0).all(axis=1)
+        good &= (self._away >= 0) & (self._away <= 1)  # a NaN is not good, either
+        if not good.all():
+            row = int(np.argmin(good))
+            raise ComponentError(
+                f"presence of {self.names[row]!r} is no distribution: shares"
+                f" {self._home[row].tolist()}, which sum to {total[row]:g}, away"
+                f" {self._away[row]:g}"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Everybody it tells of: the users, and anyone."""
+        return (*self.users, ANYONE)
+
+    @property
+    def arrays(self) -> tuple[F64, F64]:
+        """Shares of everybody, float64 (users + 1, rooms), and of away, float64 (users + 1,)."""
+        return self._home, self._away
+
+    def row(self, user: str) -> int:
+        """Return the row of a user in the arrays.
+
+        Raises:
+            ComponentError: There is no such user.
+        """
+        if user not in self.names:
+            raise ComponentError(
+                f"presence of {user!r} was asked for, whom it doesn't tell of; it tells of:"
+                f" {', '.join(self.names)}{did_you_mean(user, self.names)}"
+            )
+        return self.names.index(user)
+
+    def share(self, user: str = ANYONE) -> F64:
+        """Return the probability of each room, given at home: float64 (rooms,), sums to one."""
+        found: F64 = self._home[self.row(user)]
+        return found
+
+    def away(self, user: str = ANYONE) -> float:
+        """Return the probability that a user is away, or that nobody is at home."""
+        return float(self._away[self.row(user)])
+
+    def with_away(self, user: str = ANYONE) -> F64:
+        """Return the probability of each room, and last of away: float64 (rooms + 1,)."""
+        away = self.away(user)
+        return np.append(self.share(user) * (1 - away), away)
+
+    def low(self, user: str = ANYONE) -> F64 | None:
+        """Return the lower ends of the intervals of `share`, (rooms,); None if there are none."""
+        return None if self._interval is None else self._interval[0][self.row(user), :-1]
+
+    def high(self, user: str = ANYONE) -> F64 | None:
+        """Return the upper ends of the intervals of `share`, (rooms,); None if there are none."""
+        return None if self._interval is None else self._interval[1][self.row(user), :-1]
+
+    def at(self, time: datetime) -> "Presence":
+        """Return what this says of another time: the same, unless it tells times apart."""
+        return self
+
+    def by_hour_of_week(self, user: str = ANYONE) -> F64:
+        """Return `share` at each hour of the week from Monday 00:00: float64 (168, rooms)."""
+        return np.broadcast_to(self.share(user), (HOURS, self._home.shape[1]))
+
+    def to_columns(self, rooms: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return a row per user and room, and per user one of away.
+
+        The shares of rooms are given at home and sum to one; that of away is of all time.
+
+        Raises:
+            ComponentError: The home has another number of rooms.
+        """
+        places = [*rooms, AWAY]
+        if len(rooms) != self._home.shape[1]:
+            raise ComponentError(
+                f"presence has {self._home.shape[1]} rooms, but the home has {len(rooms)}"
+            )
+        columns: dict[str, NDArray[Any]] = {
+            "user": np.repeat(np.array(self.names, dtype=object), len(places)),
+            "room": np.tile(np.array(places, dtype=object), len(self.names)),
+            "share": np.concatenate([self._home, self._away[:, None]], axis=1).ravel(),
+        }
+        if self._interval is not None:
+            columns |= {"low": self._interval[0].ravel(), "high": self._interval[1].ravel()}
+        return columns
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return itself: it never changes."""
+        return self
+
+    def __repr__(self) -> str:
+        """Show the shares of anyone."""
+        rounded = self.share().round(3).tolist()
+        return f"{type(self).__name__}({self.time.isoformat()}, anyone: {rounded})"
+
+
+class WeeklyPresence(Presence):
+    """Presence that differs by hour of the week."""
+
+    def __init__(
+        self,
+        users: Sequence[str],
+        week: tuple[F64, F64],
+        time: datetime,
+        track: Track | None = None,
+    ) -> None:
+        """Keep what is believed of each slot of the week.
+
+        Args:
+            users: Names of the users.
+            week: Shares float64 (slots, users + 1, rooms), and away float64 (slots, users + 1), of
+                the slots of equal length that a week is cut into from Monday 00:00.
+            time: The local time it is of.
+            track: What was believed bin by bin.
+        """
+        self._week = week
+        now = slot_of_week(time, len(week[1]))
+        super().__init__(users, week[0][now], week[1][now], time, track=track)
+
+    def at(self, time: datetime) -> "WeeklyPresence":
+        """Return what it says of another time."""
+        return WeeklyPresence(self.users, self._week, time)
+
+    def by_hour_of_week(self, user: str = ANYONE) -> F64:
+        """Return `share` at each hour of the week from Monday 00:00: float64 (168, rooms)."""
+        slots = np.arange(HOURS) * len(self._week[1]) // HOURS
+        found: F64 = self._week[0][slots, self.row(user)]
+        return found
+
+
+def slot_of_week(time: datetime, slots: int = HOURS) -> int:
+    """Return which of the equal slots of a week a time is in.
+
+    Example:
+        >>> slot_of_week(datetime(2026, 1, 5, 7, 30)), slot_of_week(datetime(2026, 1, 11, 23, 59))
+        (7, 167)
+    """
+    seconds = ((time.weekday() * 24 + time.hour) * 60 + time.minute) * 60 + time.second
+    return seconds * slots // (7 * 86400)

@@ -1,0 +1,170 @@
+"""The base of what estimates long-term presence, and how a scenario names one."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import CoreSchema
+
+from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence
+from fleet2d.algorithms.presence.compiled import resampled
+from fleet2d.algorithms.presence.counts import Bins, DayCounts
+from fleet2d.component import Component, OneOf, components
+from fleet2d.errors import ComponentError
+
+F64 = NDArray[np.float64]
+
+REPLICATES = 200  # of the bootstrap
+FEWEST_DAYS = 2  # that say anything about how much days differ
+
+
+class Estimator(Component):
+    """Base of what estimates where people are from evidence; a subclass writes `sums` and `shares`.
+
+    It turns each bin of evidence into numbers that add up over bins (`sums`), and such sums into
+    shares (`shares`). From these two come all variants: over all time, by hour of the week, with
+    forgetting, and intervals by resampling days.
+    """
+
+    kind: ClassVar[str] = "presence_estimator"
+    has_interval: ClassVar[bool] = True  # whether `shares` of all days are what it says
+
+    def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
+        """Prepare for a run.
+
+        Args:
+            rooms: How many rooms there are.
+            users: How many users there are.
+            half_life: Days after which a day counts half; None: all count alike.
+        """
+        self.rooms, self.users = rooms, users
+        self.counts = DayCounts((users + 1, self.width(rooms)), half_life)
+
+    def width(self, rooms: int) -> int:
+        """Return how many numbers `sums` has per user."""
+        raise NotImplementedError
+
+    def sums(self, bins: Bins) -> F64:
+        """Return the numbers of each bin that add up: float64 (bins, users + 1, width).
+
+        The last of them is 1: it counts bins.
+        """
+        raise NotImplementedError
+
+    def shares(self, sums: F64) -> tuple[F64, F64]:
+        """Return what sums say.
+
+        Args:
+            sums: float64 (..., width).
+
+        Returns:
+            Shares of rooms given at home, float64 (..., rooms), and of away, float64 (...).
+        """
+        raise NotImplementedError
+
+    def observe(self, bins: Bins) -> None:
+        """Take in evidence that follows on that before."""
+        self.counts.add(bins.day, bins.minute, self.sums(bins))
+
+    def presence(self, users: Sequence[str], time: datetime) -> Presence:
+        """Return what all evidence so far says, over all time."""
+        return Presence(users, *self.shares(self.counts.total), time)
+
+    def weekly(self, users: Sequence[str], time: datetime, smoothing: float) -> Presence:
+        """Return what all evidence so far says by hour of the week.
+
+        Args:
+            users: Names of the users.
+            time: The local time.
+            smoothing: Bins of average evidence that are added to each hour (Laplace smoothing
+                towards the shares over all time).
+        """
+        return WeeklyPresence(users, self.shares(self.smoothed_week(smoothing)), time)
+
+    def smoothed_week(self, smoothing: float) -> F64:
+        """Return the sums of each hour of the week and of some bins of average evidence."""
+        total = self.counts.total
+        bins = np.maximum(total[..., -1:], 1)
+        week: F64 = self.counts.by_hour_of_week + smoothing / bins * total
+        return week
+
+    def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
+        """Return the ends of intervals for the shares, by resampling whole days.
+
+        Minutes of a day depend on each other, days hardly: so days are drawn with replacement, and
+        the quantiles (1 - level) / 2 and (1 + level) / 2 of the shares so found are the ends. Of
+        fewer than two whole days nothing is known: 0 and 1.
+
+        Args:
+            key: Of the stream of draws.
+            level: How often the interval should hold the truth, as 0.9.
+
+        Returns:
+            Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
+        """
+        days = self.counts.weighted_days
+        shape = (self.users + 1, self.rooms + 1)
+        if len(days) < FEWEST_DAYS:
+            return np.zeros(shape), np.ones(shape)
+        drawn = resampled(key, days.reshape(len(days), -1), REPLICATES)
+        home, away = self.shares(drawn.reshape(REPLICATES, *self.counts.shape))
+        values = np.sort(np.concatenate([home, away[..., None]], axis=-1), axis=0, kind="stable")
+        cut = min(int((1 - level) / 2 * REPLICATES), (REPLICATES - 1) // 2)
+        return values[cut], values[REPLICATES - 1 - cut]
+
+    def remember(self) -> dict[str, Any]:
+        """Return all that was learned, as arrays in mappings."""
+        return {"counts": self.counts.remember()}
+
+    def recall(self, learned: Mapping[str, Any], today: int) -> None:
+        """Go on from what `remember` returned; called after `begin`.
+
+        Args:
+            learned: What was remembered.
+            today: Ordinal of the day that begins.
+
+        Raises:
+            ComponentError: It was learned with other rooms or users, or by another estimator.
+        """
+        found = np.asarray(learned.get("counts", {}).get("over", ())).shape
+        if found != self.counts.shape:
+            raise ComponentError(
+                f"what was learned has sums of shape {found}, but {self.type_name} needs"
+                f" {self.counts.shape} here (users and anyone, numbers of each): it is from another"
+                " home, other users or another estimator"
+            )
+        self.counts.recall(learned["counts"], today)
+
+
+def normalized(weights: F64) -> F64:
+    """Divide weights by their sum over the last axis; uniform where that is zero.
+
+    Example:
+        >>> normalized(np.array([[3.0, 1.0], [0.0, 0.0]])).tolist()
+        [[0.75, 0.25], [0.5, 0.5]]
+    """
+    total = weights.sum(axis=-1, keepdims=True)
+    return np.where(total > 0, weights / np.where(total > 0, total, 1), 1 / weights.shape[-1])
+
+
+class Choice(OneOf):
+    """Declares a field for any component of a kind that is part of an algorithm."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Name the types there are; what keys each has, only its class tells."""
+        names = list(components(self.kind))
+        own = {"type": "string", "pattern": ":", "description": f"your own {self.kind}"}
+        typed = {"type": {"anyOf": [{"type": "string", "enum": names}, own]}}
+        return {
+            "x-quantity": self.kind.replace("_", " "),
+            "anyOf": [
+                {"type": "string", "enum": names},
+                own,
+                {"type": "object", "properties": typed, "required": ["type"]},
+            ],
+        }

@@ -1,0 +1,119 @@
+"""Long-term presence: how much of the time each user spends in each room."""
+
+from collections.abc import Mapping, Set
+from datetime import timedelta
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from fleet2d.algorithms.algorithm import Algorithm, Present
+from fleet2d.algorithms.history import History
+from fleet2d.algorithms.presence import (  # noqa: F401 - to be found by type
+    exposure_ratio,
+    fremen,
+    likelihood,
+    sighting_share,
+)
+from fleet2d.algorithms.presence.belief import Presence
+from fleet2d.algorithms.presence.counts import in_time
+from fleet2d.algorithms.presence.estimator import F64, Choice, Estimator
+from fleet2d.component import register
+from fleet2d.problems import problem
+from fleet2d.streams import stream_key
+from fleet2d.units import PositiveDuration, Share
+
+if TYPE_CHECKING:
+    from fleet2d.floorplan.home import Home
+
+MINUTE = timedelta(minutes=1)
+DAY = timedelta(days=1)
+SECOND_US = 1_000_000
+
+
+@register("algorithm", "long_term_presence", aliases=("ltp",))
+class LongTermPresence(Algorithm):
+    """How much of the time each user, and anyone, spends in each room, as robots' evidence says.
+
+    Its output is a `Presence`: `share` is given at home, `with_away` of all time, and with `by:
+    hour_of_week` both are those of the hour, and `at` tells of any other.
+    """
+
+    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+
+    estimator: Annotated[Estimator, Choice("presence_estimator")] = Field(
+        cast("Any", "exposure_ratio"), description="how it is estimated"
+    )
+    by: Literal["overall", "hour_of_week"] = Field(
+        default="overall", description="whether hours of the week are told apart"
+    )
+    smoothing: PositiveDuration = Field(
+        default=timedelta(hours=1),
+        description="of average evidence that each hour of the week is given beforehand",
+    )
+    half_life: PositiveDuration | None = Field(
+        default=None, description="after which evidence counts half; null: all counts alike"
+    )
+    interval: Share | None = Field(
+        default=None, gt=0, lt=1, description="coverage of the intervals it tells, as 0.9"
+    )
+
+    @model_validator(mode="after")
+    def _check_interval(self) -> "LongTermPresence":
+        if self.interval is not None and self.by != "overall":
+            raise problem(f"interval is {self.interval:g}, but there are none by: {self.by}")
+        if self.interval is not None and not self.estimator.has_interval:
+            raise problem(
+                f"interval is {self.interval:g}, but {self.estimator.type_name} has none: leave it"
+                " out, or choose another estimator"
+            )
+        return self
+
+    def start(self, home: "Home") -> None:
+        """Begin without evidence."""
+        self.rooms = len(home.rooms)
+        self.begun = False
+        self.recalled: Mapping[str, Any] | None = None
+        self.ends: tuple[F64, F64] | None = None
+
+    def update(self, history: History, state: Present) -> Presence:
+        """Take in what was watched and seen; return what all of it says."""
+        step_us = round(history.step_s * SECOND_US)
+        evidence = history.evidence
+        bins = in_time(evidence, state.start, step_us)
+        if not self.begun:
+            self._begin(state)
+        self.estimator.observe(bins)
+        time = state.time + timedelta(microseconds=step_us)
+        if self.by == "hour_of_week":
+            smoothing = self.smoothing / timedelta(microseconds=bins.bin_steps * step_us)
+            return self.estimator.weekly(state.users, time, smoothing)
+        presence = self.estimator.presence(state.users, time)
+        return presence if self.interval is None else self._with_interval(presence, state)
+
+    def _begin(self, state: Present) -> None:
+        half_life = None if self.half_life is None else self.half_life / DAY
+        self.estimator.begin(self.rooms, len(state.users), half_life)
+        if self.recalled is not None:
+            self.estimator.recall(self.recalled, state.start.toordinal())
+        self.begun, self.until = True, -1
+
+    def _with_interval(self, presence: Presence, state: Present) -> Presence:
+        """Add the interval, which changes when a day is over."""
+        assert self.interval is not None
+        if self.until != self.estimator.counts.today:
+            self.until = self.estimator.counts.today
+            key = stream_key(state.seed, state.path, f"days until {self.until}")
+            self.ends = self.estimator.interval(np.uint64(key), self.interval)
+        home, away = presence.arrays
+        return Presence(presence.users, home, away, presence.time, self.ends)
+
+    def remember(self) -> dict[str, Any]:
+        """Return what was learned, to start another run from."""
+        if not self.begun:
+            return {} if self.recalled is None else dict(self.recalled)
+        return self.estimator.remember()
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Go on from what another run has learned."""
+        self.recalled = learned or None

@@ -1,0 +1,145 @@
+"""The base of models of real-time presence, and those without a chain: last seen, and long-term."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Annotated, Any, ClassVar, cast
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.algorithms.presence import likelihood  # noqa: F401 - to be found by type
+from fleet2d.algorithms.presence.belief import HOURS, Presence, Track, WeeklyPresence
+from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.presence.estimator import F64, Choice, Estimator
+from fleet2d.component import Component, register
+
+NEVER = -1
+
+
+class Model(Component):
+    """Base of what tells where people are now; a subclass writes `observe` and `presence`.
+
+    A model that was learned elsewhere is one more subclass: a scenario names it by `model:
+    module:Class`.
+    """
+
+    kind: ClassVar[str] = "presence_model"
+
+    def begin(self, rooms: int, users: int, day: int) -> None:
+        """Prepare for a run.
+
+        Args:
+            rooms: How many rooms there are.
+            users: How many users there are.
+            day: Ordinal of its first day.
+        """
+        self.rooms, self.users = rooms, users
+
+    def observe(self, bins: Bins) -> tuple[F64, F64]:
+        """Take in evidence that follows on that before; return what is believed after each bin.
+
+        Nothing may be used that came later than the bin.
+
+        Returns:
+            Shares of rooms given at home, float64 (bins, users + 1, rooms), and of away, float64
+            (bins, users + 1).
+        """
+        raise NotImplementedError
+
+    def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
+        """Return what is believed now, which may tell of later times by `at`.
+
+        Args:
+            users: Names of the users.
+            time: The local time at which the last bin ended.
+            bin_us: Length of a bin [us].
+            track: What was believed on the way here, its last bin now.
+        """
+        return Presence(users, track.home[-1], track.away[-1], time, track=track)
+
+    def remember(self) -> dict[str, Any]:
+        """Return all that was learned, as arrays in mappings."""
+        return {}
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Go on from what `remember` returned; called after `begin`."""
+
+
+@register("presence_model", "last_seen")
+class LastSeen(Model):
+    """The room in which the user was perceived last, for sure; before that all rooms are alike.
+
+    Of a bin with sightings in several rooms, that with most; nobody is ever away. The naive
+    baseline: right just after a sighting, and then surer of itself than it should be.
+    """
+
+    def begin(self, rooms: int, users: int, day: int) -> None:
+        """Prepare for a run."""
+        super().begin(rooms, users, day)
+        self.last = np.full(users + 1, NEVER)
+
+    def observe(self, bins: Bins) -> tuple[F64, F64]:
+        """Return the last room of each user after each bin."""
+        found = np.any(bins.seen > 0, axis=2)
+        room = np.where(found, bins.seen.argmax(axis=2), NEVER)
+        room = np.concatenate([self.last[np.newaxis], room])
+        newest = np.where(room != NEVER, np.arange(len(room))[:, np.newaxis], 0)
+        room = np.take_along_axis(room, np.maximum.accumulate(newest, axis=0), axis=0)
+        self.last = room[-1]
+        home = (room[1:, :, np.newaxis] == np.arange(self.rooms)).astype(np.float64)
+        home[room[1:] == NEVER] = 1 / self.rooms
+        return home, np.zeros(home.shape[:2])
+
+
+@register("presence_model", "long_term")
+class LongTerm(Model):
+    """Long-term presence, whatever was seen just now."""
+
+    estimator: Annotated[Estimator, Choice("presence_estimator")] = Field(
+        cast("Any", "likelihood"), description="how it is estimated"
+    )
+
+    def begin(self, rooms: int, users: int, day: int) -> None:
+        """Prepare for a run."""
+        super().begin(rooms, users, day)
+        self.day = day
+        self.estimator.begin(rooms, users)
+
+    def observe(self, bins: Bins) -> tuple[F64, F64]:
+        """Return what was believed before these bins, for each of them."""
+        home, away = self.estimator.shares(self.estimator.counts.total)
+        self.estimator.observe(bins)
+        count = len(bins.day)
+        return np.repeat(home[np.newaxis], count, axis=0), np.repeat(away[np.newaxis], count, 0)
+
+    def remember(self) -> dict[str, Any]:
+        """Return all that was learned, as arrays in mappings."""
+        return self.estimator.remember()
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Go on from what `remember` returned; called after `begin`."""
+        self.estimator.recall(learned, self.day)
+
+
+@register("presence_model", "hour_of_week")
+class HourOfWeek(LongTerm):
+    """Long-term presence of the hour of the week, whatever was seen just now."""
+
+    smoothing: float = Field(
+        default=60, gt=0, description="bins of average evidence each hour is given beforehand"
+    )
+
+    def observe(self, bins: Bins) -> tuple[F64, F64]:
+        """Return what was believed before these bins of the hour of each of them."""
+        home, away = self.week()
+        self.estimator.observe(bins)
+        hour = ((bins.day - 1) * 24 + bins.minute // 60) % HOURS
+        return home[hour], away[hour]
+
+    def week(self) -> tuple[F64, F64]:
+        """Return what is believed of each hour of the week."""
+        return self.estimator.shares(self.estimator.smoothed_week(self.smoothing))
+
+    def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
+        """Return what is believed of the present hour, and by `at` of others."""
+        return WeeklyPresence(users, self.week(), time, track=track)

@@ -1,0 +1,83 @@
+"""Real-time presence: where each user is now, given all that was and wasn't seen."""
+
+from collections.abc import Mapping, Set
+from datetime import timedelta
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+
+from pydantic import Field
+
+from fleet2d.algorithms.algorithm import Algorithm, Present
+from fleet2d.algorithms.history import History
+from fleet2d.algorithms.presence import (  # noqa: F401 - to be found by type
+    chain_model,
+    exposure_ratio,
+    fremen,
+    sighting_share,
+)
+from fleet2d.algorithms.presence.belief import Presence, Track
+from fleet2d.algorithms.presence.counts import in_time
+from fleet2d.algorithms.presence.estimator import Choice
+from fleet2d.algorithms.presence.model import Model
+from fleet2d.component import register
+from fleet2d.units import PositiveDuration
+
+if TYPE_CHECKING:
+    from fleet2d.floorplan.home import Home
+
+SECOND_US = 1_000_000
+
+
+@register("algorithm", "real_time_presence", aliases=("rtp",))
+class RealTimePresence(Algorithm):
+    """Where each user, and anyone, is now: P(room | all that was and wasn't seen so far).
+
+    Its output is a `Presence` of the time of the update; `at` tells of later times, as far as the
+    model can. Until the first whole bin (a minute, or a step where that is longer) there is none.
+    """
+
+    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+
+    period: PositiveDuration = Field(
+        default=timedelta(minutes=5), description="how often it is updated"
+    )
+    model: Annotated[Model, Choice("presence_model")] = Field(
+        cast("Any", "hmm"), description="how it is worked out"
+    )
+
+    def start(self, home: "Home") -> None:
+        """Begin without evidence."""
+        self.rooms = len(home.rooms)
+        self.begun = False
+        self.recalled: Mapping[str, Any] | None = None
+
+    def update(self, history: History, state: Present) -> Presence | None:
+        """Take in what was watched and seen; return what is believed now."""
+        step_us = round(history.step_s * SECOND_US)
+        evidence = history.evidence
+        bins = in_time(evidence, state.start, step_us)
+        if not self.begun:
+            self._begin(state)
+        if not len(bins.day):
+            return None
+        home, away = self.model.observe(bins)
+        track = Track(evidence.begin, evidence.bin_steps, home, away)
+        time = state.start + timedelta(
+            microseconds=(evidence.begin + len(bins.day) * bins.bin_steps) * step_us
+        )
+        return self.model.presence(state.users, time, bins.bin_steps * step_us, track)
+
+    def _begin(self, state: Present) -> None:
+        self.model.begin(self.rooms, len(state.users), state.start.toordinal())
+        if self.recalled is not None:
+            self.model.recall(self.recalled)
+        self.begun = True
+
+    def remember(self) -> dict[str, Any]:
+        """Return what was learned, to start another run from."""
+        if not self.begun:
+            return {} if self.recalled is None else dict(self.recalled)
+        return self.model.remember()
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Go on from what another run has learned."""
+        self.recalled = learned or None

@@ -1,0 +1,106 @@
+"""Clearance: which robots are about to drive at people, step by step.
+
+It follows from the poses alone. A robot that gives way is in somebody's way at a step if its next
+move would bring it within its distance of where somebody is, and nearer than it is. It is asked
+anew at that step, before it moves, so it makes no difference where spans end.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.engine.buckets import PoseBlock
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.entity import Robot
+from fleet2d.entities.giving_way import PASSING
+from fleet2d.kernels.mesh import locate
+from fleet2d.kernels.motion import Poses, empty_poses
+from fleet2d.kernels.sight import line_of_sight
+
+I64 = NDArray[np.int64]
+
+
+class Clearance:
+    """The robots of a run that give way.
+
+    Attributes:
+        robots: Them, by their rows in a PoseBlock.
+    """
+
+    def __init__(self, users: Sequence[Actor], robots: Sequence[Actor]) -> None:
+        self._users = users
+        self.robots = {
+            len(users) + i: robot
+            for i, robot in enumerate(robots)
+            if isinstance(robot.entity, Robot) and robot.entity.gives_way is not None and users
+        }
+
+    def limit(self, block: PoseBlock, first: int, count: int) -> int:
+        """Return before which of `count` steps, but the first, a robot is to be asked anew."""
+        for row, robot in self.robots.items():
+            # The step after the span was traced, too.
+            poses, crowd = block.row(row, count + 1), slice(0, len(self._users))
+            met = self._first(
+                robot,
+                poses,
+                block.x[crowd, : count + 1],
+                block.y[crowd, : count + 1],
+                block.away[crowd, : count + 1],
+                begin=max(1, robot.pushes_until - first),
+            )
+            if met is not None:
+                count = met[0]
+        return count
+
+    def in_way(self, row: int, step: int) -> Actor | None:
+        """Return at whom a robot would drive in a step, with everybody where they are."""
+        robot = self.robots.get(row)
+        if robot is None or step < robot.pushes_until:
+            return None
+        poses = empty_poses(2)
+        robot.motion.trace(step, robot.state, poses)
+        where = np.array([user.state for user in self._users], np.int64)
+        twice = np.repeat(where[:, None, :], 2, axis=1)
+        met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], begin=0)
+        return None if met is None else self._users[met[1]]
+
+    def people(self, robot: Actor) -> I64:
+        """Return where people at home are, and how far a robot keeps to pass: int64 (n, 3)."""
+        units = robot.home.plan.lattice.units_per_m
+        rows = [
+            (u.state.x, u.state.y, int((u.entity.radius + robot.entity.radius + PASSING) * units))
+            for u in self._users
+            if not u.state.away
+        ]
+        return np.array(rows, np.int64).reshape(-1, 3)
+
+    def _first(
+        self, robot: Actor, poses: Poses, xs: I64, ys: I64, away: NDArray[np.integer], begin: int
+    ) -> tuple[int, int] | None:
+        """Return the first column, from `begin` to the last but one, and at whom it drives."""
+        assert isinstance(robot.entity, Robot)
+        assert robot.entity.gives_way is not None
+        units = robot.home.plan.lattice.units_per_m
+        best: tuple[int, int] | None = None
+        x, y = poses.x, poses.y
+        for number, user in enumerate(self._users):
+            keeps = user.entity.radius + robot.entity.radius + robot.entity.gives_way.distance
+            dx, dy = x[:-1] - xs[number, :-1], y[:-1] - ys[number, :-1]
+            next_x, next_y = x[1:] - xs[number, :-1], y[1:] - ys[number, :-1]
+            ahead = next_x * next_x + next_y * next_y
+            close = (ahead <= (keeps * units) ** 2) & (ahead < dx * dx + dy * dy)
+            close &= (away[number, :-1] == 0) & (poses.away[:-1] == 0)
+            for column in np.flatnonzero(close).tolist():
+                if best is not None and column >= best[0]:
+                    break
+                there = int(xs[number, column]), int(ys[number, column])
+                if column >= begin and _sees(robot, int(x[column]), int(y[column]), there):
+                    best = column, number
+                    break
+        return best
+
+
+def _sees(robot: Actor, x: int, y: int, there: tuple[int, int]) -> bool:
+    walls = robot.home.walls
+    return bool(line_of_sight(walls, x, y, locate(walls, x, y), *there))

@@ -1,0 +1,127 @@
+"""Hours of the week in which something holds: ``weekdays 08:00-18:00``."""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from fleet2d.problems import problem, shown
+from fleet2d.units import format_time_of_day, parse_time_of_day
+
+DAY = timedelta(days=1)
+WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+Days = Literal[
+    "daily", "weekdays", "weekend",
+    "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
+]  # fmt: skip
+GROUPS = {"daily": range(7), "weekdays": range(5), "weekend": range(5, 7)}
+
+
+class Span(NamedTuple):
+    """Hours of some days of the week; past midnight where they end before they begin.
+
+    Attributes:
+        days: The days on which they begin, 0 is Monday.
+        begin: Since midnight.
+        end: Since the same midnight, up to a day after `begin`.
+        text: As it was written.
+    """
+
+    days: tuple[int, ...]
+    begin: timedelta
+    end: timedelta
+    text: str
+
+    def holds_at(self, time: datetime) -> datetime | None:
+        """Return when the hours that a moment is in are over; None if it is in none."""
+        midnight = _midnight(time)
+        for day in (midnight - DAY, midnight):
+            if day.weekday() in self.days and day + self.begin <= time < day + self.end:
+                return day + self.end
+        return None
+
+    def next_begin(self, time: datetime) -> datetime:
+        """Return when they begin next after a moment."""
+        midnight = _midnight(time)
+        days = (midnight + i * DAY for i in range(8))
+        begins = (day + self.begin for day in days if day.weekday() in self.days)
+        return next(begin for begin in begins if begin > time)
+
+
+def parse_span(value: object) -> Span:
+    """Read hours: ``08:00-18:00``, ``weekdays 22:00-06:00`` or ``monday,friday 9:00-12:00``.
+
+    Example:
+        >>> span = parse_span("weekend 22:00-06:00")
+        >>> span.holds_at(datetime(2026, 1, 12, 5)), span.holds_at(datetime(2026, 1, 10, 5))
+        (datetime.datetime(2026, 1, 12, 6, 0), None)
+    """
+    if isinstance(value, Span):
+        return value
+    words = value.split() if isinstance(value, str) else []
+    if not 1 <= len(words) <= 2 or words[-1].count("-") != 1:
+        raise problem(
+            f"found {shown(value)}; hours are wanted, like '08:00-22:00', 'weekdays 9:00-17:00' or"
+            " 'monday,friday 22:00-06:00'"
+        )
+    begin, end = (parse_time_of_day(text) for text in words[-1].split("-"))
+    if begin == end:
+        raise problem(f"found {shown(value)}; hours begin and end at different times")
+    days = sorted(weekdays_of((words[0] if words[1:] else "daily").split(",")))
+    names = "" if len(words) == 1 else f"{words[0]} "
+    text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"
+    return Span(tuple(days), begin, end if end > begin else end + DAY, text)
+
+
+def weekdays_of(names: str | Sequence[str]) -> set[int]:
+    """Return the days of the week that names stand for, 0 is Monday.
+
+    >>> sorted(weekdays_of(["weekend", "friday"]))
+    [4, 5, 6]
+    """
+    return {day for name in ((names,) if isinstance(names, str) else names) for day in _days(name)}
+
+
+def _days(name: str) -> Sequence[int]:
+    if name in GROUPS:
+        return GROUPS[name]
+    if name in WEEKDAYS:
+        return (WEEKDAYS.index(name),)
+    raise problem(
+        f"unknown day {name!r}; there are: {', '.join((*GROUPS, *WEEKDAYS))}, or a list of those"
+        " like 'monday,friday'"
+    )
+
+
+def _midnight(time: datetime) -> datetime:
+    return datetime.combine(time.date(), datetime.min.time())
+
+
+def _parse_hours(value: object) -> tuple[Span, ...]:
+    if isinstance(value, Sequence) and not isinstance(value, str | Span):
+        return tuple(parse_span(item) for item in value)
+    return (parse_span(value),)
+
+
+Hours = Annotated[
+    tuple[Span, ...],
+    BeforeValidator(_parse_hours),
+    PlainSerializer(lambda spans: [span.text for span in spans]),
+    WithJsonSchema(
+        {
+            "description": "hours of the week, like '08:00-22:00' or 'weekdays 9:00-17:00', or a"
+            " list of them",
+            "x-quantity": "hours",
+            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            "examples": ["08:00-22:00", ["weekdays 9:00-17:00", "weekend 10:00-20:00"]],
+        }
+    ),
+]
+"""Hours of the week, in one or several spans; an empty list is never, unless a field says else."""
+
+
+def holds(hours: Sequence[Span], time: datetime) -> datetime | None:
+    """Return when the hours that a moment is in are over; None if it is in none."""
+    ends = [end for span in hours if (end := span.holds_at(time))]
+    return max(ends, default=None)

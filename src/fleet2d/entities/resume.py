@@ -1,0 +1,82 @@
+"""Resuming: the rest of a plan that was broken off, from wherever the body is by now."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.entities.plan import Note, Plan, Track
+from fleet2d.errors import NoWayError
+from fleet2d.kernels.headings import TURN, turn_between
+from fleet2d.kernels.motion import Breakpoints
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+Detour = Callable[[tuple[int, int], tuple[int, int]], NDArray[np.int64] | None]
+
+
+def resumed(
+    actor: "Actor", plan: Plan, broken: Plan, step: int, detour: Detour | None = None
+) -> Plan | None:
+    """Fill an empty plan with the rest of one that was broken off.
+
+    The body goes straight to the next place at which it would have stopped. From there on all is as
+    it was planned, only later; of a stop that was under way, what was left of it.
+
+    Args:
+        actor: The body.
+        plan: An empty plan that begins here and now.
+        broken: The other plan.
+        step: When it was broken off.
+        detour: Finds ways; None: the shortest.
+
+    Returns:
+        The plan; None where there is nothing to go on with, or no way to it at present.
+    """
+    motion, broken_us = broken.finish(), step * actor.clock.step_us
+    if not isinstance(motion, Track) or broken.postures or plan.away:
+        return None
+    track = motion.breakpoints
+    stop = _next_stop(actor, track, broken_us)
+    if stop is None or track.away[stop:].any():
+        return None
+    goes_on_us = max(int(track.time[stop]), broken_us)
+    goal = int(track.x[stop]), int(track.y[stop])
+    try:
+        plan.go_to_point(*goal, route=detour and detour((plan.x, plan.y), goal))
+    except NoWayError:
+        return None
+    plan.turn_by(turn_between(plan.heading, _heading_at(track, stop, goes_on_us)) / TURN)
+    later = plan.time_us - goes_on_us
+    # What was to happen on the way happens when it is there.
+    plan.notes += [
+        Note(max(n.time_us, goes_on_us) + later, n.event, n.detail)
+        for n in broken.notes
+        if n.time_us > broken_us
+    ]
+    rest = np.stack([column[stop + 1 :].astype(np.int64) for column in track], axis=-1)
+    rest[:, 0] += later
+    plan.follow(rest).endless = broken.endless
+    return plan
+
+
+def _next_stop(actor: "Actor", track: Breakpoints, broken_us: int) -> int | None:
+    """Return the breakpoint at which the body next stands still, where it can be; None for none."""
+    x, y, time = track.x, track.y, track.time
+    at = max(int(np.searchsorted(time, broken_us, side="right")) - 1, 0)
+    for i in range(at, len(time) - 1):
+        still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > broken_us
+        # Where a way turns at a corner it touches the border of the space: that is no stop.
+        if still and actor.space.part_at(int(x[i]), int(y[i])) == actor.part:
+            return i
+    return None
+
+
+def _heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
+    """Return the heading at a moment between a breakpoint and the next."""
+    times, headings = track.time, track.heading
+    begin, end = int(times[stop]), int(times[stop + 1])
+    turn = int(turn_between(int(headings[stop]), int(headings[stop + 1])))
+    return (int(headings[stop]) + turn * (time_us - begin) // max(end - begin, 1)) % TURN

@@ -1,0 +1,93 @@
+"""Ways of a robot: how long they take, and where one to a person ends."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.entities.behavior import Situation
+from fleet2d.errors import ComponentError
+from fleet2d.kernels.headings import TURN, heading_of, turn_between
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.plan import Plan
+
+Spot = tuple[int, int]
+
+
+def way_seconds(actor: "Actor", start: Spot, goal: Spot) -> float | None:
+    """Return how long a robot drives from a lattice point to another, turns apart; None: no way."""
+    route = actor.space.route(start, goal)
+    return None if route is None else sum(_legs(route)) / actor.speed
+
+
+def spot_near(now: Situation, x: float, y: float, distance: float) -> Spot:
+    """Return the lattice point on the way to a person at which the robot is near enough.
+
+    Args:
+        now: The situation.
+        x: Where the person is [m].
+        y: Where the person is [m].
+        distance: How near it comes [m], as the crow flies.
+
+    Returns:
+        A point on the shortest way to the free place nearest to the person; where the robot is, if
+        it is near enough already or there is no way.
+    """
+    actor, lattice = now.actor, now.home.plan.lattice
+    here = (actor.state.x, actor.state.y)
+    person = lattice.to_lattice((x, y))
+    goal = lattice.to_lattice(now.nearest_free(x, y)).tolist()
+    route = actor.space.route(here, (goal[0], goal[1]))
+    reach = distance * lattice.units_per_m
+    if route is None or _distance(person, here) <= reach:
+        return here
+    for start, end, length in zip(route[:-1], route[1:], _legs(route), strict=True):
+        steps = max(1, int(length / (lattice.units_per_m / 20)))
+        for k in range(1, steps + 1):
+            point = start + (end - start) * k // steps
+            if _distance(person, point) <= reach and _is_free(actor, point):
+                return int(point[0]), int(point[1])
+    return int(goal[0]), int(goal[1])
+
+
+def approach(now: Situation, plan: "Plan", x: float, y: float, distance: float) -> "Plan":
+    """Drive to near a person at (x, y) [m], as `spot_near` says, if it isn't there already."""
+    spot = spot_near(now, x, y, distance)
+    if spot != (plan.x, plan.y):  # where it was broken off it may touch the border of its space
+        plan.go_to_point(*spot)
+    return plan
+
+
+def face(plan: "Plan", x: int, y: int) -> "Plan":
+    """Turn towards a lattice point."""
+    heading = int(heading_of(x - plan.x, y - plan.y))
+    return plan.turn_by(turn_between(plan.heading, heading) / TURN)
+
+
+def check_has_camera(actor: "Actor", behavior: str) -> None:
+    """Refuse a behavior that goes by what is seen, for a body that sees nothing.
+
+    Raises:
+        ComponentError: The body has no camera.
+    """
+    if not actor.entity.eyes:
+        raise ComponentError(
+            f"{actor.path}: {behavior} goes by whom the robot sees, but it has no camera"
+        )
+
+
+def _is_free(actor: "Actor", point: NDArray[np.int64]) -> bool:
+    return actor.space.part_at(int(point[0]), int(point[1])) == actor.part
+
+
+def _legs(route: NDArray[np.int64]) -> list[float]:
+    legs = np.diff(route, axis=0)
+    lengths: list[float] = np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).tolist()
+    return lengths
+
+
+def _distance(one: object, other: object) -> float:
+    gap = np.asarray(one, np.int64) - np.asarray(other, np.int64)
+    return float(np.sqrt(np.float64((gap * gap).sum())))

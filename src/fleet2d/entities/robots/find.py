@@ -1,0 +1,216 @@
+"""Find: look for a person, room by room, by what is believed and how far it is."""
+
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.robots.approach import approach, check_has_camera, face
+from fleet2d.entities.robots.belief import ANYONE, room_belief
+from fleet2d.entities.robots.sites import Sites
+from fleet2d.errors import PlacementError
+from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
+from fleet2d.units import Duration, Length, PositiveDuration, Share, TimeOfDay, problem
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+DAY = timedelta(days=1)
+# Where no room can be entered at present, it waits this long.
+AT_A_DOOR = timedelta(seconds=10)
+
+
+class Missed(NamedTuple):
+    """A look that found nobody."""
+
+    site: int
+    at: datetime
+
+
+class Search(NamedTuple):
+    """A search under way."""
+
+    since: datetime
+    missed: tuple[Missed, ...] = ()
+    route: tuple[int, ...] = ()  # sites to go to yet, of a policy that decides beforehand
+    going_to: int | None = None
+
+
+@register("behavior", "find")
+class Find(Behavior):
+    """Look for a person at given times, until found, given up, or believed to be out.
+
+    A site is a room, looked round in from so many places that little of it stays out of view. In
+    which order the sites are looked at is for the `policy` to say, from what `source` says of where
+    the person is now, and the ways: see :mod:`fleet2d.search.policies`. `receding` decides anew
+    after every empty look, by the belief that is left; the others decide once, when the search
+    begins.
+
+    The person is found when the cameras perceive somebody as that person; it may be somebody else
+    whom they mistake. Events, with the person's name: `find_begins`, and one of `found`,
+    `not_at_home` and `gave_up`.
+    """
+
+    user: str = Field(default=ANYONE, min_length=1, description="whom it looks for, or anyone")
+    source: str | None = Field(
+        default=None,
+        description="the algorithm that says where people are; left out: rooms count by their size",
+    )
+    policy: Policy = Field(default="receding", description="in which order it looks at the rooms")
+    at: tuple[TimeOfDay, ...] = Field(default=(), description="times of day at which it begins")
+    every: PositiveDuration | None = Field(
+        default=None, description="or how much time lies between two searches, from the start on"
+    )
+    deadline: PositiveDuration = Field(
+        default=timedelta(minutes=10), description="after that it gives up"
+    )
+    out_at: Share = Field(
+        default=0.9,
+        description="it says that the person isn't at home once that is believed to be so probable,"
+        " and every room has been looked at",
+    )
+    doubt: Share = Field(
+        default=0.1, description="share of belief that counts rooms by their size, whatever is said"
+    )
+    memory: Duration = Field(
+        default=timedelta(minutes=20),
+        description="an empty look counts half when it is so long ago: people move",
+    )
+    views: int = Field(
+        default=2, ge=1, le=8, description="in a room it looks round from so many places at most"
+    )
+    distance: Length = Field(
+        default=1.5, ge=0.3, le=10, description="how near it comes to who is found [m]"
+    )
+    stay: Duration = Field(
+        default=timedelta(minutes=1), description="how long it stays with who is found"
+    )
+
+    @model_validator(mode="after")
+    def _begins(self) -> Self:
+        if bool(self.at) == (self.every is not None):
+            raise problem(
+                "it begins by 'at' (times of day) or 'every' (a duration): give one of them"
+            )
+        return self
+
+    def start(self, actor: "Actor") -> None:
+        """Find where to look round in each room."""
+        check_has_camera(actor, "find")
+        self.sites = Sites(actor, self.views)
+        if self.policy == "exact" and len(self.sites) > MOST_EXACT:
+            raise PlacementError(
+                f"{actor.path}: the exact policy works for up to {MOST_EXACT} rooms, and there are"
+                f" {len(self.sites)}: choose policy: receding"
+            )
+        self.search: Search | None = None
+        self.plan: Plan | None = None  # the last one it made
+        self.due = self._next(actor.clock.start, None, actor.clock.start)
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithm that it goes by."""
+        return () if self.source is None else (self.source,)
+
+    def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
+        """Return when the next search begins."""
+        return self.due
+
+    def busy(self) -> bool:
+        """Tell whether it searches."""
+        return self.search is not None
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Begin a search that is due, go on with one, or leave the robot to others."""
+        plan = now.plan()
+        if self.search is None:
+            if now.time < self.due:
+                return None
+            self.due = self._next(now.time, self.due, now.actor.clock.start)
+            self.search = Search(now.time)
+            plan.note("find_begins", self.user)
+        else:
+            self._take_in(now)
+        seen = now.in_view
+        name = self.user if self.user != ANYONE else next(iter(sorted(seen)), ANYONE)
+        if name in seen:
+            return self._found(now, plan, *seen[name])
+        return self._look_on(now, plan)
+
+    def _take_in(self, now: Situation) -> None:
+        """Note that the look that the last plan made found nobody, if it came to its end."""
+        search = self.search
+        assert search is not None
+        whole = now.actor.plan is self.plan and self.plan.is_over(now.step)
+        if search.going_to is not None and whole and not now.events:
+            missed = (*search.missed, Missed(search.going_to, now.time))
+            self.search = search._replace(missed=missed, route=search.route[1:], going_to=None)
+
+    def _found(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
+        self.search = None
+        approach(now, plan.note("found", self.user), x, y, self.distance)
+        face(plan, *now.home.plan.lattice.to_lattice((x, y)).tolist())
+        return plan.stay(self.stay)
+
+    def _look_on(self, now: Situation, plan: Plan) -> Plan | None:
+        """Go to the site that is next and look round there, or end the search."""
+        search = self.search
+        assert search is not None
+        ends = search.since + self.deadline
+        if now.time >= ends:
+            return self._end(plan, "gave_up")
+        prior, away = self._prior(now)
+        age, memory = self._ages(search, now), self.memory.total_seconds()
+        left = after_empty_looks(prior, age, memory, self.sites.share)
+        if np.isfinite(age).all() and away >= self.out_at * (away + sum(left.tolist())):
+            return self._end(plan, "not_at_home")
+        route = search.route
+        if self.policy == "receding" or not route:
+            problem = self.sites.problem(now, after_empty_looks(prior, age, memory))
+            route = tuple(order_by(self.policy, problem, now.random("order")))
+        while route and not self.sites.can_go(plan, route[0]):
+            route = route[1:]
+        self.search = search._replace(route=route, going_to=route[0] if route else None)
+        if route:
+            self.sites.look_round(plan, route[0]).interrupt_on("user_seen")
+        else:  # shut doors all round
+            plan.stay(AT_A_DOOR)
+        self.plan = plan.ask_by(ends)
+        return plan
+
+    def _prior(self, now: Situation) -> tuple[NDArray[np.float64], float]:
+        """Return the probability of each site, and that of being out, before any look."""
+        belief = room_belief(now, self.source, self.user)
+        sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
+        shares = belief.share[self.sites.rooms]
+        known = sum(shares.tolist())
+        shares = shares / known if known > 0 else np.zeros(len(sizes))
+        doubt = self.doubt if known > 0 else 1.0
+        mixed = (1 - doubt) * shares + doubt * sizes / int(sizes.sum())
+        return mixed * (1 - belief.away), belief.away
+
+    def _ages(self, search: Search, now: Situation) -> NDArray[np.float64]:
+        """Return how long ago each site was looked at in vain [s], infinite for never."""
+        ages = np.full(len(self.sites), np.inf)
+        for missed in search.missed:  # the last one counts
+            ages[missed.site] = (now.time - missed.at).total_seconds()
+        return ages
+
+    def _end(self, plan: Plan, event: str) -> Plan:
+        self.search = None
+        return plan.note(event, self.user)
+
+    def _next(self, time: datetime, last: datetime | None, start: datetime) -> datetime:
+        """Return when the next search is due, from a moment on; not the last one again."""
+        if self.every is not None:
+            if last is None:
+                return start + self.every
+            return start + ((time - start) // self.every + 1) * self.every
+        midnight = datetime.combine(time.date(), datetime.min.time())
+        days = [midnight + i * DAY for i in range(3)]
+        times = sorted(day + at for day in days for at in self.at)
+        return next(t for t in times if t >= time and (last is None or t > last))

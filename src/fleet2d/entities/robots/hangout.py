@@ -1,0 +1,153 @@
+"""Hangout: stand near people without being in the way, and move rarely."""
+
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.hours import Hours, holds
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.robots.approach import face
+from fleet2d.entities.robots.belief import ANYONE, room_belief
+from fleet2d.entities.robots.places import Nearness, Places
+from fleet2d.errors import PlacementError
+from fleet2d.kernels.mesh import SUB
+from fleet2d.units import Length, PositiveDuration, Share
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+
+@register("behavior", "hangout")
+class Hangout(Behavior):
+    """Stand where people likely are, out of their way; think about it now and then.
+
+    Every `period` it rates the places on a grid of 0.5 m by
+
+    sum over rooms p(room) nearness(place, room) - blocking * b(place) - personal_space * s(place)
+    - moving * m(place)
+
+    where p(room) is the probability that the user is at home and in that room, from `source`; b is
+    the share of the shortest ways between two rooms that lead through the robot's body there, for a
+    person of radius 0.25 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
+    it; and m = t / (t + tau), with t the seconds on foot from where it is. It moves only to a place
+    that beats the present one by `hysteresis`, and never in quiet hours.With probability
+    `explore` it goes to a room drawn with equal chances instead, so that what it believes doesn't
+    feed on itself.
+
+    Events: `relocates`, with the room it goes to, and `explores`.
+    """
+
+    source: str | None = Field(
+        default=None,
+        description="the algorithm that says where people are; left out: rooms count by their size",
+    )
+    user: str = Field(default=ANYONE, min_length=1, description="near whom, or anyone")
+    period: PositiveDuration = Field(
+        default=timedelta(minutes=30), description="how often it thinks about where to stand"
+    )
+    near: Nearness = Field(
+        default="path",
+        description="what counts as near: the same room; a view of its seats; or time on foot",
+    )
+    tau: PositiveDuration = Field(
+        default=timedelta(seconds=10), description="time on foot at which nearness is one half"
+    )
+    blocking: float = Field(default=1.0, ge=0, description="weight of ways that it stands in")
+    personal_space: float = Field(default=0.5, ge=0, description="weight of seats that it is near")
+    moving: float = Field(default=0.05, ge=0, description="weight of the way to a place")
+    hysteresis: float = Field(
+        default=0.1, ge=0, description="by how much another place must be better for it to move"
+    )
+    explore: Share = Field(
+        default=0.1, description="share of decisions in which it goes to any room instead"
+    )
+    avoid: tuple[str, ...] = Field(
+        default=(), description="rooms or kinds of rooms that it stays out of"
+    )
+    quiet: Hours = Field(default=(), description="hours in which it doesn't move")
+    off_doors: Length = Field(
+        default=0.8, ge=0, description="how far from doorways it stands at least [m]"
+    )
+
+    def start(self, actor: "Actor") -> None:
+        """Find the places, and rate what doesn't depend on where people are."""
+        avoided = frozenset(r.index for name in self.avoid for r in actor.rooms((name,)))
+        self.places = Places(actor, avoided, self.off_doors)
+        if not len(self.places.points):
+            raise PlacementError(
+                f"{actor.path}: there is no place to hang out at, off doorways by"
+                f" {self.off_doors:g} m and out of: {', '.join(self.avoid) or 'no room'}"
+            )
+        self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
+        self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
+        self.place: int | None = None
+        self.decides_at = actor.clock.start
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithm that it goes by."""
+        return () if self.source is None else (self.source,)
+
+    def decide(self, now: Situation) -> Plan:
+        """Stay, or go where it is better; back to its place, if it was called away."""
+        plan, still = now.plan(), holds(self.quiet, now.time)
+        if still is not None:
+            return plan.stay(until=still)
+        if now.time >= self.decides_at or self.place is None:
+            self.decides_at = now.time + self.period
+            self._choose(now, plan)
+        x, y = self.places.points[self.place].tolist()
+        if (plan.x, plan.y) != (x, y):
+            plan.go_to_point(x, y)
+            self._face_people(now, plan)
+        return plan.stay(until=self.decides_at).ask_by(
+            self._quiet_begins(self.decides_at, now.time)
+        )
+
+    def _choose(self, now: Situation, plan: Plan) -> None:
+        """Choose the place to stand at until it thinks again."""
+        draws = now.random("hangout")
+        if draws.uniform() < self.explore:
+            rooms = sorted(set(self.places.room.tolist()))
+            here = np.flatnonzero(self.places.room == draws.choice(rooms)).tolist()
+            self.place = draws.choice(here)
+            plan.note("explores", self._room_name(now))
+            return
+        belief = room_belief(now, self.source, self.user)
+        scores = self._scores(now, belief.joint)
+        best = int(np.argmax(scores))
+        if self.place is None or scores[best] > scores[self.place] + self.hysteresis:
+            self.place = best
+            plan.note("relocates", self._room_name(now))
+
+    def _scores(self, now: Situation, joint: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the rating of each place: float64 (n,); products are summed room by room."""
+        actor, points = now.actor, self.places.points
+        gain = np.zeros(len(points))
+        for room, chance in enumerate(joint.tolist()):  # in a fixed order, unlike a matrix product
+            gain += chance * self.nearness[:, room]
+        here = np.array([[actor.state.x, actor.state.y]], np.int64)
+        metres = actor.space.distance_field(here)[points[:, 1] // SUB, points[:, 0] // SUB]
+        seconds = metres * now.home.plan.lattice.units_per_m / actor.speed
+        reached = np.isfinite(seconds)
+        way = np.where(reached, seconds, 0.0)
+        move = way / (way + self.tau.total_seconds())
+        return np.where(reached, gain - self.penalty - self.moving * move, -np.inf)
+
+    def _face_people(self, now: Situation, plan: Plan) -> None:
+        """Turn to the middle of the room that it stands in."""
+        room = now.home.plan.rooms[int(self.places.room[self.place])]
+        x, y = now.home.plan.lattice.to_lattice(room.anchor_xy).tolist()
+        if (x, y) != (plan.x, plan.y):
+            face(plan, x, y)
+
+    def _room_name(self, now: Situation) -> str:
+        return now.home.plan.rooms[int(self.places.room[self.place])].name
+
+    def _quiet_begins(self, until: datetime, time: datetime) -> datetime:
+        """Return when the next quiet hours begin, or `until` if that is earlier."""
+        return min([until, *(span.next_begin(time) for span in self.quiet)])

@@ -1,0 +1,152 @@
+"""Places to hang out at: what is good and bad about standing there, whoever is where."""
+
+from itertools import combinations
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from fleet2d.entities.robots.looking import sight_range
+from fleet2d.kernels.mesh import CELL_CENTRE, SUB
+from fleet2d.kernels.points import points_in_sight
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.floorplan.plan import Room
+
+# What people's ways are taken for: of bodies of this radius [m].
+PERSON = 0.25
+# Personal space ends at 1.2 m (Hall): nearer to a seat a place is the worse, the nearer it is.
+PERSONAL = 1.2
+# Of each room so many cells are looked at as seats, where it has no furniture to sit or lie on.
+SEATS_TRIED = 60
+# Places to stand are tried on a grid of this pitch [m].
+PITCH = 0.5
+
+I64 = NDArray[np.int64]
+F64 = NDArray[np.float64]
+Nearness = Literal["room", "view", "path"]
+
+
+class Places:
+    """Candidate places of a robot, all lattice points that its body can get to.
+
+    Attributes:
+        points: int64 (n, 2). room: Index of each place's room, int64 (n,). block: float64 (n,),
+        share of the ways between any two rooms that lead through the body there. prox: float64
+        (n,), 0 outside of the personal space of all seats, 1 on a seat.
+    """
+
+    def __init__(self, actor: "Actor", avoid: frozenset[int], off_doors: float) -> None:
+        """Lay out the places, by walls and furniture as they are at present.
+
+        Args:
+            actor: The robot.
+            avoid: Indices of the rooms that it stays out of.
+            off_doors: How far from every doorway a place is [m].
+        """
+        self._actor = actor
+        self.points, self.room = self._candidates(avoid, off_doors)
+        self._seats = {room.index: self._seats_of(room) for room in actor.home.rooms}
+        self.block = self._blocking()
+        self.prox = self._proximity()
+
+    def nearness(self, by: Nearness, tau: float) -> F64:
+        """Return how near each place is to who is in each room: float64 (n, rooms), 0 to 1.
+
+        `room`: 1 in the same room. `view`: the share of the room's seats in range and in sight.
+        `path`: tau / (tau + t), with t the seconds on foot to the nearest point of the room.
+        """
+        rooms = self._actor.home.rooms
+        if by == "path":
+            return np.stack([self._path(room, tau) for room in rooms], axis=1)
+        column = self._same_room if by == "room" else self._view
+        return np.stack([column(room) for room in rooms], axis=1)
+
+    def _candidates(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64]:
+        actor, plan = self._actor, self._actor.home.plan
+        cells = actor.space.cells(None, actor.part)
+        pitch = max(1, round(PITCH / plan.lattice.cell))
+        on_grid = (cells[:, 0] % pitch == 0) & (cells[:, 1] % pitch == 0)
+        rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
+        kept = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
+        cells, rooms = cells[kept], rooms[kept]
+        points = cells[:, ::-1] * SUB + CELL_CENTRE
+        if plan.doorways and off_doors > 0:
+            lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
+            gaps = shapely.distance(
+                shapely.points(points)[:, None],
+                np.array([shapely.LineString(line) for line in lines]),
+            )
+            clear = gaps.min(axis=1, initial=np.inf) >= off_doors * plan.lattice.units_per_m
+            points, rooms = points[clear], rooms[clear]
+        return np.ascontiguousarray(points), rooms
+
+    def _seats_of(self, room: "Room") -> I64:
+        """Return where people usually are in a room: where its furniture is used, else all over."""
+        plan = self._actor.home.plan
+        uses = [
+            (use.x, use.y)
+            for thing in self._actor.home.objects
+            for use in thing.uses
+            if plan.room_at(use.x, use.y) == plan.rooms[room.index]
+        ]
+        if uses:
+            return np.ascontiguousarray(plan.lattice.to_lattice(uses))
+        cells = np.argwhere(plan.room_of_cell == room.index)
+        cells = cells[:: max(1, len(cells) // SEATS_TRIED)]
+        return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
+
+    def _same_room(self, room: "Room") -> F64:
+        same: F64 = (self.room == room.index).astype(np.float64)
+        return same
+
+    def _view(self, room: "Room") -> F64:
+        walls, reach = self._actor.home.walls, sight_range(self._actor)
+        seats = self._seats[room.index]
+        shown = np.zeros(len(self.points))
+        for i, (x, y) in enumerate(self.points.tolist()):
+            near = ((seats - (x, y)) ** 2).sum(axis=1) <= reach * reach
+            if near.any():
+                shown[i] = np.count_nonzero(points_in_sight(walls, x, y, seats[near])) / len(seats)
+        return shown
+
+    def _path(self, room: "Room", tau: float) -> F64:
+        actor, lattice = self._actor, self._actor.home.plan.lattice
+        cells = actor.space.cells(room.index, actor.part)
+        if not len(cells):
+            return np.zeros(len(self.points))
+        field = actor.space.distance_field(cells[:, ::-1] * SUB + CELL_CENTRE)
+        metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
+        seconds = metres * lattice.units_per_m / actor.speed
+        near: F64 = np.where(np.isfinite(seconds), tau / (tau + seconds), 0.0)
+        return near
+
+    def _blocking(self) -> F64:
+        """Return the share of the ways of people from room to room that a robot stands in."""
+        actor, home = self._actor, self._actor.home
+        space = home.space(PERSON, opens_doors=True)
+        anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
+        stops = [space.nearest(x, y, 0, r) for r, (x, y) in enumerate(anchors)]
+        pairs = list(combinations([stop for stop in stops if stop is not None], 2))
+        reach = (PERSON + actor.entity.radius) * home.plan.lattice.units_per_m
+        points, blocked, ways = shapely.points(self.points), np.zeros(len(self.points)), 0
+        for start, goal in pairs:
+            route = space.route(start, goal)
+            if route is not None and len(route) > 1:
+                ways += 1
+                blocked += shapely.distance(points, shapely.LineString(route)) < reach
+        return blocked / max(ways, 1)
+
+    def _proximity(self) -> F64:
+        """Return how deep in the personal space of the nearest seat of furniture a place is."""
+        plan = self._actor.home.plan
+        uses = [(use.x, use.y) for thing in self._actor.home.objects for use in thing.uses]
+        if not uses or not len(self.points):
+            return np.zeros(len(self.points))
+        seats = plan.lattice.to_lattice(uses)
+        gaps = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2).min(axis=1)
+        metres = np.sqrt(gaps.astype(np.float64)) / plan.lattice.units_per_m
+        inside: F64 = np.maximum(0.0, 1 - metres / PERSONAL)
+        return inside

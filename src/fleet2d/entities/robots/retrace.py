@@ -1,0 +1,86 @@
+"""Retrace: drive the path that a robot vacuum recorded in its map."""
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.valetudo import read_valetudo_paths
+from fleet2d.logs.nearest import Nearest
+from fleet2d.paths import InputPath
+from fleet2d.units import Length
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from fleet2d.entities.actor import Actor
+
+I64 = NDArray[np.int64]
+
+
+@register("behavior", "retrace")
+class Retrace(Behavior):
+    """Drive the path in the map of a Valetudo robot, in the home of that map, at the robot's speed.
+
+    The map tells no times; a log that does is for the behavior `replay`. Points nearer to each
+    other than `spacing` are thinned out, and one that the body can't get to becomes the nearest
+    that it can, if that is within `reach`. When it is through it begins anew: `cooldown` says after
+    how long. Events: `retraces`, with the number of points, and `retraced`.
+    """
+
+    resumes: ClassVar[bool] = True
+
+    path: InputPath = Field(description="the map's JSON file")
+    spacing: Length = Field(
+        default=0.1, ge=0, description="points of the path nearer than this are left out [m]"
+    )
+    reach: Length = Field(
+        default=1.0, ge=0, description="a point farther than this from free space is left out [m]"
+    )
+
+    def files(self) -> tuple["Path", ...]:
+        """Return the files that it reads."""
+        return (self.path,)
+
+    def start(self, actor: "Actor") -> None:
+        """Read the path and put it on free places.
+
+        Raises:
+            PlacementError: The map has no path, or none that the robot can drive here.
+        """
+        pieces = read_valetudo_paths(self.path)
+        if not pieces:
+            raise PlacementError(f"{actor.path}: {self.path} holds no path to retrace")
+        lattice = actor.home.plan.lattice
+        points: I64 = lattice.to_lattice(np.concatenate(pieces))
+        near: I64 = Nearest(actor).of(points)
+        moved = ((near - points) ** 2).sum(axis=1)
+        kept = near[moved <= (self.reach * lattice.units_per_m) ** 2]
+        self.points = _thinned(kept, self.spacing * lattice.units_per_m)
+        if len(self.points) < 2:
+            raise PlacementError(
+                f"{actor.path}: of the path in {self.path}, {len(self.points)} points are within"
+                f" {self.reach:g} m of where the robot can be: is this the home of that map?"
+            )
+
+    def decide(self, now: Situation) -> Plan:
+        """Drive the whole path."""
+        plan = now.plan().note("retraces", f"{len(self.points)} points")
+        for x, y in self.points:
+            if not now.home.hinders or plan.reaches(x, y):
+                plan.go_to_point(x, y)
+        return plan.note("retraced")
+
+
+def _thinned(points: I64, spacing: float) -> list[tuple[int, int]]:
+    """Return points in order, without those nearer than `spacing` to the last one kept."""
+    kept: list[tuple[int, int]] = []
+    for x, y in points.tolist():
+        if not kept or (x - kept[-1][0]) ** 2 + (y - kept[-1][1]) ** 2 > spacing * spacing:
+            kept.append((x, y))
+    return kept

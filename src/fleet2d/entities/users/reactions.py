@@ -1,0 +1,168 @@
+"""Reactions: what people do about robots."""
+
+from collections.abc import Iterator
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.kernels.headings import TURN, cosine, heading_of, sine, turn_between
+from fleet2d.kernels.headings import UNIT as SINE_UNIT
+from fleet2d.routines.laws import Law
+from fleet2d.routines.manners import Manners
+from fleet2d.streams import Draws
+from fleet2d.units import micros
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+# What is reacted to first, of several things at one step, and the manner that says how likely.
+LIKELY = {
+    "robot_calls": "comes",
+    "robot_close": "leaves",
+    "robot_coming": "steps_aside",
+    "robot_near": "turns",
+}
+RANKS = list(LIKELY)
+# So far one steps aside, and so far from a robot one stops that called [m].
+STEP_M = 0.7
+MEET_M = 0.9
+CLEAR_M = 0.1  # beyond what is too close
+# A robot that was let pass has passed.
+PASSING = timedelta(seconds=4)
+DIRECTIONS = 16
+
+
+@register("behavior", "reactions")
+class Reactions(Behavior):
+    """React to robots: turn to them, step aside, come, leave; put before what one does otherwise.
+
+    How likely one reacts, and how near a robot has to be, are one's manners: those given here, else
+    those of the persona of a `routine` behind it, else the usual ones.
+    """
+
+    manners: Manners | None = Field(
+        default=None, description="how one reacts; left out: as the persona does"
+    )
+
+    def attention(self, actor: "Actor") -> Attention:
+        """Find out what its manners are, now that all behaviors know who they are."""
+        personas = (getattr(behavior, "who", None) for behavior in actor.behaviors)
+        persona = next((who for who in personas if who is not None), None)
+        self.kept = self.manners or getattr(persona, "manners", None) or Manners()
+        self.laws = {
+            "looks": self.kept.looks.table(),
+            "leaves_for": self.kept.leaves_for.table(),
+            "comes_for": self.kept.comes_for.table(),
+        }
+        self.rank, self.until = 0, -1  # what it reacts to, and up to which step
+        units, kept = actor.home.plan.lattice.units_per_m, self.kept
+        return Attention(
+            notices=round(kept.notices * units),
+            in_way=round(kept.in_the_way * units),
+            too_close=round(kept.too_close * units),
+            patience=max(1, -(-micros(kept.patience) // actor.clock.step_us)),
+            hears=round(kept.hears * units),
+        )
+
+    def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
+        """Tell whether it reacts to something at a step."""
+        if step < self.until and RANKS.index(event.event) >= self.rank:
+            return False  # it has something better to do
+        likely: float = getattr(self.kept, LIKELY[event.event])
+        draws = Draws(actor.stream(f"{event.event} {event.user}"), step)
+        return draws.uniform() < likely
+
+    def decide(self, now: Situation) -> Plan | None:
+        """React to what just happened; else leave it to the next behavior."""
+        events = [event for event in now.events if event.event in LIKELY]
+        if not events:
+            return None
+        event = min(events, key=lambda event: RANKS.index(event.event))
+        draws = now.random("reaction")
+        plan = now.plan()
+        if event.event == "robot_calls":
+            self._come(now, plan, event, draws)
+        elif event.event == "robot_close":
+            self._leave(now, plan, event, draws)
+        elif event.event == "robot_coming":
+            self._step_aside(now, plan, event, draws)
+        else:
+            plan.note("reacts", f"turns to {event.user}")
+            self._look_at(now, plan, event, self.laws["looks"], draws)
+        self.rank = RANKS.index(event.event)
+        self.until = now.actor.clock.step_at_or_after(plan.time_us)
+        return plan
+
+    def _come(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
+        plan.note("reacts", f"comes to {event.user}")
+        self._maybe_stop(now, draws)
+        at_x, at_y = _robot(now, event)
+        far = max(MEET_M, self.kept.too_close + CLEAR_M)
+        own = [p for p in _around(now, at_x, at_y, far) if plan.reaches(*p)]
+        if own:
+            plan.go_to_point(*min(own, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
+        self._look_at(now, plan, event, self.laws["comes_for"], draws)
+
+    def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
+        plan.note("reacts", f"leaves {event.user}")
+        self._maybe_stop(now, draws)
+        here = now.room
+        rooms = [room for room in now.actor.reachable_rooms() if room != here]
+        if rooms:
+            plan.go_to((draws.choice(rooms).name,), "retreat")
+        plan.stay(timedelta(seconds=self.laws["leaves_for"].draw(draws)))
+
+    def _step_aside(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
+        """Step to where the robot doesn't come: of the places about, the one farthest from it."""
+        plan.note("reacts", f"steps aside for {event.user}")
+        at_x, at_y = _robot(now, event)
+        dx, dy = plan.x - at_x, plan.y - at_y
+        # Across its way, not along it: it would only come after one.
+        across = [
+            (x, y)
+            for x, y in _around(now, plan.x, plan.y, STEP_M)
+            if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
+            <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
+        ]
+        if across:
+            plan.go_to_point(*draws.choice(across))
+        plan.stay(PASSING)
+
+    def _look_at(
+        self, now: Situation, plan: Plan, event: SightEvent, law: Law, draws: Draws
+    ) -> None:
+        x, y = _robot(now, event)
+        plan.turn_by(turn_between(plan.heading, heading_of(x - plan.x, y - plan.y)) / TURN)
+        plan.stay(timedelta(seconds=law.draw(draws)))
+
+    def _maybe_stop(self, now: Situation, draws: Draws) -> None:
+        if draws.uniform() < self.kept.stops:
+            for behavior in now.actor.behaviors:
+                behavior.give_up(now)
+
+
+def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
+    x, y = now.home.plan.lattice.to_lattice((event.x, event.y)).tolist()
+    return x, y
+
+
+def _around(now: Situation, x: int, y: int, distance_m: float) -> Iterator[tuple[int, int]]:
+    """Yield the points so far from a point where the body can stand, in the point's room."""
+    actor, lattice = now.actor, now.home.plan.lattice
+    room = now.home.plan.room_at(*lattice.to_metres([x, y]).tolist())
+    far = round(distance_m * lattice.units_per_m)
+    for i in range(DIRECTIONS):
+        heading = i * TURN // DIRECTIONS
+        at_x = x + far * cosine(heading) // SINE_UNIT
+        at_y = y + far * sine(heading) // SINE_UNIT
+        same_room = now.home.plan.room_at(*lattice.to_metres([at_x, at_y]).tolist()) == room
+        if same_room and actor.space.part_at(at_x, at_y) == actor.part:
+            yield at_x, at_y
+
+
+def _squared(dx: int, dy: int) -> int:
+    return dx * dx + dy * dy

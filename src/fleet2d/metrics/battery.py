@@ -1,0 +1,58 @@
+"""How robots get along with their batteries."""
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+
+@register("metric", "battery")
+class BatteryUse(Metric):
+    """Lowest charge that was told, dockings a day, and share of time spent charging, of each robot.
+
+    From the events `battery`, `docks` and `charged`: the charge is told at decisions, when it has
+    changed by 5 %. Time from `docks` to `charged` is charging.
+    """
+
+    unit: ClassVar[str] = "parts of 1; a day"
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.lowest: dict[str, float] = {}
+        self.dockings: dict[str, int] = {}
+        self.docked_at: dict[str, int] = {}
+        self.charging: dict[str, int] = {}  # steps
+        self.steps = 0
+        self.step_s = 1.0
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Read the events."""
+        for event in history.events:
+            name = event.entity
+            if event.event in ("battery", "docks", "charged"):
+                level = float(event.detail.removesuffix(" %")) / 100
+                self.lowest[name] = min(self.lowest.get(name, 1.0), level)
+            if event.event == "docks":
+                self.dockings[name] = self.dockings.get(name, 0) + 1
+                self.docked_at[name] = event.step
+            elif event.event == "charged" and name in self.docked_at:
+                took = event.step - self.docked_at.pop(name)
+                self.charging[name] = self.charging.get(name, 0) + took
+        self.steps, self.step_s = history.end, history.step_s
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {lowest, dockings, charging}} of the robots with a battery."""
+        found = {}
+        for name, lowest in self.lowest.items():
+            under_way = self.steps - self.docked_at[name] if name in self.docked_at else 0
+            found[name] = {
+                "lowest": lowest,
+                "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / 86400),
+                "charging": (self.charging.get(name, 0) + under_way) / self.steps,
+            }
+        return found

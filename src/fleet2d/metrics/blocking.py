@@ -1,0 +1,66 @@
+"""How often robots are in people's way."""
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.pairs import pairs_of
+from fleet2d.units import Length
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+
+@register("metric", "blocking")
+class Blocking(Metric):
+    """How often, and for how long, a robot is in the way of a user who walks.
+
+    A step counts when the user moves in it, and the centres are nearer than `clearance` at its
+    begin or at its end: two bodies of the usual radii (0.2 and 0.15 m) would touch at 0.35 m. A
+    block is an unbroken run of such steps. People of a scenario without reactions walk as if there
+    were no robot, so this is how often they would have had to change their way or stop.
+    """
+
+    unit: ClassVar[str] = "a day"
+
+    clearance: Length = Field(
+        default=0.4, gt=0, le=3, description="distance between the centres [m]"
+    )
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.blocks: dict[tuple[str, str], int] = {}
+        self.seconds: dict[tuple[str, str], float] = {}
+        self.last: dict[tuple[str, str], tuple[tuple[float, float], bool, bool]] = {}
+        self.days = 0.0
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Count the steps in which somebody walks into a robot."""
+        for pair in pairs_of(history, state):
+            key = (pair.robot, pair.user)
+            near, xy = pair.distance < self.clearance, pair.at_user.xy
+            # A step leads from one pose to the next: the first from the last of the time before.
+            at, was_near, blocked = self.last.get(key, (pair.at_user.at(0), bool(near[0]), False))
+            moves = (np.diff(xy, axis=0, prepend=[at]) != 0).any(axis=1) & pair.at_home
+            hit = moves & (near | np.append(was_near, near[:-1]))
+            begins = hit & ~np.append(blocked, hit[:-1])
+            self.blocks[key] = self.blocks.get(key, 0) + int(np.count_nonzero(begins))
+            spent = int(np.count_nonzero(hit)) * history.step_s
+            self.seconds[key] = self.seconds.get(key, 0.0) + spent
+            self.last[key] = pair.at_user.at(-1), bool(near[-1]), bool(hit[-1])
+        self.days += len(history) * history.step_s / 86400
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {user: {blocks, seconds}}}, both per day."""
+        found: dict[str, Any] = {}
+        for (robot, user), blocks in self.blocks.items():
+            found.setdefault(robot, {})[user] = {
+                "blocks": blocks / self.days,
+                "seconds": self.seconds[robot, user] / self.days,
+            }
+        return found

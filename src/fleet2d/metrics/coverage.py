@@ -1,0 +1,56 @@
+"""How much of the home a robot has seen."""
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+SHARES = {"half": 0.5, "most": 0.9}
+
+
+@register("metric", "coverage")
+class Coverage(Metric):
+    """Share of the floor of all rooms that was in view of a robot, and when it was half, and 90 %.
+
+    Cells count, as in the layer `explored`; a wall touches no line to a cell in view.
+    """
+
+    needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
+    unit: ClassVar[str] = "part of the floor; h"
+
+    def start(self, home: "Home") -> None:
+        """Begin with nothing seen."""
+        self.first: dict[str, Any] = {}  # sorted first steps of the cells seen, by robot
+        self.cells = int(np.count_nonzero(home.plan.room_of_cell >= 0))
+        self.step_s = 0.0
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Take over what was seen; return a row for each robot."""
+        self.step_s, inside = history.step_s, state.home.plan.room_of_cell >= 0
+        for robot in state.robots:
+            layer = f"first_seen.{robot}"
+            if layer in state.home.layers:
+                first = state.home.layers[layer].values[inside]
+                self.first[robot] = np.sort(first[(first >= 0) & (first < history.end)])
+        if not self.first:
+            return None
+        shares = [len(first) / self.cells for first in self.first.values()]
+        return {"robot": np.array(list(self.first), dtype=object), "share": np.array(shares)}
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {share, half_h, most_h}}, hours only where it came to that."""
+        found: dict[str, Any] = {}
+        for robot, first in self.first.items():
+            found[robot] = {"share": len(first) / self.cells}
+            for name, share in SHARES.items():
+                needed = int(np.ceil(share * self.cells))
+                if 0 < needed <= len(first):
+                    found[robot][f"{name}_h"] = int(first[needed - 1]) * self.step_s / 3600
+        return found

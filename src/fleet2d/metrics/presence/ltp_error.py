@@ -1,0 +1,237 @@
+"""How far long-term presence is from where users really were."""
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fleet2d.algorithms.history import History
+from fleet2d.algorithms.presence.belief import ANYONE, Presence
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.presence.believed import presence_of
+from fleet2d.metrics.presence.distances import (
+    earth_mover,
+    jensen_shannon,
+    kl_divergence,
+    room_gaps,
+    total_variation,
+)
+from fleet2d.metrics.presence.occupancy import (
+    shares,
+    steps_by_hour,
+    steps_in_places,
+    walking_distances,
+)
+from fleet2d.units import PositiveDuration, Share
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+
+DAY_S = 86_400
+COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap")
+
+
+class Realised(Metric):
+    """Base of what compares long-term presence with the realised occupancy of a window.
+
+    The truth is how long each user really was in each room, from the beginning of the run, or in
+    the last `window`, up to now: not what the user was set up to do.
+    """
+
+    of: str = Field(description="the algorithm whose presence is measured")
+    window: PositiveDuration | None = Field(
+        default=None,
+        description="the truth is that of the last such time, in whole periods; null: of all time",
+    )
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.counts: list[I64] = []  # of each period in the window
+        self.steps: list[int] = []
+        self.days = 0.0
+
+    def count(self, counts: I64, history: History) -> tuple[I64, int]:
+        """Add a period; return the counts of the window and its steps."""
+        self.days += len(history) * history.step_s / DAY_S
+        if self.window is None and self.counts:
+            self.counts = [self.counts[0] + counts]
+            self.steps = [self.steps[0] + len(history)]
+        else:
+            self.counts.append(counts)
+            self.steps.append(len(history))
+        if self.window is not None:
+            most = max(1, math.floor(self.window / self.period))
+            self.counts, self.steps = self.counts[-most:], self.steps[-most:]
+        return np.sum(self.counts, axis=0), sum(self.steps)
+
+
+@register("metric", "ltp_error")
+class LtpError(Realised):
+    """Distance of long-term presence from the realised occupancy, over time.
+
+    Per period and user (and anyone), with p the true and q the estimated shares of rooms:
+
+    - tv: total variation, 1/2 sum |p - q|, 0 to 1;
+    - js: Jensen-Shannon divergence to base 2, 0 to 1;
+    - kl: sum p ln(p / q'), q' being q smoothed by `alpha` [nats];
+    - max_gap, mean_gap: greatest and mean |p - q| of a room;
+    - earth_mover_m: least mean way on foot by which q is moved onto p [m], from middle to middle
+      of rooms; only `given: home`;
+    - inside: share of rooms whose p lies in the stated interval, if there is one and `given: home`.
+
+    The shares are `given: home`; or of all time with away as one more room (`away`); or given at
+    home at each hour of the week (`hour_of_week`), where distances are means over the hours, each
+    with the weight of the time that the user was at home then.
+
+    The result has the values at the end, and `burn_in_day`: the first day n, from 1, at whose end
+    tv was at most `burn_in` and stayed so. It is missing if that never came. Users who were never
+    at home are left out.
+    """
+
+    unit: ClassVar[str] = "per user, at the end"
+
+    given: Literal["home", "away", "hour_of_week"] = Field(
+        default="home", description="which shares are compared"
+    )
+    alpha: float = Field(default=1e-3, gt=0, le=1, description="by which KL is smoothed")
+    burn_in: Share = Field(default=0.1, description="total variation at which burn-in ends")
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        super().start(home)
+        self.metres = walking_distances(home)
+        self.last: dict[str, dict[str, float]] = {}
+        self.within: dict[str, float | None] = {}
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Compare what is believed with what was so far; return a row per user."""
+        weekly = self.given == "hour_of_week"
+        found = (steps_by_hour if weekly else steps_in_places)(history, state)
+        counts, steps = self.count(found, history)
+        presence = presence_of(self.of, state)
+        if presence is None:
+            return None
+        rows: dict[str, dict[str, float]] = {}
+        for row, user in enumerate((*state.users, ANYONE)):
+            mine = counts[..., row, :]
+            if mine[..., :-1].any():
+                rows[user] = self._compare(presence, user, mine, steps)
+                self._note(user, rows[user])
+        if not rows:
+            return None
+        names = next(iter(rows.values()))
+        return {
+            "user": np.array(list(rows), dtype=object),
+            **{name: np.array([row[name] for row in rows.values()]) for name in names},
+        }
+
+    def _compare(self, presence: Presence, user: str, counts: I64, steps: int) -> dict[str, float]:
+        if self.given == "hour_of_week":
+            return self._by_hour(presence.by_hour_of_week(user), counts)
+        home, away = shares(counts, steps)
+        if self.given == "away":
+            share = float(away) if user != ANYONE else counts[-1] / steps
+            truth = np.append(home * (1 - share), share)
+            return self._distances(truth, presence.with_away(user))
+        row = self._distances(home, presence.share(user))
+        row["earth_mover_m"] = earth_mover(home, presence.share(user), self.metres)
+        low, high = presence.low(user), presence.high(user)
+        if low is not None and high is not None:
+            row["inside"] = float(((low <= home) & (home <= high)).mean())
+        return row
+
+    def _by_hour(self, estimate: F64, counts: I64) -> dict[str, float]:
+        home, _ = shares(counts, 1)
+        weight = counts[:, :-1].sum(axis=1).astype(np.float64)
+        some = weight > 0
+        return self._distances(home[some], estimate[some], weight[some] / weight.sum())
+
+    def _distances(self, truth: F64, estimate: F64, weight: F64 | None = None) -> dict[str, float]:
+        gaps = room_gaps(truth, estimate)
+        found = (
+            total_variation(truth, estimate),
+            jensen_shannon(truth, estimate),
+            kl_divergence(truth, estimate, self.alpha),
+            gaps.max(axis=-1),
+            gaps.mean(axis=-1),
+        )
+        return {
+            name: float(value if weight is None else (value * weight).sum())
+            for name, value in zip(COLUMNS, found, strict=True)
+        }
+
+    def _note(self, user: str, row: dict[str, float]) -> None:
+        """Keep the newest row, and since when it has been good."""
+        self.last[user] = row
+        if row["tv"] > self.burn_in:
+            self.within[user] = None
+        elif self.within.get(user) is None:
+            self.within[user] = max(1, math.ceil(round(self.days, 9)))
+
+    def result(self) -> dict[str, Any]:
+        """Return {user: {tv, js, …, burn_in_day}} at the end."""
+        return {
+            user: row | ({} if (day := self.within[user]) is None else {"burn_in_day": day})
+            for user, row in self.last.items()
+        }
+
+
+@register("metric", "ltp_gap")
+class LtpGap(Realised):
+    """Gap of long-term presence per room, over time: |p - q|, given at home.
+
+    p is the user's realised share of time at home in the room so far, or in the last `window`, q
+    the estimate. Stored per period, user (and anyone) and room: both, the gap, and the ends of the
+    interval, if there is one. The result has the gaps at the end, and per user `mean`. Users who
+    were never at home are left out.
+    """
+
+    unit: ClassVar[str] = "gap of share, at the end"
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        super().start(home)
+        self.rooms = [room.name for room in home.rooms]
+        self.last: dict[str, F64] = {}
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Compare what is believed with what was so far; return a row per user and room."""
+        counts, steps = self.count(steps_in_places(history, state), history)
+        presence = presence_of(self.of, state)
+        users = [
+            (row, user) for row, user in enumerate((*state.users, ANYONE)) if counts[row, :-1].any()
+        ]
+        if presence is None or not users:
+            return None
+        truth = np.array([shares(counts[row], steps)[0] for row, _ in users])
+        estimate = np.array([presence.share(user) for _, user in users])
+        gaps = room_gaps(truth, estimate)
+        self.last |= {user: gap for (_, user), gap in zip(users, gaps, strict=True)}
+        columns = {
+            "user": np.repeat(np.array([user for _, user in users], dtype=object), len(self.rooms)),
+            "room": np.tile(np.array(self.rooms, dtype=object), len(users)),
+            "true_share": truth.ravel(),
+            "share": estimate.ravel(),
+            "gap": gaps.ravel(),
+        }
+        for name, end in (("low", presence.low), ("high", presence.high)):
+            if end() is not None:
+                columns[name] = np.array([end(user) for _, user in users]).ravel()
+        return columns
+
+    def result(self) -> dict[str, Any]:
+        """Return {user: {room: gap, "mean": of all rooms}} at the end."""
+        return {
+            user: {
+                "mean": float(gaps.mean()),
+                **dict(zip(self.rooms, gaps.tolist(), strict=True)),
+            }
+            for user, gaps in self.last.items()
+        }

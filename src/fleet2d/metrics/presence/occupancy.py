@@ -1,0 +1,105 @@
+"""Where users really were: the truth that presence is measured by."""
+
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.history import History
+from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.algorithms.presence.belief import HOURS
+from fleet2d.kernels.mesh import SUB
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+I64 = NDArray[np.int64]
+F64 = NDArray[np.float64]
+
+HOUR_US = 3_600_000_000
+# What a person needs beside walls, to walk from room to room [m].
+RADIUS = 0.2
+
+
+def steps_in_places(history: History, state: "Present") -> I64:
+    """Return how many steps everybody was in each place: int64 (users + 1, rooms + 1).
+
+    The last row is of anyone: steps with somebody in the room, and last with nobody at home.
+    """
+    rooms, users = len(state.home.rooms), state.users
+    counts = np.zeros((len(users) + 1, rooms + 1), np.int64)
+    for row, user in enumerate(users):
+        counts[row] = history.poses(user).time_in_rooms
+    if len(users) == 1:
+        counts[-1] = counts[0]
+    else:
+        counts[-1] = _anybody(history, state).sum(axis=0)
+    return counts
+
+
+def steps_by_hour(history: History, state: "Present") -> I64:
+    """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
+    rooms, users = len(state.home.rooms), state.users
+    counts = np.zeros((HOURS, len(users) + 1, rooms + 1), np.int64)
+    hour = hours_of_week(history, state)
+    for row, user in enumerate(users):
+        room = history.poses(user).room.astype(np.int64)
+        place = np.where(room == NOWHERE, rooms, room)
+        found = np.bincount(hour * (rooms + 1) + place, minlength=HOURS * (rooms + 1))
+        counts[:, row] = found.reshape(HOURS, rooms + 1)
+    first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
+    found = np.add.reduceat(_anybody(history, state), first, axis=0, dtype=np.int64)
+    np.add.at(counts[:, -1], hour[first], found)
+    return counts
+
+
+def hours_of_week(history: History, state: "Present") -> I64:
+    """Return the hour of the week, from Monday 00:00, of each step of a history."""
+    monday = state.start.replace(hour=0, minute=0, second=0, microsecond=0)
+    monday -= timedelta(days=monday.weekday())
+    since = (state.start - monday) // timedelta(microseconds=1)
+    steps = np.arange(history.first, history.end, dtype=np.int64)
+    return (since + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
+
+
+def _anybody(history: History, state: "Present") -> NDArray[np.bool_]:
+    """Return where somebody was at each step, last nobody at home: bool (steps, rooms + 1)."""
+    steps = np.arange(len(history))
+    somewhere = np.zeros((len(history), len(state.home.rooms) + 1), bool)
+    for user in state.users:
+        somewhere[steps, history.poses(user).room] = True  # -1, who is away, is the last
+    somewhere[:, -1] = ~somewhere[:, :-1].any(axis=1)
+    return somewhere
+
+
+def shares(counts: I64, steps: float) -> tuple[F64, F64]:
+    """Return counts as shares of rooms given at home, NaN who never was, and of away."""
+    rooms = counts[..., :-1].astype(np.float64)
+    total = rooms.sum(axis=-1, keepdims=True)
+    home = np.where(total > 0, rooms / np.where(total > 0, total, 1), np.nan)
+    return home, counts[..., -1] / max(steps, 1)
+
+
+def walking_distances(home: "Home") -> F64:
+    """Return how far it is on foot from the middle of each room to that of each other [m].
+
+    Where no way leads it is twice the longest way there is.
+
+    Returns:
+        float64 (rooms, rooms), symmetric.
+    """
+    space, lattice = home.space(RADIUS), home.plan.lattice
+    places = []
+    for room in home.rooms:
+        x, y = lattice.to_lattice(room.anchor_xy).tolist()
+        places.append(space.nearest(x, y, None, room.index) or (x, y))
+    columns, rows = np.array(places, np.int64).reshape(-1, 2).T // SUB
+    metres = np.array([space.distance_field(np.array([place]))[rows, columns] for place in places])
+    metres = np.minimum(metres, metres.T)
+    reached = np.isfinite(metres)
+    longest = float(metres[reached].max(initial=0.0)) or 1.0
+    metres = np.where(reached, metres, 2 * longest)
+    np.fill_diagonal(metres, 0)
+    return metres

@@ -1,0 +1,81 @@
+"""How long people would wait for a robot that they call."""
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.algorithms.history import History
+from fleet2d.component import register
+from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.pairs import pairs_of
+from fleet2d.units import Length, PositiveDuration, Speed, micros
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+
+@register("metric", "reach_time")
+class ReachTime(Metric):
+    """Seconds that a robot would drive to a user who called it, at evenly spaced times.
+
+    Each user at home calls every robot every `every`, from the start of the run on. The time is the
+    length of the shortest way of a body of `radius` to the free place nearest to the user, divided
+    by `speed`; turns and people apart, and with doors and furniture as they are when the metric is
+    updated. Calls without a way count as unreached, and in no mean.
+    """
+
+    unit: ClassVar[str] = "s"
+
+    every: PositiveDuration = Field(
+        default=timedelta(minutes=10), description="time between two calls of a user"
+    )
+    speed: Speed = Field(default=0.6, gt=0, description="driving speed that is assumed [m/s]")
+    radius: Length = Field(default=0.15, gt=0, le=2, description="the robot's radius [m]")
+
+    def start(self, home: "Home") -> None:
+        """Begin counting."""
+        self.seconds: dict[tuple[str, str], list[float]] = {}
+        self.unreached: dict[tuple[str, str], int] = {}
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Let everybody at home call."""
+        step_us = round(history.step_s * 1e6)
+        every = max(1, -(-micros(self.every) // step_us))
+        calls = np.arange(-history.first % every, len(history), every)
+        space, lattice = state.home.space(self.radius), state.home.plan.lattice
+        for pair in pairs_of(history, state):
+            key = (pair.robot, pair.user)
+            seconds = self.seconds.setdefault(key, [])
+            self.unreached.setdefault(key, 0)
+            for i in calls[pair.at_home[calls]].tolist():
+                start = lattice.to_lattice(pair.at_robot.at(i)).tolist()
+                there = lattice.to_lattice(pair.at_user.at(i)).tolist()
+                part = (
+                    space.part_near(*start) if space.part_at(*start) < 0 else space.part_at(*start)
+                )
+                goal = (
+                    tuple(there) if space.part_at(*there) == part else space.nearest(*there, part)
+                )
+                route = None if goal is None else space.route(tuple(start), goal)
+                if route is None:
+                    self.unreached[key] += 1
+                    continue
+                legs = np.diff(route, axis=0)
+                length = float(np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).sum())
+                seconds.append(length / lattice.units_per_m / self.speed)
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {user: {mean, p90, calls, unreached}}}; p90 as numpy's linear quantile."""
+        found: dict[str, Any] = {}
+        for (robot, user), seconds in self.seconds.items():
+            numbers: dict[str, Any] = {"calls": len(seconds) + self.unreached[robot, user]}
+            if seconds:
+                numbers["mean"] = sum(seconds) / len(seconds)
+                numbers["p90"] = float(np.quantile(seconds, 0.9))
+            if self.unreached[robot, user]:
+                numbers["unreached"] = self.unreached[robot, user]
+            found.setdefault(robot, {})[user] = numbers
+        return found

@@ -1,0 +1,187 @@
+"""How long robots look for people, and what comes of it."""
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fleet2d.algorithms.history import Event, History
+from fleet2d.component import register
+from fleet2d.kernels.points import points_in_sight
+from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
+from fleet2d.units import Length, PositiveDuration
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.algorithm import Present
+    from fleet2d.floorplan.home import Home
+
+ENDS = ("found", "not_at_home", "gave_up")
+
+
+class Search(NamedTuple):
+    """A search.
+
+    Attributes:
+        step: When it began. user: Who was looked for. at_home: Whether the user was, when it began.
+        ideal: Metres of the way on which who knows where the user is has the user in sight. metres:
+        Metres that the robot had driven in all when it began; then, during the search. seconds: How
+        long it took. end: What came of it: one of ENDS, or `lost` where the robot took somebody
+        else for the user.
+    """
+
+    step: int
+    user: str
+    at_home: bool
+    ideal: float
+    metres: float
+    seconds: float = 0.0
+    end: str = ""
+
+
+@register("metric", "time_to_find")
+class TimeToFind(Metric):
+    """Times and outcomes of the searches of behavior `find`, for each robot.
+
+    Of the searches for users who were at home when they began: the share found by the deadline
+    (`success`), and of the time to find the Kaplan-Meier `median` and `p90`, and the `mean`
+    restricted to the deadline [s]; a search that was given up, or ended by `not_at_home`, is cut
+    short there. A find is `false`, and cut short, if the user wasn't within `sight` of the robot
+    then. `spl` is the mean of found * l / max(l, d), where d is how far the robot drove [m] and l
+    the way of a clairvoyant: along the shortest path to where the user was at the beginning, until
+    within `sight` and with no wall between; `ratio` is the sum of max(l, d) over that of l, over
+    those found. Of searches for users who were out: the share that ended by `not_at_home`
+    (`out_told`), and its mean time (`out_mean`).
+    """
+
+    unit: ClassVar[str] = "s; shares"
+
+    deadline: PositiveDuration = Field(
+        default=timedelta(minutes=10), description="until then a find is a success"
+    )
+    sight: Length = Field(default=4.5, gt=0, description="how far a robot recognizes somebody [m]")
+    radius: Length = Field(default=0.15, gt=0, le=2, description="the robot's radius [m]")
+
+    def start(self, home: "Home") -> None:
+        """Begin with no search."""
+        self.open: dict[str, Search] = {}
+        self.done: dict[str, list[Search]] = {}
+        self.driven: dict[str, float] = {}  # metres of each robot before the period
+        self.last: dict[str, tuple[float, float]] = {}
+
+    def update(self, history: History, state: "Present") -> Any:
+        """Take in the searches; return a row for each that ended."""
+        ended: list[tuple[str, Search]] = []
+        for robot in state.robots:
+            driven = self._driven(history, robot)
+            for event in history.events:
+                if event.entity != robot:
+                    continue
+                metres = float(driven[event.step - history.first])
+                if event.event == "find_begins" and event.detail in state.users:
+                    self.open[robot] = self._begun(history, state, event, metres)
+                elif event.event in ENDS and robot in self.open:
+                    ended.append((robot, self._ended(history, event, robot, metres)))
+            self.driven[robot] = float(driven[-1])
+        for robot, search in ended:
+            self.done.setdefault(robot, []).append(search)
+        return _rows(ended)
+
+    def _driven(self, history: History, robot: str) -> NDArray[np.float64]:
+        """Return how far a robot has driven by each step of the period [m]."""
+        xy = history.poses(robot).xy
+        moves = np.diff(xy, axis=0, prepend=[self.last.get(robot, tuple(xy[0].tolist()))])
+        self.last[robot] = history.poses(robot).at(-1)
+        lengths = np.sqrt((moves * moves).sum(axis=1))
+        driven: NDArray[np.float64] = self.driven.get(robot, 0.0) + np.cumsum(lengths)
+        return driven
+
+    def _begun(self, history: History, state: "Present", event: Event, metres: float) -> Search:
+        i, user = event.step - history.first, history.poses(event.detail)
+        at_home = not bool(user.away[i])
+        ideal = 0.0
+        if at_home:
+            ideal = self._ideal(state.home, history.poses(event.entity).at(i), user.at(i))
+        return Search(event.step, event.detail, at_home, ideal, metres)
+
+    def _ended(self, history: History, event: Event, robot: str, metres: float) -> Search:
+        search, end = self.open.pop(robot), event.event
+        i, user = event.step - history.first, history.poses(search.user)
+        gap = np.array(history.poses(robot).at(i)) - user.at(i)
+        if end == "found" and (user.away[i] or float((gap * gap).sum()) > self.sight**2):
+            end = "false"
+        return search._replace(
+            metres=metres - search.metres,
+            seconds=(event.step - search.step) * history.step_s,
+            end=end,
+        )
+
+    def _ideal(self, home: "Home", robot: tuple[float, float], user: tuple[float, float]) -> float:
+        """Return how far a robot drives straight to a user until it could see the user [m]."""
+        plan, space = home.plan, home.space(self.radius)
+        lattice = plan.lattice
+        start, there = lattice.to_lattice(robot).tolist(), lattice.to_lattice(user).tolist()
+        part = space.part_at(*start)
+        goal = tuple(there) if space.part_at(*there) == part else space.nearest(*there, part)
+        route = None if goal is None or part < 0 else space.route(tuple(start), goal)
+        if route is None:
+            return 0.0
+        legs = np.sqrt((np.diff(route, axis=0) ** 2).sum(axis=1).astype(np.float64))
+        total, along = float(legs.sum()), np.append(0.0, np.cumsum(legs))
+        at = np.append(np.arange(0.0, total, lattice.units_per_m / 10), total)
+        points = np.stack([np.interp(at, along, route[:, k]) for k in (0, 1)], axis=1)
+        points = np.rint(points).astype(np.int64)
+        near = ((points - there) ** 2).sum(axis=1) <= (self.sight * lattice.units_per_m) ** 2
+        seen = near & points_in_sight(plan.mesh, there[0], there[1], points)
+        first = int(np.argmax(seen)) if seen.any() else len(at) - 1
+        return float(at[first]) / lattice.units_per_m
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: numbers}, each where it can be told."""
+        return {robot: self._summary(searches) for robot, searches in self.done.items()}
+
+    def _summary(self, searches: list[Search]) -> dict[str, Any]:
+        until = self.deadline.total_seconds()
+        home = [s for s in searches if s.at_home]
+        out = [s for s in searches if not s.at_home]
+        numbers: dict[str, Any] = {"searches": len(searches)}
+        false = sum(s.end == "false" for s in searches)
+        if false:
+            numbers["false"] = false
+        if home:
+            found = [s for s in home if s.end == "found"]
+            curve = kaplan_meier([s.seconds for s in home], [s.end == "found" for s in home])
+            in_time = [s for s in found if s.seconds <= until]
+            numbers["success"] = len(in_time) / len(home)
+            numbers["mean"] = restricted_mean([c for c in curve if c[0] <= until], until)
+            for name, share in (("median", 0.5), ("p90", 0.9)):
+                if (time := quantile(curve, share)) is not None:
+                    numbers[name] = time
+            quality = [s.ideal / max(s.ideal, s.metres) if s.metres > 0 else 1.0 for s in found]
+            numbers["spl"] = sum(quality) / len(home)
+            if sum(s.ideal for s in found) > 0:
+                most = sum(max(s.ideal, s.metres) for s in found)
+                numbers["ratio"] = most / sum(s.ideal for s in found)
+        if out:
+            told = [s for s in out if s.end == "not_at_home"]
+            numbers["out_told"] = len(told) / len(out)
+            if told:
+                numbers["out_mean"] = sum(s.seconds for s in told) / len(told)
+        return numbers
+
+
+def _rows(ended: list[tuple[str, Search]]) -> dict[str, Any] | None:
+    if not ended:
+        return None
+    return {
+        "robot": np.array([robot for robot, _ in ended], dtype=object),
+        "user": np.array([search.user for _, search in ended], dtype=object),
+        "began": np.array([search.step for _, search in ended], np.int64),
+        "seconds": np.array([search.seconds for _, search in ended]),
+        "end": np.array([search.end for _, search in ended], dtype=object),
+        "at_home": np.array([search.at_home for _, search in ended]),
+        "metres": np.array([search.metres for _, search in ended]),
+        "ideal": np.array([search.ideal for _, search in ended]),
+    }

@@ -1,0 +1,1 @@
+"""In which order to look for somebody: pure functions of what is believed and how far it is."""

@@ -1,0 +1,157 @@
+"""Long-term and real-time presence in whole runs: outputs, rows, errors, and what others read."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import digests, run, scenario, table
+
+import fleet2d
+from fleet2d.component import lookup
+from fleet2d.errors import Fleet2DError
+
+pytestmark = needs_jit
+
+ESTIMATORS = ["sighting_share", "exposure_ratio", "audit_only", "likelihood", "hmm", "fremen"]
+MODELS = ["last_seen", "long_term", "hour_of_week", "markov", "hmm", "semi_markov"]
+USERS = {
+    "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},
+    "ben": {"type": "meander"},
+}
+
+
+def content(duration: str = "3 h", **algorithms: Any) -> dict[str, Any]:
+    robots = {"astro": {"type": "patrol", "dwell": "20 s"}}
+    return scenario(duration, users=USERS, robots=robots, algorithms=algorithms)
+
+
+@pytest.fixture(scope="module")
+def stored():
+    """Every estimator and every model, over a midnight."""
+    algorithms = {f"e_{name}": {"type": "ltp", "estimator": name} for name in ESTIMATORS}
+    algorithms |= {f"m_{name}": {"type": "rtp", "model": name, "period": "1 h"} for name in MODELS}
+    algorithms["week"] = {"type": "long_term_presence", "by": "hour_of_week"}
+    algorithms["sure"] = {"type": "ltp", "interval": 0.9}
+    return run(content("19 h", **algorithms))
+
+
+def test_shares_of_each_user_and_hour_sum_to_one(stored) -> None:
+    names = [f"e_{name}" for name in ESTIMATORS] + [f"m_{name}" for name in MODELS]
+    for name in (*names, "week", "sure"):
+        rows = table(stored, name)
+        for step in np.unique(rows["step"]):
+            for user in ("ana", "ben", "anyone"):
+                mine = (rows["step"] == step) & (rows["user"] == user)
+                assert 7 == mine.sum(), name  # six rooms and away
+                at_home = mine & (rows["room"] != "away")
+                assert 1.0 == pytest.approx(rows["share"][at_home].sum())
+                assert 0 <= rows["share"][mine & (rows["room"] == "away")][0] <= 1
+
+
+def test_who_meanders_at_home_is_found_at_home(stored) -> None:
+    rows = table(stored, "e_likelihood", user="ben", room="away")
+    assert rows["share"][-1] < 0.3
+    rows = table(stored, "e_likelihood", user="ana", room="kitchen_0")
+    assert rows["share"][-1] > 0.15
+
+
+def test_intervals_are_columns_and_the_others_have_none(stored) -> None:
+    rows = table(stored, "sure")
+    assert (rows["low"] <= rows["share"]).all()
+    assert (rows["share"] <= rows["high"]).all()
+    assert "low" not in table(stored, "e_exposure_ratio")
+
+
+def test_a_run_is_the_same_with_and_without_other_learners(stored) -> None:
+    alone = run(content("19 h", e_likelihood={"type": "ltp", "estimator": "likelihood"}))
+    assert digests(stored)["e_likelihood"] == digests(alone)["e_likelihood"]
+    assert digests(stored)["trajectories"] == digests(alone)["trajectories"]
+
+
+def test_the_longest_span_changes_nothing() -> None:
+    found = [
+        digests(run(content("2 h", rtp={"type": "rtp"}, ltp={"type": "ltp"}), max_span=span))
+        for span in (100, 100_000)
+    ]
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"type": "ltp", "estimator": "sighting"}, "sighting_share"),
+        ({"type": "ltp", "estimator": {"type": "likelihood", "detection": 1}}, "detection"),
+        ({"type": "ltp", "estimator": {"type": "likelihood", "looks": 1}}, "looks"),
+        ({"type": "ltp", "interval": 0.9, "by": "hour_of_week"}, "interval"),
+        ({"type": "ltp", "interval": 0.9, "estimator": "fremen"}, "fremen has none"),
+        ({"type": "ltp", "half_life": 0}, "half_life"),
+        ({"type": "rtp", "model": "psychic"}, "There are: hmm, hour_of_week"),
+        ({"type": "rtp", "model": {"detection": 0.5}}, "'type' is needed"),
+    ],
+)
+def test_wrong_settings_are_told(settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(Fleet2DError, match=words):
+        run(content(mine=settings))
+
+
+def test_they_are_found_by_their_short_names() -> None:
+    assert lookup("algorithm", "ltp") is lookup("algorithm", "long_term_presence")
+    assert lookup("algorithm", "rtp") is lookup("algorithm", "real_time_presence")
+
+
+def test_a_home_without_users_or_cameras_is_told_something_defined() -> None:
+    for robots in ({}, {"astro": {"type": "patrol", "camera": None}}):
+        algorithms = {"ltp": {"type": "ltp", "estimator": "likelihood"}, "rtp": {"type": "rtp"}}
+        found = run(scenario("2 h", robots=robots, algorithms=algorithms))
+        rows = table(found, "ltp")
+        assert {"anyone"} == set(rows["user"])
+        assert np.isfinite(rows["share"]).all()
+
+
+def test_a_model_of_ones_own_is_read_by_its_path(tmp_path: Path) -> None:
+    code = """
+import numpy as np
+from fleet2d.algorithms.presence.model import Model
+
+class Sure(Model):
+    '''Everybody is in the first room.'''
+    room: int = 0
+
+    def observe(self, bins):
+        home = np.zeros((len(bins.day), self.users + 1, self.rooms))
+        home[..., self.room] = 1
+        return home, np.zeros(home.shape[:2])
+"""
+    (tmp_path / "mine.py").write_text(code)
+    model = {"type": f"{tmp_path.as_posix()}/mine:Sure", "room": 2}
+    found = run(content("1 h", rtp={"type": "rtp", "model": model}))
+    rows = table(found, "rtp", user="ana", share=1.0)
+    assert 12 == len(rows["step"])
+    assert {"bedroom_0"} == set(rows["room"])
+
+
+def test_a_longer_step_than_a_minute_makes_bins_of_a_step() -> None:
+    slow = content("2 d", ltp={"type": "ltp", "estimator": "likelihood"}, rtp={"type": "rtp"})
+    slow["simulation"] |= {"step": "5 min"}
+    slow["artifacts"] |= {"trajectories": "off"}
+    assert len(table(fleet2d.run(slow), "rtp")["step"]) == 2 * 288 * 3 * 7
+
+
+def test_a_run_goes_on_from_what_another_has_learned(tmp_path: Path) -> None:
+    algorithms = {"ltp": {"type": "ltp", "estimator": "likelihood"}, "rtp": {"type": "rtp"}}
+    before = content("1 d", **algorithms)
+    before["artifacts"] |= {"learned": True}
+    first = fleet2d.run(before, out=tmp_path / "one")
+    algorithms = {
+        name: {**settings, "learned": str(tmp_path / "one" / "learned" / f"{name}.npz")}
+        for name, settings in algorithms.items()
+    }
+    second = run(content("1 h", **algorithms))
+    known = table(first, "ltp", user="ana")["share"][-7:]
+    assert known.tolist() == pytest.approx(
+        table(second, "ltp", user="ana")["share"].tolist(), abs=0.08
+    )
+    with pytest.raises(Fleet2DError, match="other users"):
+        run({**content("1 h", **algorithms), "users": {"ana": USERS["ana"]}})

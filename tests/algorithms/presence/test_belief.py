@@ -1,0 +1,115 @@
+"""Presence: what it says, what it refuses, and the rows that it becomes."""
+
+import copy
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence, slot_of_week
+from fleet2d.algorithms.presence.counts import DayCounts
+from fleet2d.errors import ComponentError
+
+NOON = datetime(2026, 1, 5, 12)
+
+
+def some(**changes) -> Presence:
+    values = {
+        "users": ("ana",),
+        "home": np.array([[0.75, 0.25], [0.5, 0.5]]),
+        "away": np.array([0.5, 0.25]),
+        "time": NOON,
+    }
+    return Presence(**{**values, **changes})
+
+
+def test_rooms_and_away_of_a_user_and_of_anyone() -> None:
+    presence = some()
+    assert ("ana", "anyone") == presence.names
+    assert [0.75, 0.25] == presence.share("ana").tolist()
+    assert [0.5, 0.5] == presence.share().tolist()
+    assert 0.25 == presence.away()
+    assert [0.375, 0.125, 0.5] == presence.with_away("ana").tolist()
+    assert presence.low() is None
+    assert presence.high() is None
+
+
+def test_it_never_changes_and_is_not_copied() -> None:
+    presence = some()
+    assert presence is copy.deepcopy(presence)
+    assert presence is presence.at(NOON + timedelta(days=1))
+    with pytest.raises(ValueError, match="read-only"):
+        presence.share("ana")[0] = 1
+
+
+def test_somebody_it_does_not_tell_of_is_refused_by_name() -> None:
+    with pytest.raises(ComponentError, match=r"'anna'.*it tells of: ana, anyone"):
+        some().share("anna")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"home": np.array([[0.75, 0.5], [0.5, 0.5]])}, "'ana' is no distribution.*1.25"),
+        ({"home": np.array([[0.5, 0.5], [np.nan, 0.5]])}, "'anyone' is no distribution.*nan"),
+        ({"home": np.array([[1.5, -0.5], [0.5, 0.5]])}, "'ana' is no distribution"),
+        ({"away": np.array([0.5, np.nan])}, "'anyone'.*away nan"),
+        ({"away": np.array([-0.1, 0.5])}, "'ana'.*away -0.1"),
+        ({"away": np.array([0.5])}, "shapes"),
+        ({"home": np.array([[0.5, 0.5]])}, "needs 2 rows"),
+    ],
+)
+def test_what_is_no_distribution_is_refused(changes, words: str) -> None:
+    with pytest.raises(ComponentError, match=words):
+        some(**changes)
+
+
+def test_it_becomes_a_row_per_user_and_room_and_one_of_away() -> None:
+    columns = some().to_columns(["hall", "bath"])
+    rows = list(zip(*(columns[name] for name in ("user", "room", "share")), strict=True))
+    assert [
+        ("ana", "hall", 0.75), ("ana", "bath", 0.25), ("ana", "away", 0.5),
+        ("anyone", "hall", 0.5), ("anyone", "bath", 0.5), ("anyone", "away", 0.25),
+    ] == rows  # fmt: skip
+    ends = np.zeros((2, 3)), np.ones((2, 3))
+    with_ends = some(interval=ends).to_columns(["hall", "bath"])
+    assert ["user", "room", "share", "low", "high"] == list(with_ends)
+    assert [0.0] * 6 == with_ends["low"].tolist()
+    with pytest.raises(ComponentError, match="2 rooms, but the home has 3"):
+        some().to_columns(["a", "b", "c"])
+
+
+def test_each_hour_of_the_week_has_its_own() -> None:
+    home = np.zeros((168, 2, 2))
+    home[..., 0] = np.linspace(0, 1, 168)[:, None]
+    home[..., 1] = 1 - home[..., 0]
+    presence = WeeklyPresence(("ana",), (home, np.zeros((168, 2))), NOON)
+    assert presence.share("ana")[0] == home[12, 0, 0]
+    assert presence.at(NOON + timedelta(days=8)).share("ana")[0] == home[36, 0, 0]
+    assert np.array_equal(home[:, 0], presence.by_hour_of_week("ana"))
+    assert 0 == slot_of_week(datetime(2026, 1, 5))
+    assert 167 == slot_of_week(datetime(2026, 1, 4, 23, 59, 59))
+
+
+@pytest.mark.parametrize("half_life", [None, 2.0])
+def test_sums_by_day_and_hour_are_those_of_a_loop(half_life: float | None) -> None:
+    random = np.random.default_rng(1)
+    day = np.sort(random.choice([100, 101, 103, 109, 110], 300))
+    minute = np.concatenate([np.sort(random.integers(0, 1440, (day == d).sum())) for d in (100, 101, 103, 109, 110)])  # fmt: skip
+    values = random.random((300, 2))
+    counts = DayCounts((2,), half_life)
+    for begin in range(0, 300, 17):
+        part = slice(begin, begin + 17)
+        counts.add(day[part], minute[part], values[part])
+    weight = 0.5 ** ((110 - day) / half_life) if half_life else np.ones(300)
+    weighted = values * weight[:, None]
+    assert weighted.sum(axis=0).tolist() == pytest.approx(counts.total.tolist())
+    assert [100, 101, 103, 109] == counts.days
+    for at, d in enumerate(counts.days):
+        assert weighted[day == d].sum(axis=0).tolist() == pytest.approx(
+            counts.weighted_days[at].tolist()
+        )
+    hour = (day - 1) % 7 * 24 + minute // 60
+    for slot in range(168):
+        expected = weighted[hour == slot].sum(axis=0)
+        assert expected.tolist() == pytest.approx(counts.by_hour_of_week[slot].tolist())

@@ -1,0 +1,100 @@
+"""Small simulated homes for the tests of presence: a person who is a Markov chain, robots that look."""
+
+from collections.abc import Callable
+from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.presence.counts import Bins, in_time
+
+MONDAY = datetime(2026, 1, 5)
+DAY = 1440
+DETECTION = 0.95
+
+I64 = NDArray[np.int64]
+F64 = NDArray[np.float64]
+Policy = Callable[[int, int, bool, I64, np.random.Generator], int]
+"""From bin, room now, whether the person was seen, sightings per room so far, to the next room."""
+
+
+def transitions(rooms: int, seed: int, dwell: float = 40.0) -> F64:
+    """How a Markov person goes on: rooms and last away, of different popularity and dwell."""
+    random = np.random.default_rng(seed)
+    liking = random.dirichlet(np.full(rooms + 1, 1.5))
+    stay = 1 - 1 / (dwell * random.uniform(0.4, 2.0, rooms + 1))
+    found = np.tile(liking, (rooms + 1, 1)) * (1 - stay)[:, None]
+    found[np.arange(rooms + 1), np.arange(rooms + 1)] += stay
+    return found
+
+
+def person(bins: int, rooms: int, seed: int, dwell: float = 40.0) -> I64:
+    """Where a Markov person is in each bin: a room, or `rooms` for away."""
+    sums = transitions(rooms, seed, dwell).cumsum(axis=1)
+    uniform = np.random.default_rng([seed, 2]).random(bins)
+    where, now = np.empty(bins, np.int64), 0
+    for t in range(bins):
+        now = min(int(np.searchsorted(sums[now], uniform[t])), rooms)
+        where[t] = now
+    return where
+
+
+def evidence(where: I64, rooms: int, policy: Policy, seed: int) -> Evidence:
+    """What a robot that sees the whole room it is in, and nothing else, watched and saw."""
+    random = np.random.default_rng([seed, 1])
+    bins = len(where)
+    watched, seen = np.zeros((bins, rooms)), np.zeros((bins, 2, rooms), np.int64)
+    sightings, at, found = np.zeros(rooms, np.int64), 0, False
+    for t in range(bins):
+        at = policy(t, at, found, sightings, random)
+        watched[t, at] = 1
+        found = where[t] == at and random.random() < DETECTION
+        if found:
+            seen[t, :, at] = 1
+            sightings[at] += 1
+    return Evidence(0, 1, watched, seen)
+
+
+def patrol(t: int, at: int, found: bool, sightings: I64, random: np.random.Generator) -> int:
+    """Ten bins in a room, then another at random."""
+    return int(random.integers(len(sightings))) if t % 10 == 0 else at
+
+
+def hangout(t: int, at: int, found: bool, sightings: I64, random: np.random.Generator) -> int:
+    """Every half hour to the room with the most sightings, one time in ten to any."""
+    if t % 30:
+        return at
+    explore = random.random() < 0.1
+    return int(random.integers(len(sightings))) if explore else int(np.argmax(sightings))
+
+
+def follow(t: int, at: int, found: bool, sightings: I64, random: np.random.Generator) -> int:
+    """Stay while the person is seen, else go from room to room."""
+    return at if found else (at + 1) % len(sightings)
+
+
+def bins_of(found: Evidence, start: datetime = MONDAY) -> Bins:
+    """Evidence of bins of a minute."""
+    return in_time(found, start, 60_000_000)
+
+
+def pieces(bins: Bins, length: int = 60) -> list[Bins]:
+    """The same evidence in pieces, as updates bring it."""
+    return [bins.part(i, min(i + length, len(bins.day))) for i in range(0, len(bins.day), length)]
+
+
+def shares_at_home(where: I64, rooms: int) -> F64:
+    """The realised shares of rooms, given at home."""
+    counts = np.bincount(where, minlength=rooms + 1)[:rooms]
+    return counts / counts.sum()
+
+
+def any_evidence(seed: int, bins: int = 40, users: int = 2, rooms: int = 3, steps: int = 6) -> Bins:
+    """Evidence without rhyme or reason, from Sunday 22:10 on, so that it has two days."""
+    random = np.random.default_rng(seed)
+    watched = random.choice([0.0, 0.3, 0.3, 0.7, 1.0], (bins, rooms))
+    hit = (random.random((bins, users + 1, rooms)) < 0.15) & (watched[:, None] > 0)
+    seen = np.where(hit, random.integers(1, steps + 1, hit.shape), 0)
+    seen[:, -1] = np.maximum(seen[:, -1], seen[:, :-1].max(axis=1, initial=0))
+    return in_time(Evidence(0, steps, watched, seen), datetime(2026, 1, 4, 23, 40), 10_000_000)

@@ -1,0 +1,144 @@
+"""Giving way: robots stop before people, wait, go round; the same for every span."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import (
+    assert_same_for_every_max_span,
+    home_with,
+    names,
+    rooms,
+)
+from tests.homes import needs_jit
+from tests.scenes import digests, each_step, everything, path, run
+
+import fleet2d
+from fleet2d.errors import InputError
+
+pytestmark = needs_jit
+
+GIVES_WAY = {"distance": 0.4, "patience": "10 s"}
+TO_AND_FRO = {
+    "type": "patrol",
+    "waypoints": [[1.0, 3.5], [4.5, 3.5]],
+    "dwell": "20 s",
+    "look_around": False,
+}
+KEPT = 0.2 + 0.15 + 0.4
+
+
+def stands(x: float, y: float) -> dict[str, Any]:
+    return {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [x, y]}]}]}
+
+
+def polite(
+    ana: Any, behaviors: list[Any] | None = None, duration: str = "10 min", **fields: Any
+) -> dict[str, Any]:
+    return home_with(
+        behaviors or [TO_AND_FRO], duration, ana, astro={"gives_way": {**GIVES_WAY, **fields}}
+    )
+
+
+def gap(stored: Any) -> Any:
+    one, other = path(stored, "astro"), path(stored, "ana")
+    return np.hypot(one.x - other.x, one.y - other.y)
+
+
+def test_it_waits_before_somebody_and_then_goes_round() -> None:
+    stored = assert_same_for_every_max_span(polite(stands(3.0, 3.2)), 61, 7, 1)
+    assert "gives_way" in names(stored)
+    assert gap(stored).min() > 0.35
+    astro = path(stored, "astro")
+    assert astro.x.max() > 4.4
+    assert astro.x[400:].min() < 1.1
+
+
+def test_without_it_the_robot_drives_through_people() -> None:
+    assert gap(run(home_with([TO_AND_FRO], "10 min", stands(3.0, 3.5)))).min() < 0.35
+
+
+def test_it_comes_no_nearer_while_it_is_patient() -> None:
+    stored = run(polite(stands(2.8, 3.5), patience="1 h"))
+    assert gap(stored).min() >= KEPT - 0.01
+    assert 1 == names(stored).count("gives_way")
+
+
+def test_it_lets_somebody_through_a_door_and_goes_on_with_its_round() -> None:
+    walker = {
+        "type": "tests.own_components:Scripted",
+        "start": [7.0, 3.1],
+        "speed": 0.6,
+        "script": [12.0, [1.0, 0.6], 600.0],
+    }
+    patrol = {
+        "type": "patrol",
+        "waypoints": [[6.5, 3.1], [6.5, 1.0]],
+        "dwell": "30 s",
+        "look_around": False,
+    }
+    content = polite(walker, [patrol], "4 min", patience="30 s")
+    content["robots"]["astro"]["start"] = [2.0, 3.1]
+    stored = assert_same_for_every_max_span(content, 61, 1)
+    assert "gives_way" in names(stored)
+    assert "kitchen_0" in rooms(stored, 25)
+
+
+def test_steps_of_any_length_and_copies_give_the_same() -> None:
+    import copy
+
+    content = polite("meander", [{"type": "find", "every": "2 min", "deadline": "1 min"}, "patrol"])
+    for step in ("250 ms", "2 s"):
+        content["simulation"]["step"] = step
+        assert_same_for_every_max_span(content, 61, 1)
+    simulation = fleet2d.Simulation(content)
+    simulation.advance(123)
+    assert digests(copy.deepcopy(simulation).run()) == digests(simulation.run())
+
+
+@pytest.mark.parametrize(
+    "behaviors", [["meander"], ["opportunistic", "patrol"], ["follow", "patrol"]]
+)
+def test_it_keeps_clear_in_a_crowd_most_of_the_time(behaviors: list[Any]) -> None:
+    content = polite("meander", behaviors, "40 min")
+    stored = assert_same_for_every_max_span(content, 61)
+    assert "gives_way" in names(stored)
+    rude = run(home_with(behaviors, "40 min", "meander"))
+    assert (gap(stored) < 0.35).mean() <= (gap(rude) < 0.35).mean()
+
+
+def test_key_frames_tell_the_same_as_the_poses() -> None:
+    content = polite("meander", ["patrol"], "20 min")
+    poses, rows = path(run(content), "astro"), each_step(content, "astro")
+    assert np.abs(poses.x - rows["x"]).max() < 1e-3
+
+
+def test_events_at_the_begin_of_a_plan_are_told_though_it_waits() -> None:
+    find = {"type": "find", "user": "ben", "at": ["07:02"], "deadline": "2 min"}
+    still = {"type": "patrol", "waypoints": [[3.0, 3.5]], "dwell": "1 d", "look_around": False}
+    content = polite(stands(3.6, 3.5), [find, still], patience="1 min")
+    content["robots"]["astro"]["start"] = [3.0, 3.5]
+    stored = assert_same_for_every_max_span(content, 61)
+    assert ["find_begins", "gave_up"] == [n for n in names(stored) if n != "gives_way"]
+
+
+def test_robots_that_do_not_give_way_are_as_they_were() -> None:
+    content = everything("20 min")
+    before = run(content)
+    content["robots"]["zed"] = {"type": "patrol", "gives_way": {}, "camera": None}
+    after = run(content)
+    for name in ("astro", "bolt", "curio", "drift", "ana", "ben"):
+        assert np.array_equal(path(before, name).x, path(after, name).x), name
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"distance": -1}, "distance"),
+        ({"patience": 0}, "longer than 0"),
+        ({"politeness": 1}, "unknown key"),
+    ],
+)
+def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fleet2d.Simulation(polite("meander", **fields))

@@ -1,0 +1,121 @@
+"""Encounters: beside a slow twin that goes from step to step."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.scenes import scenario
+
+from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.simulation import Simulation
+
+UNITS = 1280  # lattice units per metre
+LYING, SITTING = 2, 1
+ALWAYS = {"turns": 1, "steps_aside": 1, "leaves": 1, "comes": 1}
+CLOSE = {"notices": 2.5, "in_the_way": 0.9, "too_close": 0.7, "patience": "3 s"}
+
+
+class Seen(NamedTuple):
+    """A step as the twin sees it."""
+
+    distance: float
+    moved: bool
+    posture: int
+    away: bool
+
+
+def simulation() -> Simulation:
+    user = {"behaviors": [{"type": "reactions", "manners": {**ALWAYS, **CLOSE}}]}
+    return Simulation(scenario(users={"ana": user}, robots={"astro": {"type": "patrol"}}))
+
+
+def twin(steps: list[Seen]) -> list[tuple[int, str]]:
+    """Say what happens, step by step."""
+    found, near, coming, close, last = [], True, True, 0, float("inf")
+    for k, step in enumerate(steps):
+        gone = step.away or step.posture == LYING
+        distance = float("inf") if gone else step.distance
+        if distance > 2.5 * 1.25:
+            near = True
+        if distance > 0.9 * 1.5:
+            coming = True
+        close = close + 1 if distance <= 0.7 else 0
+        if near and distance <= 2.5:
+            found.append((k, "robot_near"))
+            near = False
+        drives_up = step.moved and distance < last and step.posture == 0
+        if coming and distance <= 0.9 and drives_up:
+            found.append((k, "robot_coming"))
+            coming = False
+        if close == 3:
+            found.append((k, "robot_close"))
+        last = distance
+    return found
+
+
+@st.composite
+def meetings(draw: st.DrawFn) -> list[tuple[int, int, bool]]:
+    """Distances [cm], postures, and whether she is away, of some steps in a row."""
+    legs = draw(st.lists(st.tuples(st.integers(5, 390), st.integers(1, 6)), min_size=1, max_size=8))
+    found, at = [], 300
+    for goal, count in legs:
+        posture = draw(st.sampled_from([0, 0, 0, SITTING, LYING]))
+        away = draw(st.integers(0, 9)) == 0
+        found += [(at + (goal - at) * i // count, posture, away) for i in range(1, count + 1)]
+        at = goal
+    return found
+
+
+@settings(max_examples=80, deadline=None)
+@given(meeting=meetings(), cuts=st.lists(st.integers(1, 7), max_size=40))
+def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
+    meeting: list[tuple[int, int, bool]], cuts: list[int]
+) -> None:
+    users, robots = _bodies()
+    encounters = Encounters(users, robots)
+    # In the middle of the living room; the robot comes along its long side.
+    x = [4.7 * UNITS - cm * UNITS // 100 for cm, _, _ in meeting]
+    user = round(4.7 * UNITS), round(3.1 * UNITS)
+    xs = [round(v) for v in x]
+    block = _BLOCKS[0]
+    found, first, sizes = [], 0, iter(cuts)
+    while first < len(meeting):
+        count = min(next(sizes, 5), len(meeting) - first)
+        part = slice(first, first + count)
+        block.x[0, :count], block.y[0, :count] = user
+        block.x[1, :count], block.y[1, :count] = xs[part], user[1]
+        block.posture[0, :count] = [posture for _, posture, _ in meeting[part]]
+        block.away[0, :count] = [away for _, _, away in meeting[part]]
+        count = encounters.limit(block, first, count)
+        for _, _, event in encounters.take(block, first, count):
+            found.append((first + count - 1, event.event))
+        first += count
+    moved = np.diff(xs, prepend=xs[0]) != 0
+    steps = [
+        Seen(abs(user[0] - xs[k]) / UNITS, bool(moved[k]), posture, away)
+        for k, (_, posture, away) in enumerate(meeting)
+    ]
+    assert twin(steps) == found
+
+
+_ACTORS: list[Any] = []
+_BLOCKS: list[PoseBlock] = []
+
+
+def _bodies() -> tuple[list[Any], list[Any]]:
+    """Ana, who always reacts, and a robot; set up once."""
+    if not _ACTORS:
+        actors = simulation().actors
+        _ACTORS.extend([actors["ana"], actors["astro"]])
+        _BLOCKS.append(PoseBlock(_ACTORS))
+    return _ACTORS[:1], _ACTORS[1:]
+
+
+def test_nobody_is_watched_who_does_not_react() -> None:
+    _, robots = _bodies()
+    quiet = Simulation(scenario(users={"ana": {"type": "meander"}})).actors["ana"]
+    encounters = Encounters([quiet], robots)
+    assert [] == encounters.pairs
+    assert 17 == encounters.limit(_BLOCKS[0], 0, 17)

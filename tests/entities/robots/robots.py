@@ -1,0 +1,59 @@
+"""What the tests of robots' behaviors share."""
+
+from itertools import groupby
+from typing import Any
+
+from tests.scenes import digests, path, run, scenario, table
+
+from fleet2d.artifacts.reader import Run
+
+CAMERA = {"range": [0.2, 4.5], "angle_deg": 108, "lost_after": "5 s"}
+SIT = {"days": [{"items": [{"at": "00:00", "place": [7.0, 6.0]}]}]}
+SHARE = {"share": {"type": "tests.own_components:Share", "period": "5 min"}}
+
+
+def home_with(
+    behaviors: list[Any], duration: str = "1 h", ana: Any = None, **sections: Any
+) -> dict[str, Any]:
+    """The flat with a robot, and Ana, who is in the bathroom all day unless told otherwise."""
+    ana = {"type": "schedule", **SIT} if ana is None else ana
+    astro = {
+        "start": [1.0, 3.0],
+        "start_heading_deg": 0,
+        "camera": CAMERA,
+        "behaviors": behaviors,
+        **sections.pop("astro", {}),
+    }
+    return scenario(duration, users={"ana": ana}, robots={"astro": astro}, **sections)
+
+
+def events(stored: Run, entity: str = "astro") -> list[tuple[int, str, str]]:
+    """The events of a body: step, event, detail."""
+    rows = table(stored, "events", entity=entity)
+    return list(
+        zip(rows["step"].tolist(), rows["event"].tolist(), rows["detail"].tolist(), strict=True)
+    )
+
+
+def names(stored: Run) -> list[str]:
+    """The events of the robot but those of its camera."""
+    return [name for _, name, _ in events(stored) if name not in ("user_seen", "user_lost")]
+
+
+def rooms(stored: Run, still_s: int = 20) -> list[str]:
+    """The rooms in which the robot stood still, in order."""
+    poses = path(stored, "astro")
+    found = []
+    for xy, steps in groupby(zip(poses.x.tolist(), poses.y.tolist(), strict=True)):
+        if sum(1 for _ in steps) >= still_s:
+            room = stored.plan.room_at(*xy)
+            found.append("" if room is None else room.name)
+    return [room for room, _ in groupby(found)]
+
+
+def assert_same_for_every_max_span(content: dict[str, Any], *spans: int) -> Run:
+    """A run is the same however it is cut into spans; returns it."""
+    whole = run(content)
+    for span in spans or (61, 1):
+        assert digests(whole) == digests(run(content, max_span=span)), span
+    return whole

@@ -1,0 +1,76 @@
+"""A day of each behavior in real homes, beside a person on a schedule."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import SHARE, events
+from tests.homes import needs_jit
+from tests.scenes import path, run
+
+import fleet2d
+from fleet2d.kernels.mesh import strictly_inside
+
+pytestmark = needs_jit
+
+PATROL = {"type": "patrol", "dwell": "5 min"}
+# Short, for the patrol charges a little each time that it stops in the charger's room.
+BATTERY = {"driving": "1 h", "standing": "3 h", "charging": "2 h", "charger": "any"}
+# Which behaviors, and which events they must have brought about in a day.
+DAYS: dict[str, tuple[list[Any], set[str]]] = {
+    "explore": (["explore", PATROL], {"explored"}),
+    "scheduled": (
+        [{"type": "scheduled", "visits": [{"at": "09:00", "place": ["kitchen", "any"]}]}, PATROL],
+        {"visits"},
+    ),
+    "hangout": ([{"type": "hangout", "source": "share", "quiet": "22:00-06:00"}], {"relocates"}),
+    "find": (
+        [{"type": "find", "user": "ana", "every": "1 h", "source": "share"}, PATROL],
+        {"found"},
+    ),
+    "opportunistic": ([{"type": "opportunistic", "cooldown": "10 min"}, PATROL], {"interacts"}),
+    "follow": ([{"type": "follow", "longest": "10 min", "cooldown": "1 h"}, PATROL], {"follows"}),
+    "dock": (["dock", PATROL], {"docks", "charged"}),
+    "all": (
+        [
+            "dock",
+            {"type": "scheduled", "visits": [{"at": "09:00", "place": "any", "task": "water"}]},
+            {"type": "find", "user": "ana", "at": ["18:30"], "source": "share"},
+            {"type": "opportunistic", "when": "08:00-22:00", "cooldown": "30 min"},
+            {"type": "patrol", "when": "weekdays 10:00-11:00"},
+            {"type": "hangout", "source": "share", "quiet": "22:00-07:00"},
+        ],
+        {"visits", "find_begins", "relocates", "docks"},
+    ),
+}
+
+
+def home_file(folder: Path, which: str) -> Path:
+    files = sorted((folder / "houseexpo").glob("*.json"))
+    return files[0] if which == "first" else files[len(files) // 2]
+
+
+@pytest.mark.parametrize("which", ["first", "middle"])
+@pytest.mark.parametrize("name", list(DAYS))
+def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which: str) -> None:
+    behaviors, wanted = DAYS[name]
+    ana = fleet2d.load_scenario("bundled:base").users["ana"].model_dump(mode="json")
+    body = {"battery": BATTERY} if "dock" in behaviors else {}
+    content = {
+        "simulation": {"start": "2026-01-10", "duration": "1 d", "seed": 4},
+        "floorplan": {"type": "houseexpo", "path": str(home_file(shared_data, which))},
+        "users": {"ana": ana},
+        "robots": {"astro": {"behaviors": behaviors, "gives_way": {}, **body}},
+        "algorithms": SHARE,
+    }
+    stored = run(content)
+    assert wanted <= {event for _, event, _ in events(stored)}
+    # The body never leaves the space that it fits in.
+    plan, space = stored.plan, fleet2d.Home(stored.plan).space(0.15)
+    poses = path(stored, "astro")
+    points = np.unique(plan.lattice.to_lattice(np.stack([poses.x, poses.y], axis=1)), axis=0)
+    some = points[:: max(1, len(points) // 500)].tolist()
+    assert all(strictly_inside(plan.mesh, x, y) for x, y in some)
+    inside = [space.part_at(x, y) >= 0 for x, y in some]
+    assert np.mean(inside) > 0.8  # ways touch its corners

@@ -1,0 +1,63 @@
+"""Explore: all floor that can be seen is seen, frontier by frontier."""
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
+from tests.homes import needs_jit
+from tests.scenes import path
+
+import fleet2d
+
+pytestmark = needs_jit
+
+
+def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others() -> None:
+    content = home_with(
+        ["explore", {"type": "patrol", "rooms": ["kitchen"], "dwell": "1 d"}], "15 min"
+    )
+    stored = assert_same_for_every_max_span(content, 61)
+    told = [
+        (name, float(detail.split(" ")[0]))
+        for _, name, detail in events(stored)
+        if name.startswith("explore")
+    ]
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert ("explored", pytest.approx(98.5, abs=1.5)) == told[-1]
+    assert names(stored).count("explored") == 1
+    poses = path(stored, "astro")
+    assert "kitchen_0" == stored.plan.room_at(float(poses.x[-1]), float(poses.y[-1])).name
+
+
+def test_the_share_is_that_of_the_layer() -> None:
+    simulation = fleet2d.Simulation(home_with(["explore"], "15 min"))
+    simulation.run_until(simulation.clock.steps)
+    explored = simulation.home.layers["explored.astro"].values
+    floor = simulation.actors["astro"].behaviors[0].floor  # type: ignore[attr-defined]
+    share = 100 * np.count_nonzero(explored & floor) / np.count_nonzero(floor)
+    stored = simulation.finish()
+    detail = next(detail for _, name, detail in events(stored) if name == "explored")
+    assert share == pytest.approx(float(detail.split(" ")[0]), abs=0.1)
+
+
+def test_what_can_not_be_seen_is_given_up() -> None:
+    near_sighted = {"camera": {"range": [1.5, 3.0], "angle_deg": 60}}
+    stored = assert_same_for_every_max_span(
+        home_with([{"type": "explore", "enough": 1}], "1 h", astro=near_sighted), 61
+    )
+    assert "explored" == names(stored)[-1]
+
+
+def test_a_real_home_is_explored_within_the_hour() -> None:
+    content = home_with(["explore"], "1 h")
+    content["floorplan"] = "bundled"
+    content["users"] = {}
+    content["robots"]["astro"].pop("start")
+    stored = fleet2d.run(content)
+    assert "explored" == names(stored)[-1]
+    assert float(events(stored)[-1][2].split(" ")[0]) > 95
+
+
+def test_a_robot_without_a_camera_is_refused() -> None:
+    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
+        fleet2d.Simulation(home_with(["explore"], astro={"camera": None}))

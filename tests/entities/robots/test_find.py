@@ -1,0 +1,166 @@
+"""Find: search for a person by what is believed, with a deadline, and a verdict."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import (
+    SHARE,
+    assert_same_for_every_max_span,
+    events,
+    home_with,
+    names,
+)
+from tests.homes import needs_jit
+from tests.scenes import path, run
+
+import fleet2d
+from fleet2d import Algorithm
+from fleet2d.errors import InputError
+
+pytestmark = needs_jit
+
+POLICIES = ["random", "nearest", "likeliest", "greedy", "exact", "receding"]
+OUT = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}
+STAY = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_around": False}
+
+
+class Told:
+    """Where people are, as a presence algorithm says it."""
+
+    def __init__(self, shares: list[float], away: float) -> None:
+        self.shares, self.out = np.array(shares), away
+
+    def share(self, user: str = "anyone") -> Any:
+        return self.shares
+
+    def away(self, user: str) -> float:
+        return self.out
+
+    def at(self, time: Any) -> "Told":
+        return self
+
+    def to_columns(self, rooms: Any) -> Any:
+        return {"room": np.array(rooms, dtype=object), "share": self.shares}
+
+
+class Oracle(Algorithm):
+    """Says from the first minute on what the scenario tells it to."""
+
+    rooms: dict[str, float]
+    away: float = 0.0
+
+    def update(self, history: Any, state: Any) -> Told:
+        known = [self.rooms.get(room.name, 0.0) for room in state.home.rooms]
+        return Told([share / sum(known) for share in known], self.away)
+
+
+def told(**rooms: float) -> dict[str, Any]:
+    """An algorithm that knows."""
+    away = rooms.pop("away", 0.0)
+    oracle = {"type": f"{__name__}:Oracle", "period": "1 min", "rooms": rooms, "away": away}
+    return {"algorithms": {"rtp": oracle}}
+
+
+def search(policy: str = "receding", **fields: Any) -> dict[str, Any]:
+    return {
+        "type": "find",
+        "user": "ana",
+        "policy": policy,
+        "at": ["07:10"],
+        "source": "rtp",
+        **fields,
+    }
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy: str) -> None:
+    content = home_with([search(policy), STAY], "30 min", **told(kitchen_0=1, bathroom_0=1))
+    stored = assert_same_for_every_max_span(content, 61)
+    found = [(name, step) for step, name, _ in events(stored) if name in ("find_begins", "found")]
+    assert ["find_begins", "found"] == [name for name, _ in found]
+    assert 600 == found[0][1]
+    poses, end = path(stored, "astro"), found[1][1]
+    gap = np.hypot(poses.x - 7.0, poses.y - 6.0)
+    assert gap[end : end + 60].min() < 1.6
+    assert (poses.x[-1], poses.y[-1]) == pytest.approx((1.0, 3.0), abs=0.01)
+
+
+def test_it_looks_first_where_it_is_told_to() -> None:
+    right = run(home_with([search("likeliest"), STAY], "30 min", **told(bathroom_0=1)))
+    wrong = run(home_with([search("likeliest"), STAY], "30 min", **told(bedroom_0=1)))
+    times = [
+        next(step for step, name, _ in events(one) if name == "found") for one in (right, wrong)
+    ]
+    assert times[0] + 10 < times[1]
+
+
+def test_it_gives_up_at_the_deadline() -> None:
+    content = home_with([search(deadline="2 min"), STAY], "30 min", OUT, **told(bathroom_0=1))
+    stored = assert_same_for_every_max_span(content, 61)
+    found = [(step, name) for step, name, _ in events(stored)]
+    assert [(600, "find_begins"), (720, "gave_up")] == found
+
+
+def test_it_says_not_at_home_once_all_is_looked_at_and_believed() -> None:
+    stored = run(home_with([search(), STAY], "30 min", OUT, **told(bathroom_0=1, away=0.6)))
+    assert ["find_begins", "not_at_home"] == names(stored)
+    surer = run(home_with([search(out_at=1), STAY], "30 min", OUT, **told(bathroom_0=1, away=0.6)))
+    assert ["find_begins", "gave_up"] == names(surer)
+
+
+def test_who_is_in_view_is_found_at_once() -> None:
+    content = home_with(
+        [search(), STAY], "30 min", astro={"start": [5.5, 6.0]}, **told(kitchen_0=1)
+    )
+    content["robots"]["astro"]["behaviors"][1]["waypoints"] = [[5.5, 6.0]]
+    found = [(step, name) for step, name, _ in events(run(content))]
+    assert (600, "find_begins") in found
+    assert (600, "found") in found
+
+
+def test_anyone_and_intervals_and_no_source_will_do() -> None:
+    every = {"type": "find", "every": "20 min", "deadline": "5 min"}
+    stored = run(home_with([every, STAY], "1 h 10 min"))
+    begun = [step for step, name, _ in events(stored) if name == "find_begins"]
+    assert [1200, 2400, 3600] == begun
+    assert 3 == names(stored).count("found")
+
+
+def test_it_breaks_in_and_the_patrol_goes_on() -> None:
+    patrol = {"type": "patrol", "rooms": ["kitchen", "bedroom", "living_room"], "dwell": "7 min"}
+    stored = run(home_with([search(), patrol], "1 h", **told(bathroom_0=1)))
+    assert ["find_begins", "found"] == names(stored)
+
+
+def test_a_distribution_of_an_own_algorithm_will_do() -> None:
+    stored = run(home_with([search(source="share"), STAY], "30 min", algorithms=SHARE))
+    assert "found" in names(stored)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"at": []}, "give one of them"),
+        ({"every": "1 h"}, "give one of them"),
+        ({"policy": "magic"}, "policy"),
+        ({"views": 0}, "views"),
+        ({"deadline": 0}, "longer than 0"),
+        ({"source": "rpt"}, "goes by 'rpt'.*did you mean 'rtp'"),
+    ],
+)
+def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fleet2d.Simulation(home_with([search(**fields)], **told(kitchen_0=1)))
+
+
+def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> None:
+    algorithms = {"tick": {"type": "tests.own_components:Keeper", "period": "1 min"}}
+    content = home_with([search(source="tick"), STAY], "30 min", algorithms=algorithms)
+    with pytest.raises(fleet2d.ComponentError, match=r"robots\.astro.*'tick' says nothing"):
+        run(content)
+
+
+def test_a_robot_without_a_camera_is_refused() -> None:
+    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
+        fleet2d.Simulation(home_with([search()], astro={"camera": None}, **told(kitchen_0=1)))

@@ -1,0 +1,134 @@
+"""Hangout: stand near people, out of their way, and move rarely."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from tests.entities.robots.robots import (
+    SHARE,
+    assert_same_for_every_max_span,
+    events,
+    home_with,
+    names,
+    rooms,
+)
+from tests.entities.robots.test_find import told
+from tests.homes import needs_jit
+from tests.scenes import path, run
+
+import fleet2d
+from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.robots.places import Places
+from fleet2d.errors import InputError
+
+pytestmark = needs_jit
+
+
+def hangout(**fields: Any) -> dict[str, Any]:
+    return {"type": "hangout", "source": "rtp", "explore": 0, "period": "10 min", **fields}
+
+
+@pytest.mark.parametrize("near", ["room", "view", "path"])
+def test_it_goes_where_people_are_believed_to_be(near: str) -> None:
+    content = home_with([hangout(near=near)], "40 min", **told(bathroom_0=1))
+    stored = assert_same_for_every_max_span(content, 61)
+    assert "bathroom_0" == rooms(stored)[-1]
+    assert names(stored)[-1] == "relocates"
+
+
+def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
+    content = home_with([hangout(avoid=["bathroom"])], "40 min", **told(bathroom_0=1))
+    assert "kitchen_0" == rooms(run(content))[-1]
+
+
+def test_it_stands_off_doors_ways_and_seats() -> None:
+    content = home_with([hangout()], "5 min", **told(bathroom_0=1))
+    content["floorplan"] = {"type": "bundled", "furnish": True}
+    content["robots"]["astro"].pop("start")
+    content["users"]["ana"] = "meander"
+    simulation = Simulation(content)
+    home, astro = simulation.home, simulation.actors["astro"]
+    places = Places(astro, frozenset(), off_doors=0.8)
+    points = shapely.points(home.plan.lattice.to_metres(places.points))
+    for door in home.plan.doorways:
+        line = shapely.LineString([door.start, door.end])
+        assert shapely.distance(points, line).min() >= 0.79
+    assert 0 <= places.block.min()
+    assert 0.05 < places.block.max() <= 1
+    assert 0 < places.prox.max() <= 1
+    behavior: Any = astro.behaviors[0]
+    free = int(np.argmax(-behavior.penalty))
+    assert 0 == places.block[free] == places.prox[free]
+
+
+def test_a_free_place_beats_one_in_the_way() -> None:
+    simulation = Simulation(home_with([hangout()], **told(kitchen_0=1)))
+    behavior: Any = simulation.actors["astro"].behaviors[0]
+    ways = behavior.places.block
+    assert ways.max() > 0.2
+    assert (ways == 0).any()
+
+
+def test_it_moves_rarely() -> None:
+    moody = {"algorithms": SHARE}
+    stored = run(
+        home_with([hangout(source="share", explore=0)], "12 h", {"type": "meander"}, **moody)
+    )
+    moves = [step for step, name, _ in events(stored) if name == "relocates"]
+    assert len(moves) < 12
+    careless = run(
+        home_with(
+            [hangout(source="share", hysteresis=0, moving=0)], "12 h", {"type": "meander"}, **moody
+        )
+    )
+    assert names(careless).count("relocates") >= len(moves)
+    assert min((b - a for a, b in pairwise(moves)), default=600) >= 600
+
+
+def test_it_stands_still_in_quiet_hours() -> None:
+    content = home_with([hangout(explore=1, quiet="07:30-08:30")], "2 h", **told(bathroom_0=1))
+    stored = assert_same_for_every_max_span(content, 61)
+    poses = path(stored, "astro")
+    quiet = slice(1860, 5400)  # a way that was begun before is ended
+    assert 1 == len(set(zip(poses.x[quiet].tolist(), poses.y[quiet].tolist(), strict=True)))
+    steps = [step for step, name, _ in events(stored) if name == "explores"]
+    assert [step for step in steps if 1800 <= step < 5400] == []
+    assert len([step for step in steps if step >= 5400]) >= 3
+
+
+def test_it_explores_all_rooms_with_equal_chances() -> None:
+    stored = run(home_with([hangout(explore=1)], "2 d", **told(bathroom_0=1)))
+    details = [detail for _, name, detail in events(stored) if name == "explores"]
+    found = {room: details.count(room) / len(details) for room in set(details)}
+    assert len(details) == 288
+    wanted = 1 / len(found)
+    # Five standard deviations of a share of 288 draws.
+    assert all(abs(share - wanted) < 5 * (wanted / 288) ** 0.5 for share in found.values())
+
+
+def test_turning_it_off_leaves_the_life_of_people_as_it_was() -> None:
+    meander = {"type": "meander"}
+    on = run(home_with([hangout()], "1 h", meander, **told(bathroom_0=1)))
+    off = run(home_with([], "1 h", meander, **told(bathroom_0=1)))
+    for column in ("x", "y", "heading"):
+        assert np.array_equal(getattr(path(on, "ana"), column), getattr(path(off, "ana"), column))
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"avoid": ["attic"]}, "no room 'attic'"),
+        ({"avoid": ["any"]}, "no place to hang out"),
+        ({"quiet": "22:00"}, "hours are wanted"),
+        ({"quiet": "workdays 22:00-23:00"}, "unknown day 'workdays'"),
+        ({"near": "far"}, "near"),
+        ({"explore": 1.5}, "share is 0 to 1"),
+        ({"blocking": -1}, "blocking"),
+        ({"source": "ltp"}, "goes by 'ltp'"),
+    ],
+)
+def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fleet2d.Simulation(home_with([hangout(**fields)], **told(kitchen_0=1)))

@@ -1,0 +1,64 @@
+"""Scheduled: visits at times of the day, between which others have their way."""
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, rooms
+from tests.homes import needs_jit
+from tests.scenes import run
+
+import fleet2d
+from fleet2d.errors import InputError
+
+pytestmark = needs_jit
+
+VISITS = [
+    {"at": "07:10", "place": "kitchen", "dwell": "5 min", "task": "sweep"},
+    {"at": "07:30", "place": [1.0, 6.0], "dwell": "3 min"},
+    {"at": "07:40", "place": "bathroom", "on": "weekend"},
+]
+REST = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_around": False}
+
+
+def test_visits_are_made_at_their_times_and_days() -> None:
+    content = home_with([{"type": "scheduled", "visits": VISITS}, REST])
+    stored = assert_same_for_every_max_span(content)
+    found = [(step, detail) for step, name, detail in events(stored) if name == "visits"]
+    assert ["sweep", "bedroom_0"] == [detail for _, detail in found]
+    assert 600 < found[0][0] < 620
+    assert 1800 < found[1][0] < 1830
+    assert ["living_room_0", "kitchen_0", "living_room_0", "bedroom_0", "living_room_0"] == rooms(
+        stored
+    )
+
+
+def test_visits_are_made_anew_every_day() -> None:
+    stored = run(home_with([{"type": "scheduled", "visits": VISITS[:1]}, REST], "3 d"))
+    steps = [step for step, name, _ in events(stored) if name == "visits"]
+    assert 3 == len(steps)
+    assert {86400} == {b - a for a, b in pairwise(steps)}
+
+
+def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late() -> None:
+    patient = {"type": "scheduled", "visits": VISITS[:2], "preempts": False, "late": "12 min"}
+    busy = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "20 min", "look_around": False}
+    stored = run(home_with([patient, busy]))
+    found = [(step // 60, detail) for step, name, detail in events(stored) if name == "visits"]
+    # The first is made when the robot is free, 10 min late; the second would be 16 min late.
+    assert [(20, "sweep")] == found
+
+
+@pytest.mark.parametrize(
+    ("visits", "words"),
+    [
+        ([], "visits"),
+        ([{"at": "25:00", "place": "kitchen"}], "time of day"),
+        ([{"at": "07:00", "place": "storage"}], "can't be reached"),
+        ([{"at": "07:00", "place": "kichen"}], "did you mean 'kitchen"),
+        ([{"at": "07:00", "place": "kitchen", "on": "someday"}], "on"),
+    ],
+)
+def test_visits_that_can_not_be_made_are_refused(visits: list[Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fleet2d.Simulation(home_with([{"type": "scheduled", "visits": visits}]))

@@ -1,0 +1,97 @@
+"""Where cameras are, and what lies in their angle, against trigonometry."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
+from tests.strategies import quick
+
+from fleet2d.kernels.lens import Lenses, camera_pose, in_wedge, near_wedge, points_in_view
+from fleet2d.kernels.mesh import locate
+from fleet2d.sight.camera import Camera
+from fleet2d.sight.tables import stack_lenses
+
+MIDDLE = round(SIDE_M / 2 * UNITS_PER_M)
+OFFSET = st.integers(-4000, 4000)
+
+
+def lenses(**camera: object) -> Lenses:
+    """Return one camera."""
+    lens = Camera.model_validate(camera).lens(UNITS_PER_M, 10**6)
+    return stack_lenses([lens], [False], scene())
+
+
+@quick
+@given(st.integers(0, 4095), st.floats(-1, 1), st.floats(-1, 1), st.floats(-180, 180))
+def test_a_camera_turns_with_its_body(
+    heading: int, forward: float, left: float, mount: float
+) -> None:
+    found = lenses(offset=[forward, left], heading_deg=mount)
+    x, y, towards = camera_pose(found, 0, 1000, 2000, heading, 0)
+    angle = 2 * math.pi * heading / 4096
+    along, across = (round(v * UNITS_PER_M) for v in (forward, left))
+    assert 1000 + along * math.cos(angle) - across * math.sin(angle) == pytest.approx(x, abs=0.51)
+    assert 2000 + along * math.sin(angle) + across * math.cos(angle) == pytest.approx(y, abs=0.51)
+    assert (heading + round(mount / 360 * 4096)) % 4096 == towards
+
+
+@pytest.mark.parametrize(
+    ("seconds", "degrees"), [(0, -45), (4.999, -45), (5, 0), (10, 45), (15, 0), (20, -45)]
+)
+def test_a_panning_camera_looks_where_its_turn_says(seconds: float, degrees: int) -> None:
+    found = lenses(pan={"headings_deg": [-45, 0, 45, 0], "dwell": "5 s"})
+    _, _, towards = camera_pose(found, 0, 0, 0, 1024, round(seconds * 1e6))
+    assert 1024 + degrees * 4096 // 360 == pytest.approx(towards, abs=1)
+
+
+@quick
+@given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET)
+def test_what_is_in_a_wedge_is_within_its_angle(heading: int, half: int, dx: int, dy: int) -> None:
+    off = abs((math.atan2(dy, dx) * 4096 / math.pi - 2 * heading + 4096) % 8192 - 4096)
+    if (dx, dy) != (0, 0) and abs(off - half) > 1e-2:
+        assert (off < half) == in_wedge(heading, half, dx, dy)
+
+
+@quick
+@given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET, st.integers(0, 600))
+def test_no_body_that_reaches_into_a_wedge_is_left_out(
+    heading: int, half: int, dx: int, dy: int, reach: int
+) -> None:
+    """The quick test may be wrong one way only."""
+    rim = [
+        (round(reach * math.cos(a)), round(reach * math.sin(a))) for a in np.linspace(0, 6.2, 12)
+    ]
+    if any(in_wedge(heading, half, dx + x, dy + y) for x, y in [(0, 0), *rim]):
+        assert near_wedge(heading, half, dx, dy, reach + 1)
+
+
+def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
+    found = lenses(range=[0, 5], body_points=8)
+    at = locate(HALL, MIDDLE, MIDDLE)
+    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, at, 2 * UNITS_PER_M, 0)
+    assert 9 == shown
+    behind = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, at, -2 * UNITS_PER_M, 0)
+    assert 0 == behind
+
+
+@pytest.mark.parametrize(("far", "expected"), [(1.81, 1), (2.0, 6), (2.21, 9)])
+def test_points_beyond_the_range_are_not_in_view(far: float, expected: int) -> None:
+    """A body of 20 cm at 2 m: its nearest point, then half of it, then all."""
+    found = lenses(range=[0, far], body_points=8)
+    at = locate(HALL, MIDDLE, MIDDLE)
+    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, at, 2 * UNITS_PER_M, 0)
+    assert expected == pytest.approx(shown, abs=2)
+    assert (far > 2.2) == (shown == 9)
+
+
+def test_a_pillar_hides_a_body_behind_it() -> None:
+    walls, found = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
+    at = locate(walls, MIDDLE, MIDDLE)
+    x, y = (round(v * UNITS_PER_M) for v in (3.5, 1.2))
+    assert 0 == points_in_view(walls, found, 0, 0, MIDDLE, MIDDLE, 0, at, x, y)
+    assert 9 == points_in_view(
+        HALL, found, 0, 0, MIDDLE, MIDDLE, 0, locate(HALL, MIDDLE, MIDDLE), x, y
+    )

@@ -1,0 +1,237 @@
+"""Errors of long-term and scores of real-time presence, against the stored rows of a run."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import digests, run, scenario, table
+
+import fleet2d
+from fleet2d.errors import Fleet2DError
+from fleet2d.floorplan.home import Home
+from fleet2d.metrics.presence.occupancy import walking_distances
+
+pytestmark = needs_jit
+
+ROOMS = [
+    f"{name}_0" for name in ("living_room", "kitchen", "bedroom", "bathroom", "storage", "unknown")
+]
+USERS = {
+    "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},
+    "ben": {"type": "meander"},
+    "gone": {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]},
+}
+
+
+def content(duration: str = "3 h", **changes: Any) -> dict[str, Any]:
+    return scenario(
+        duration,
+        **{
+            "users": USERS,
+            "robots": {"astro": {"type": "patrol", "dwell": "20 s"}},
+            "algorithms": {
+                "ltp": {"type": "ltp", "estimator": "likelihood"},
+                "rtp": {"type": "rtp"},
+                "last": {"type": "rtp", "model": "last_seen"},
+                "share": {"type": "ltp", "estimator": "sighting_share"},
+            },
+            "metrics": {
+                "error": {"type": "ltp_error", "of": "ltp", "period": "1 h"},
+                "gap": {"type": "ltp_gap", "of": "ltp", "period": "1 h"},
+                "with_away": {"type": "ltp_error", "of": "ltp", "given": "away", "period": "1 h"},
+                "score": {"type": "rtp_score", "of": "rtp"},
+                "naive": {"type": "rtp_score", "of": "last"},
+                "at_home": {"type": "rtp_score", "of": "rtp", "given_home": True},
+            },
+            "artifacts": {"trajectories": "every step"},
+            **changes,
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def stored():
+    return run(content())
+
+
+def places(stored: Any, user: str) -> list[str]:
+    rows = table(stored, "trajectories", entity=user)
+    return ["away" if away else room for away, room in zip(rows["away"], rows["room"], strict=True)]
+
+
+def estimate(stored: Any, algorithm: str, user: str, step: int) -> dict[str, float]:
+    rows = table(stored, algorithm, user=user)
+    at = rows["step"] == step
+    return dict(zip(rows["room"][at], rows["share"][at], strict=True))
+
+
+@pytest.mark.parametrize("user", ["ana", "ben"])
+def test_ltp_error_is_the_distance_to_what_really_was(stored: Any, user: str) -> None:
+    rows = table(stored, "error", user=user)
+    for k, step in enumerate((3599, 7199, 10799)):
+        lived = places(stored, user)[: step + 1]
+        home = [place for place in lived if place != "away"]
+        truth = {room: home.count(room) / len(home) for room in ROOMS}
+        found = estimate(stored, "ltp", user, step)
+        gaps = [abs(truth[room] - found[room]) for room in ROOMS]
+        assert sum(gaps) / 2 == pytest.approx(rows["tv"][k])
+        assert max(gaps) == pytest.approx(rows["max_gap"][k])
+        assert sum(gaps) / 6 == pytest.approx(rows["mean_gap"][k])
+        per_room = table(stored, "gap", user=user)
+        assert gaps == pytest.approx(per_room["gap"][per_room["step"] == step].tolist())
+        away = lived.count("away") / len(lived)
+        spread = [
+            abs(truth[room] * (1 - away) - found[room] * (1 - found["away"])) for room in ROOMS
+        ]
+        whole = (sum(spread) + abs(away - found["away"])) / 2
+        assert whole == pytest.approx(table(stored, "with_away", user=user)["tv"][k])
+    assert stored.metrics["error"][user]["tv"] == rows["tv"][-1]
+    assert stored.metrics["gap"][user]["mean"] == pytest.approx(rows["mean_gap"][-1])
+
+
+def test_anyone_is_where_there_is_somebody(stored: Any) -> None:
+    both = [places(stored, user) for user in USERS]
+    occupied = {room: sum(room in now for now in zip(*both, strict=True)) for room in ROOMS}
+    truth = {room: count / sum(occupied.values()) for room, count in occupied.items()}
+    found = estimate(stored, "ltp", "anyone", 10799)
+    tv = sum(abs(truth[room] - found[room]) for room in ROOMS) / 2
+    assert tv == pytest.approx(stored.metrics["error"]["anyone"]["tv"])
+
+
+def test_who_was_never_at_home_is_left_out(stored: Any) -> None:
+    for metric in ("error", "gap"):
+        assert {"ana", "ben", "anyone"} == set(stored.metrics[metric])
+    assert {"ana", "ben"} == set(stored.metrics["at_home"])
+
+
+@pytest.mark.parametrize("user", ["ana", "ben", "gone"])
+def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> None:
+    lived, observed = places(stored, user), table(stored, "observations")
+    steps = observed["step"][observed["user"] == user]  # nobody is mistaken here
+    rows = table(stored, "score", user=user)
+    counts: dict[str, int] = {}
+    for end in range(59, 10800, 60):
+        before = steps[steps <= end]
+        gap = (end - before.max()) / 60 if len(before) else math.inf
+        ends = {1: "0-1 min", 5: "1-5 min", 15: "5-15 min", 60: "15-60 min", 240: "1-4 h"}
+        name = next((name for limit, name in ends.items() if gap <= limit), "over 4 h")
+        counts[name] = counts.get(name, 0) + 1
+    result = stored.metrics["score"][user]
+    assert counts == {name: scores["bins"] for name, scores in result.items() if name != "all"}
+    assert 180 == result["all"]["bins"] == rows["bins"].sum()
+    for name in ("log_loss", "brier", "top_1"):
+        assert rows[name].sum() / 180 == pytest.approx(result["all"][name])
+    # At the end of a period the track is what was put out.
+    total = 0.0
+    for end in range(299, 10800, 300):
+        found = estimate(stored, "rtp", user, end)
+        p = {room: found[room] * (1 - found["away"]) for room in ROOMS} | {"away": found["away"]}
+        total -= math.log(max(p[lived[end]], 1e-6))
+    assert total / 36 == pytest.approx(result["all"]["log_loss"], rel=0.25)
+
+
+def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:
+    """It knows of a minute where somebody was seen most, not last."""
+    scores = {user: stored.metrics["naive"][user]["all"] for user in ("ana", "ben")}
+    for user in ("ana", "ben"):
+        assert scores[user]["top_1"] == pytest.approx(scores[user]["naive_top_1"], abs=0.1)
+        better = stored.metrics["score"][user]["all"]
+        assert better["naive_log_loss"] == scores[user]["naive_log_loss"]
+        assert better["log_loss"] < scores[user]["log_loss"]
+
+
+def test_bins_away_do_not_count_given_home(stored: Any) -> None:
+    lived = places(stored, "ana")
+    at_home = sum(lived[end] != "away" for end in range(59, 10800, 60))
+    assert at_home == stored.metrics["at_home"]["ana"]["all"]["bins"]
+
+
+def test_metrics_change_nothing(stored: Any) -> None:
+    without = digests(run(content(metrics={})))
+    with_ = digests(stored)
+    for name in ("trajectories", "observations", "ltp", "rtp"):
+        assert without[name] == with_[name]
+
+
+def test_an_algorithm_without_a_track_is_asked_for_forecasts() -> None:
+    found = run(
+        content(
+            metrics={"score": {"type": "rtp_score", "of": "ltp", "period": "30 min"}},
+            algorithms={"ltp": {"type": "ltp", "period": "30 min"}},
+        )
+    )
+    # Of the first period nothing was known.
+    assert 150 == found.metrics["score"]["ben"]["all"]["bins"]
+
+
+def test_another_period_than_that_of_the_track_is_refused() -> None:
+    with pytest.raises(Fleet2DError, match="same period"):
+        run(content(metrics={"score": {"type": "rtp_score", "of": "rtp", "period": "1 h"}}))
+
+
+def test_an_output_that_is_no_presence_is_refused() -> None:
+    from tests.scenes import OWN
+
+    algorithms = {
+        "tick": {"type": f"{OWN}:Smooth", "reads": ["share"]},
+        "share": {"type": f"{OWN}:Share"},
+    }
+    with pytest.raises(Fleet2DError, match="this metric measures presence"):
+        run(
+            content(
+                algorithms=algorithms,
+                metrics={"error": {"type": "ltp_error", "of": "tick", "period": "1 h"}},
+            )
+        )
+
+
+def test_burn_in_ends_where_the_error_stays_small() -> None:
+    from fleet2d.metrics.presence.ltp_error import LtpError
+
+    metric = LtpError(of="ltp")
+    metric.last, metric.within, metric.days = {}, {}, 0.0
+    for tv in (0.3, 0.05, 0.2, 0.1, 0.09):
+        metric.days += 1
+        metric._note("ana", {"tv": tv})
+    assert 4 == metric.result()["ana"]["burn_in_day"]
+    metric._note("ana", {"tv": 0.11})
+    assert "burn_in_day" not in metric.result()["ana"]
+
+
+def test_a_window_forgets_what_was_before() -> None:
+    """A person who changed rooms: the truth of the last hour is the new room alone."""
+    agenda = [{"items": [{"at": "00:00", "place": "bedroom"}, {"at": "09:00", "place": "kitchen"}]}]
+    settings = {"type": "ltp_gap", "of": "ltp", "period": "30 min"}
+    found = run(
+        content(
+            users={"ana": {"type": "schedule", "days": agenda}},
+            metrics={"new": {**settings, "window": "1 h"}, "all": settings},
+        )
+    )
+    rows = {name: table(found, name, user="ana", room="kitchen_0") for name in ("new", "all")}
+    assert rows["new"]["true_share"][-1] > 0.95
+    assert rows["all"]["true_share"][-1] == pytest.approx(1 / 3, abs=0.02)
+
+
+def test_hours_of_the_week_are_compared_one_by_one() -> None:
+    week = {"type": "ltp", "estimator": "sighting_share", "by": "hour_of_week"}
+    found = run(
+        content(
+            algorithms={"week": week},
+            metrics={"e": {"type": "ltp_error", "of": "week", "given": "hour_of_week"}},
+        )
+    )
+    assert 0 < found.metrics["e"]["ben"]["tv"] < 1
+    assert "earth_mover_m" not in found.metrics["e"]["ben"]
+
+
+def test_walking_distances_are_symmetric_and_far_where_no_way_leads() -> None:
+    plan = fleet2d.Simulation(content()).home.plan
+    metres = walking_distances(Home(plan))
+    assert np.array_equal(metres, metres.T)
+    assert (np.diagonal(metres) == 0).all()
+    reached = metres[:4, :4]
+    assert 2 * reached.max() == metres[4, 0]
+    assert 2.5 < metres[0, 1] < 8

@@ -1,0 +1,268 @@
+"""Metrics of robots among people, against what an every-step record of a run says."""
+
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.entities.robots.robots import CAMERA, events
+from tests.entities.robots.test_find import told
+from tests.homes import needs_jit
+from tests.scenes import flat_document, run, scenario, table
+
+from fleet2d import Algorithm, Metric
+from fleet2d.artifacts.reader import Run
+from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
+
+pytestmark = needs_jit
+
+BATTERY = {"driving": "20 min", "standing": "1 h", "charging": "10 min", "charger": [1.0, 3.0]}
+OUT_LATER = {
+    "days": [{"items": [{"at": "00:00", "place": [7.0, 6.0]}, {"at": "08:10", "away": True}]}]
+}
+METRICS = (
+    "co_presence",
+    "reach_time",
+    "intrusion",
+    "blocking",
+    "travel",
+    "time_to_find",
+    "coverage",
+    "battery",
+)
+
+
+def content(period: str = "17 min") -> dict[str, Any]:
+    find = {"type": "find", "user": "ana", "every": "9 min", "deadline": "3 min", "source": "rtp"}
+    return scenario(
+        "1 h 40 min",
+        users={"ana": {"type": "schedule", **OUT_LATER}, "ben": {"type": "meander", "speed": 0.7}},
+        robots={
+            "astro": {
+                "start": [1.0, 3.0],
+                "camera": CAMERA,
+                "battery": BATTERY,
+                "behaviors": ["dock", find, {"type": "patrol", "dwell": "90 s"}],
+            },
+            "bolt": {"type": "meander"},
+        },
+        metrics={name: {"period": period} for name in METRICS},
+        artifacts={"trajectories": "every step"},
+        **told(bathroom_0=1, kitchen_0=1, away=0.4),
+    )
+
+
+@pytest.fixture(scope="module")
+def stored() -> Run:
+    """A run whose length is no multiple of the metrics' period."""
+    return run(content())
+
+
+def poses(stored: Run, name: str) -> dict[str, Any]:
+    return table(stored, "trajectories", entity=name)
+
+
+def gaps(stored: Run, robot: str, user: str) -> Any:
+    one, other = poses(stored, robot), poses(stored, user)
+    return np.hypot(one["x"] - other["x"], one["y"] - other["y"])
+
+
+@pytest.mark.parametrize("period", ["11 min", "1 d"])
+def test_results_do_not_depend_on_the_period(stored: Run, period: str) -> None:
+    other = run(content(period)).metrics
+    for metric in METRICS:
+        assert flat(other[metric]) == {
+            k: pytest.approx(v, rel=1e-9) for k, v in flat(stored.metrics[metric]).items()
+        }
+
+
+def flat(result: Any, path: str = "") -> dict[str, Any]:
+    if not isinstance(result, dict):
+        return {path: result}
+    return {k: v for key, value in result.items() for k, v in flat(value, f"{path}.{key}").items()}
+
+
+@pytest.mark.parametrize(("robot", "user"), [("astro", "ana"), ("bolt", "ben")])
+def test_co_presence_is_the_share_of_time_at_home_in_the_same_room(
+    stored: Run, robot: str, user: str
+) -> None:
+    one, other = poses(stored, robot), poses(stored, user)
+    home = ~other["away"]
+    together = home & (one["room"] == other["room"])
+    assert stored.metrics["co_presence"][robot][user] == pytest.approx(together.sum() / home.sum())
+
+
+def test_intrusion_is_the_time_in_each_zone_without_a_wall_between(stored: Run) -> None:
+    space = shapely.union_all(
+        [shapely.Polygon(f["outline"], f["holes"]) for f in flat_document()["free"]]
+    )
+    shapely.prepare(space)
+    one, other, gap = poses(stored, "bolt"), poses(stored, "ben"), gaps(stored, "bolt", "ben")
+    near = np.flatnonzero(gap < 3.6)
+    ends = np.stack([np.stack([p["x"], p["y"]], axis=1)[near] for p in (one, other)], axis=1)
+    clear = shapely.contains_properly(space, shapely.linestrings(ends))
+    found = stored.metrics["intrusion"]["bolt"]["ben"]
+    for zone, low, high in (("intimate", 0, 0.45), ("personal", 0.45, 1.2), ("social", 1.2, 3.6)):
+        minutes = (clear & (gap[near] >= low) & (gap[near] < high)).sum() / 60
+        # A line that all but touches a corner may be told otherwise.
+        assert found[zone] == pytest.approx(minutes / (6000 / 86400), abs=0.05 * 14.4)
+    assert found["social"] > 10
+
+
+def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored: Run) -> None:
+    ben, gap = poses(stored, "ben"), gaps(stored, "bolt", "ben")
+    steps = []
+    for k in range(1, len(gap)):
+        moves = (ben["x"][k], ben["y"][k]) != (ben["x"][k - 1], ben["y"][k - 1])
+        steps.append(bool(moves and (gap[k] < 0.4 or gap[k - 1] < 0.4)))
+    found = stored.metrics["blocking"]["bolt"]["ben"]
+    assert sum(steps) > 3
+    assert found["seconds"] == pytest.approx(sum(steps) * 14.4)
+    assert found["blocks"] == pytest.approx(sum(1 for hit, _ in groupby(steps) if hit) * 14.4)
+
+
+def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
+    astro = poses(stored, "astro")
+    rests = []
+    for place, steps in groupby(zip(astro["x"].tolist(), astro["y"].tolist(), strict=True)):
+        if sum(1 for _ in steps) >= 60:
+            rests.append(place)
+    moves = sum(np.hypot(a[0] - b[0], a[1] - b[1]) > 0.5 for a, b in pairwise(rests))
+    found = stored.metrics["travel"]["astro"]
+    assert moves > 10
+    assert found["relocations"] == pytest.approx(moves * 14.4)
+    metres = np.hypot(np.diff(astro["x"]), np.diff(astro["y"])).sum()
+    assert found["metres"] == pytest.approx(metres * 14.4)
+
+
+def test_reach_time_is_the_way_at_call_times_divided_by_speed(stored: Run) -> None:
+    home_steps = np.flatnonzero(~poses(stored, "ana")["away"])
+    calls = [k for k in range(0, 6000, 600) if k in set(home_steps.tolist())]
+    found = stored.metrics["reach_time"]["astro"]["ana"]
+    assert len(calls) == found["calls"]
+    straight = gaps(stored, "astro", "ana")[calls] / 0.6
+    assert straight.mean() <= found["mean"] <= 3 * straight.mean()
+    assert found["mean"] <= found["p90"]
+
+
+def test_coverage_is_what_the_layer_says_at_the_end(stored: Run) -> None:
+    found = stored.metrics["coverage"]["astro"]
+    assert 0.5 < found["share"] < 1
+    assert 0 < found["half_h"] <= 1.67
+    rows = table(stored, "coverage", robot="astro")
+    assert rows["share"].tolist() == sorted(rows["share"].tolist())
+    assert rows["share"][-1] == pytest.approx(found["share"])
+
+
+def test_battery_tells_the_lowest_charge_and_the_dockings(stored: Run) -> None:
+    found = stored.metrics["battery"]["astro"]
+    told_ = [
+        (step, name, float(d.split()[0]))
+        for step, name, d in events(stored)
+        if name in ("battery", "docks", "charged")
+    ]
+    assert found["lowest"] == pytest.approx(min(level for *_, level in told_) / 100)
+    docks = [step for step, name, _ in told_ if name == "docks"]
+    assert found["dockings"] == pytest.approx(len(docks) * 14.4)
+    assert 0 < found["charging"] < 1
+    assert {"astro"} == set(stored.metrics["battery"])
+
+
+def test_time_to_find_tells_outcomes_and_times(stored: Run) -> None:
+    rows = table(stored, "time_to_find", robot="astro")
+    begun = [step for step, name, _ in events(stored) if name == "find_begins"]
+    ends = [
+        (step, name)
+        for step, name, _ in events(stored)
+        if name in ("found", "gave_up", "not_at_home")
+    ]
+    assert begun[: len(rows["began"])] == rows["began"].tolist()
+    assert [name for _, name in ends] == rows["end"].tolist()
+    assert [step - b for (step, _), b in zip(ends, begun, strict=False)] == rows["seconds"].tolist()
+    home = rows["at_home"]
+    assert home.any()
+    assert (~home).any()
+    found = stored.metrics["time_to_find"]["astro"]
+    assert found["success"] == pytest.approx((rows["end"][home] == "found").mean())
+    assert found["out_told"] == pytest.approx((rows["end"][~home] == "not_at_home").mean())
+    assert 0 < found["spl"] <= 1 <= found["ratio"]
+    assert found["median"] <= found["p90"] if "p90" in found else True
+
+
+# --- Survival ----------------------------------------------------------------------------------
+
+
+@given(st.lists(st.tuples(st.integers(1, 50), st.booleans()), min_size=1, max_size=30))
+def test_kaplan_meier_is_the_product_over_times(rows: list[tuple[int, bool]]) -> None:
+    times, happened = [float(t) for t, _ in rows], [h for _, h in rows]
+    curve = kaplan_meier(times, happened)
+    for time, left in curve:
+        product = 1.0
+        for t in range(1, int(time) + 1):
+            at_risk = len([1 for other in times if other >= t])
+            product *= 1 - len([1 for o, h in rows if o == t and h]) / at_risk
+        assert left == pytest.approx(product)
+
+
+@given(st.lists(st.integers(1, 50), min_size=1, max_size=30))
+def test_without_cuts_it_is_the_sample(times: list[int]) -> None:
+    curve = kaplan_meier([float(t) for t in times], [True] * len(times))
+    assert restricted_mean(curve, 60.0) == pytest.approx(np.mean(times))
+    assert quantile(curve, 0.5) == pytest.approx(np.quantile(times, 0.5, method="inverted_cdf"))
+
+
+def test_what_never_happens_has_no_median_and_the_deadline_for_a_mean() -> None:
+    curve = kaplan_meier([10.0, 10.0], [False, False])
+    assert quantile(curve, 0.5) is None
+    assert 10.0 == restricted_mean(curve, 10.0)
+
+
+# --- Events ------------------------------------------------------------------------------------
+
+
+class Diary(Metric):
+    """Keeps what plans said happened, period by period."""
+
+    def start(self, home: Any) -> None:
+        self.found: list[list[Any]] = []
+
+    def update(self, history: Any, state: Any) -> None:
+        self.found += [list(event) for event in history.events]
+
+    def result(self) -> dict[str, Any]:
+        return {"events": self.found}
+
+
+@pytest.mark.parametrize("period", ["1 s", "7 min", "1 d"])
+def test_history_has_the_events_of_the_table(period: str) -> None:
+    told_events = content()
+    told_events["simulation"]["duration"] = "40 min"
+    told_events["metrics"] = {"diary": {"type": f"{__name__}:Diary", "period": period}}
+    stored = run(told_events)
+    rows = table(stored, "events")
+    columns = [rows[name].tolist() for name in ("step", "entity", "event", "detail")]
+    sights = ("user_seen", "user_lost")
+    expected = [list(row) for row in zip(*columns, strict=True) if row[2] not in sights]
+    found = stored.metrics["diary"]["events"]
+    assert len(expected) > 10
+    # Rows of one step and body may be stored in another order.
+    assert sorted(expected) == sorted(found)
+    assert [row[0] for row in found] == sorted(row[0] for row in found)
+
+
+class Listener(Algorithm):
+    """Keeps the names of those whose events it hears."""
+
+    def update(self, history: Any, state: Any) -> dict[str, Any]:
+        return {"names": ",".join(sorted({event.entity for event in history.events}))}
+
+
+def test_algorithms_hear_of_the_events_of_robots_only() -> None:
+    told_events = content()
+    told_events["algorithms"]["listener"] = {"type": f"{__name__}:Listener", "period": "50 min"}
+    stored = run(told_events)
+    assert {"astro"} == set(table(stored, "listener")["names"].tolist())
+    assert "ana" in table(stored, "events")["entity"].tolist()

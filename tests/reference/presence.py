@@ -1,0 +1,128 @@
+"""Slow, obvious twins of the estimators and measures of presence: loops, and all paths of a chain."""
+
+import cmath
+import math
+from collections.abc import Sequence
+from itertools import permutations, product
+from typing import Any
+
+import numpy as np
+
+WEEK = 10_080
+
+
+def sighting_share(seen: Any) -> list[float]:
+    """Sightings per room by all sightings; seen[bin][room] of one user."""
+    rooms = len(seen[0])
+    counts = [sum(bin_[room] for bin_ in seen) for room in range(rooms)]
+    return [c / sum(counts) for c in counts] if sum(counts) else [1 / rooms] * rooms
+
+
+def exposure_ratio(
+    seen: Any, watched: Any, bin_steps: int, detection: float
+) -> tuple[list[float], float]:
+    """Sightings by exposure with one bin of average beforehand; shares at home, and away."""
+    rooms = range(len(seen[0]))
+    n = [sum(b[r] for b in seen) / bin_steps for r in rooms]
+    e = [sum(b[r] for b in watched) for r in rooms]
+    average = sum(n) / sum(e) if sum(e) else 0.0
+    rate = [(n[r] + average) / (e[r] + 1) for r in rooms]
+    if not sum(rate):
+        return [1 / len(rate)] * len(rate), 1.0 if sum(e) else 0.0
+    return [x / sum(rate) for x in rate], max(0.0, 1 - sum(rate) / detection)
+
+
+def chain_posterior(transition: Any, start: Any, likelihood: Any) -> tuple[Any, Any, Any]:
+    """Filtered and smoothed probabilities, and expected steps, by summing over all paths."""
+    bins, states = np.shape(likelihood)
+    smoothed, pairs = np.zeros((bins, states)), np.zeros((states, states))
+    total = 0.0
+    for path in product(range(states), repeat=bins + 1):
+        p = start[path[0]]
+        for t in range(bins):
+            p *= transition[path[t]][path[t + 1]] * likelihood[t][path[t + 1]]
+        total += p
+        for t in range(bins):
+            smoothed[t, path[t + 1]] += p
+            pairs[path[t], path[t + 1]] += p
+    filtered = []
+    for end in range(1, bins + 1):
+        last = np.zeros(states)
+        for path in product(range(states), repeat=end + 1):
+            p = start[path[0]]
+            for t in range(end):
+                p *= transition[path[t]][path[t + 1]] * likelihood[t][path[t + 1]]
+            last[path[-1]] += p
+        filtered.append(last / last.sum())
+    return np.array(filtered), smoothed / total, pairs / total
+
+
+def missed(
+    w: Any, seen: Any, unknown: Any, bin_steps: int, d: float, m: float, views: int
+) -> list[list[float]]:
+    """Chance of not being perceived in each bin and room, for one user whom nobody knew before."""
+    table = []
+    for t, row in enumerate(w):
+        values = []
+        for r, share in enumerate(row):
+            before = seen[t - 1][r] > 0 if t else seen[0][r] > 0
+            same = t > 0 and abs(share - w[t - 1][r]) <= 0.02 * share
+            if unknown[t][r] or share == 0:
+                value = 1.0
+            elif before:
+                value = 1 - d * (1 - m * (1 - share)) if same else 1 - d * share
+            elif same:
+                out = (1 - share) / (1 - share + share * (1 - d) ** 2)
+                value = out * (1 - m * share * d) + (1 - out) * (1 - d)
+            else:
+                value = 1 - d * (1 - (1 - share) ** min(views, bin_steps))
+            values.append(value)
+        table.append(values)
+    return table
+
+
+def fremen(minutes: Sequence[int], weight: Any, state: Any, days: int, m: int, at: int) -> float:
+    """The forecast of order m at a minute of the week, from samples of one room, by definition."""
+    n = sum(weight)
+    mean = sum(state) / n
+    found = []
+    for i in range(1, 101):
+        turn = [cmath.exp(2j * math.pi * t * i / WEEK) for t in minutes]
+        gamma = sum((s - mean * w) * z for s, w, z in zip(state, weight, turn, strict=True)) / n
+        if 1.5 * 7 / i <= days:
+            found.append((abs(gamma), i, cmath.phase(gamma)))
+    found.sort(key=lambda f: -f[0])
+    p = mean + sum(2 * a * math.cos(2 * math.pi * at * i / WEEK - phi) for a, i, phi in found[:m])
+    return min(max(p, 0.0), 1.0)
+
+
+def earth_mover(truth: Sequence[int], estimate: Sequence[int], cost: Any) -> float:
+    """The cheapest assignment of units to units, by trying all; weights are whole numbers."""
+    here = [room for room, count in enumerate(estimate) for _ in range(count)]
+    there = [room for room, count in enumerate(truth) for _ in range(count)]
+    assert len(here) == len(there)
+    best = min(
+        sum(cost[i][j] for i, j in zip(here, order, strict=True)) for order in permutations(there)
+    )
+    return best / len(here)
+
+
+def brier(p: Sequence[float], truth: int) -> float:
+    """Sum of squares to the true place."""
+    return sum((x - (1 if i == truth else 0)) ** 2 for i, x in enumerate(p))
+
+
+def calibration_error(p: Any, truth: Sequence[int], masses: int) -> float:
+    """Gap between accuracy and confidence, by groups of equal size."""
+    rows = sorted(
+        ((max(row), i, row, t) for i, (row, t) in enumerate(zip(p, truth, strict=True))),
+        key=lambda r: (r[0], r[1]),
+    )
+    total = 0.0
+    for g in range(masses):
+        group = rows[g * len(rows) // masses : (g + 1) * len(rows) // masses]
+        if group:
+            right = sum((list(row).index(max(row)) == t) for _, _, row, t in group) / len(group)
+            sure = sum(c for c, *_ in group) / len(group)
+            total += len(group) / len(rows) * abs(right - sure)
+    return total

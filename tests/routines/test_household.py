@@ -1,0 +1,147 @@
+"""Households: days that agree, whoever works them out, and what only one can use at a time."""
+
+from datetime import date
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+from tests.routines.days import DAY_S, MONDAY, violations
+
+from fleet2d.routines.activity import catalogue
+from fleet2d.routines.household import LONG_GONE_S, WELCOME, Household, Lives
+from fleet2d.routines.planner import Doing
+
+CROWD = {
+    "ana": "works_outside",
+    "ben": "works_from_home",
+    "cleo": "child",
+    "dan": "night_shift",
+    "eve": "student",
+    "vera": "retired",
+}
+DINNER = {"dinner": {"at": "18:45", "spread": "10 min", "on": "daily", "takes": "35 min"}}
+
+
+def lives(seed: int = 4, members: dict[str, Any] = CROWD, **more: Any) -> Lives:
+    household = Household.model_validate({"members": members, **more})
+    return Lives(household, seed, MONDAY - 1)
+
+
+def at_home(doing: Doing) -> bool:
+    return not catalogue()[doing.activity].away
+
+
+def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for() -> None:
+    straight = lives(welcome=0.5)
+    days = [straight.day(MONDAY + i) for i in range(30)]
+    hopping = lives(welcome=0.5)
+    assert [days[20], days[3], days[29], days[12]] == [
+        hopping.day(MONDAY + i) for i in (20, 3, 29, 12)
+    ]
+
+
+def test_no_day_of_a_crowded_household_breaks_a_constraint() -> None:
+    home = lives()
+    for i in range(60):
+        today, after = home.day(MONDAY + i), home.day(MONDAY + i + 1)
+        for name, persona in home.household.members.items():
+            found = violations(persona, MONDAY + i, today[name], after[name])
+            # Who finds the bathroom taken all the time does without.
+            assert [] == [v for v in found if "left out" not in v], name
+
+
+def test_the_bathroom_is_planned_for_one_at_a_time_even_by_those_who_are_up_at_night() -> None:
+    home = lives()
+    used = sorted(
+        (doing.begin + i * DAY_S, doing.end + i * DAY_S, name)
+        for i in range(-1, 60)
+        for name, day in home.day(MONDAY + i).items()
+        for doing in day
+        if catalogue()[doing.activity].exclusive
+    )
+    assert {name for _, _, name in used} == set(CROWD)
+    assert [] == [(a, b) for a, b in pairwise(used) if a[1] > b[0]]
+
+
+def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
+    home = lives(members={n: CROWD[n] for n in ("ana", "ben", "cleo")}, together=DINNER)
+    times = []
+    for i in range(100):
+        day = home.day(MONDAY + i)
+        found = {(d.begin, d.end) for name in day for d in day[name] if d.task == "dinner"}
+        assert len(found) == 1
+        times += found
+    assert len({begin for begin, _ in times}) > 50
+
+
+def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home() -> None:
+    home = lives(welcome=0.5)
+    welcomed = came = 0
+    for i in range(30):
+        day = home.day(MONDAY + i)
+        comings = {
+            after.begin: name
+            for name, doings in day.items()
+            for gone, after in pairwise(doings)
+            if at_home(after) and not at_home(gone) and gone.end - gone.begin >= LONG_GONE_S
+        }
+        came += len(comings)
+        for doings in day.values():
+            assert all(a.end == b.begin for a, b in pairwise(doings))
+            welcomes = [doing for doing in doings if doing.activity == WELCOME]
+            assert all(doing.begin in comings for doing in welcomes)
+            welcomed += len(welcomes)
+    assert 0 < came < welcomed
+
+
+def test_nobody_comes_to_the_door_unless_asked_for() -> None:
+    day = lives().day(MONDAY)
+    assert all(doing.activity != WELCOME for doings in day.values() for doing in doings)
+
+
+def test_members_are_away_on_trips_and_visitors_outside_their_visits() -> None:
+    home = lives(
+        trips={"ana": [["2026-01-06", "2026-01-08T12:00"]]},
+        visits={"vera": [["2026-01-09T17:00", "2026-01-11T16:00"]]},
+        away=[["2026-01-20", "2026-01-25"]],
+    )
+
+    def here(name: str, day: str, hour: float) -> bool:
+        ordinal = date.fromisoformat(day).toordinal()
+        for start in (ordinal - 1, ordinal):
+            for doing in home.day(start)[name]:
+                at = hour * 3600 + (ordinal - start) * DAY_S
+                if doing.begin <= at < doing.end:
+                    return at_home(doing)
+        raise AssertionError
+
+    assert [False, False, True] == [here("ana", f"2026-01-{d}", h) for d, h in (("06", 3), ("07", 23), ("08", 23))]  # fmt: skip
+    assert [False, True, False] == [here("vera", f"2026-01-{d}", 3) for d in ("09", "10", "12")]
+    assert not any(here(name, "2026-01-22", 3) for name in CROWD)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"trips": {"zoe": []}}, ["trips", "zoe", "no member"]),
+        ({"visits": {"anna": []}}, ["visits", "anna", "did you mean 'ana'"]),
+        ({"welcome": 2}, ["welcome"]),
+        ({"couples": [["ana", "zoe"]]}, ["zoe", "no member"]),
+        ({"together": {"dance": {"at": "18:00", "on": "daily"}}}, ["dance", "no activity"]),
+        ({"together": {"dinner": {"on": "daily"}}}, ["'at' or 'between'"]),
+        ({"members": {}}, ["members"]),
+    ],
+)
+def test_what_is_no_household_is_refused_in_plain_words(
+    more: dict[str, Any], words: list[str]
+) -> None:
+    with pytest.raises(ValidationError) as caught:
+        Household.model_validate({"members": CROWD, **more})
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_days_before_the_first_are_not_made_up() -> None:
+    with pytest.raises(ValueError, match="known from"):
+        lives().day(MONDAY - 2)

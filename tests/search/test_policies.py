@@ -1,0 +1,152 @@
+"""Orders of looks: the exact one is never beaten on its own model."""
+
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fleet2d.search.policies import (
+    MOST_EXACT,
+    after_empty_looks,
+    exact,
+    greedy,
+    likeliest_first,
+    nearest_first,
+    order_by,
+    random_order,
+    receding,
+)
+from fleet2d.search.problem import SearchProblem, clairvoyant_time, play, search_problem
+from fleet2d.streams import Draws, stream_key
+
+DRAWS = Draws(stream_key(4, "robots.astro", "order"), 0)
+HEURISTICS = (nearest_first, likeliest_first, greedy, receding)
+
+
+@st.composite
+def problems(draw: Any, most: int = 6) -> SearchProblem:
+    """Small searches: whole seconds, chances in per mill, not always somebody there."""
+    count = draw(st.integers(1, most))
+    seconds = st.integers(0, 60)
+    weights = draw(st.lists(st.integers(0, 20), min_size=count + 1, max_size=count + 1))
+    prior = np.array(weights[:count]) / max(sum(weights), 1)
+    row = st.lists(seconds, min_size=count, max_size=count)
+    return search_problem(
+        prior,
+        draw(row),
+        draw(st.lists(row, min_size=count, max_size=count)),
+        draw(row),
+        draw(st.lists(st.sampled_from([0.3, 0.9, 1.0]), min_size=count, max_size=count)),
+    )
+
+
+@given(problems())
+@settings(max_examples=60, deadline=None)
+def test_exact_order_is_the_best_of_all_orders(problem: SearchProblem) -> None:
+    costs = [play(problem, order).cost for order in permutations(range(len(problem.prior)))]
+    assert play(problem, exact(problem)).cost == pytest.approx(min(costs), abs=1e-9)
+
+
+@given(problems(most=10))
+@settings(max_examples=60, deadline=None)
+def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> None:
+    best = play(problem, exact(problem)).cost
+    for policy in HEURISTICS:
+        assert best <= play(problem, policy(problem)).cost + 1e-9
+    assert best <= play(problem, random_order(problem, DRAWS)).cost + 1e-9
+
+
+@given(problems(most=10))
+@settings(max_examples=60, deadline=None)
+def test_every_policy_looks_at_every_site_once(problem: SearchProblem) -> None:
+    sites = list(range(len(problem.prior)))
+    for name in ("random", "nearest", "likeliest", "greedy", "exact", "receding"):
+        assert sites == sorted(order_by(name, problem, DRAWS))  # type: ignore[arg-type]
+
+
+@given(problems(most=8))
+@settings(max_examples=60, deadline=None)
+def test_nobody_is_faster_than_the_clairvoyant_where_ways_are_shortest(
+    problem: SearchProblem,
+) -> None:
+    # By way of others no site is nearer than straight ahead, and a look finds for sure.
+    travel = problem.travel + problem.reach[None, :]
+    sure = problem._replace(travel=travel, detect=np.ones_like(problem.detect))
+    for policy in (*HEURISTICS, exact):
+        assert clairvoyant_time(sure) <= play(sure, policy(sure)).mean + 1e-9
+
+
+@given(problems(most=8))
+@settings(max_examples=40, deadline=None)
+def test_a_horizon_that_holds_all_sites_is_exact(problem: SearchProblem) -> None:
+    assert exact(problem) == receding(problem, horizon=8)
+
+
+def test_each_heuristic_goes_by_what_it_says() -> None:
+    travel = np.full((3, 3), 10.0)
+    problem = search_problem([0.1, 0.3, 0.6], [1, 4, 30], travel)
+    assert 0 == nearest_first(problem)[0]
+    assert 2 == likeliest_first(problem)[0]
+    assert 0 == greedy(problem)[0]  # 0.1 a second, beside 0.075 and 0.02
+
+
+def test_looks_that_may_miss_can_be_repeated() -> None:
+    problem = search_problem([0.8], [10], [[0]], look=5, detect=0.5)
+    found = play(problem, [0, 0, 0])
+    assert [15.0, 20.0, 25.0] == found.time.tolist()
+    assert [0.4, 0.2, 0.1] == pytest.approx(found.chance.tolist())
+    assert found.success == pytest.approx(0.7)
+
+
+def test_restricted_mean_counts_what_is_not_found_as_the_deadline() -> None:
+    problem = search_problem([0.5, 0.3], [4, 1], [[0, 5], [5, 0]], look=2)
+    found = play(problem, [1, 0])  # after 3 s with 0.3, after 10 s with 0.5, else never
+    assert found.restricted_mean(9) == pytest.approx(0.3 * 3 + 0.7 * 9)
+    assert found.restricted_mean(100) == pytest.approx(0.3 * 3 + 0.5 * 10 + 0.2 * 100)
+
+
+def test_sixteen_sites_are_solved_and_more_are_refused() -> None:
+    rng = np.random.default_rng(4)
+    places = rng.uniform(0, 10, (MOST_EXACT + 1, 2))
+    travel = np.sqrt(((places[:, None] - places[None]) ** 2).sum(axis=-1))
+    weights = rng.uniform(size=MOST_EXACT + 1)
+    problem = search_problem(weights / weights.sum(), travel[0], travel)
+    with pytest.raises(ValueError, match="17 sites"):
+        exact(problem)
+    fewer = SearchProblem(
+        problem.prior[:-1], problem.reach[:-1], problem.travel[:-1, :-1],
+        problem.look[:-1], problem.detect[:-1],
+    )  # fmt: skip
+    best = play(fewer, exact(fewer)).cost
+    for policy in HEURISTICS:
+        assert best <= play(fewer, policy(fewer)).cost
+    assert sorted(receding(problem)) == list(range(MOST_EXACT + 1))
+
+
+def test_an_empty_look_fades_with_its_age() -> None:
+    prior = np.array([0.5, 0.5])
+    fresh = after_empty_looks(prior, np.array([0.0, np.inf]), 600, 0.8)
+    older = after_empty_looks(prior, np.array([600.0, np.inf]), 600, 0.8)
+    assert fresh.tolist() == pytest.approx([0.1, 0.5])
+    assert older.tolist() == pytest.approx([0.3, 0.5])
+    assert [0.5, 0.5] == after_empty_looks(prior, np.array([5.0, np.inf]), 0).tolist()
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"prior": [0.7, 0.7]}, "more than one"),
+        ({"prior": [-0.1, 0.5]}, "prior has a value"),
+        ({"reach": [1.0]}, "reach has shape"),
+        ({"travel": [[0.0], [1.0]]}, "travel has shape"),
+        ({"detect": 1.5}, "above one"),
+        ({"look": float("nan")}, "look has a value"),
+    ],
+)
+def test_problems_that_make_no_sense_are_refused(fields: dict[str, Any], words: str) -> None:
+    usual: dict[str, Any] = {"prior": [0.5, 0.5], "reach": [1, 1], "travel": np.ones((2, 2))}
+    with pytest.raises(ValueError, match=words):
+        search_problem(**{**usual, **fields})

@@ -1,0 +1,49 @@
+"""Sight in real homes, turned and mirrored, doors open and shut: the short form of the benchmark."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+
+import fleet2d
+
+pytestmark = needs_jit
+
+PLANS = {
+    "houseexpo/658e5214673c7a4e25b458e56bdb6144.json": 5,
+    "houseexpo/2deaa98e9acd1293d5224e25715c1393.json": 5,
+    "ros_maps/aws_small_house/map.yaml": 1,
+    "valetudo/roborock_s6_segments.json": 1,
+}
+"""With at least so many doors."""
+
+
+@pytest.fixture(scope="module")
+def proof() -> ModuleType:
+    """The script that compares millions of pairs."""
+    path = Path(__file__).parents[2] / "benchmarks" / "sight_proof.py"
+    spec = importlib.util.spec_from_file_location("sight_proof", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["sight_proof"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("name", "doors"), PLANS.items())
+def test_sight_agrees_with_every_wall_however_a_home_lies_and_its_doors_stand(
+    proof: ModuleType, shared_data: Path, name: str, doors: int
+) -> None:
+    plan = fleet2d.load_floorplan(shared_data / name)
+    wrong, (pairs, seen, arrangements) = proof.check_plan(plan, np.random.default_rng(7), 6)
+
+    assert [0, 0, 0, 0] == wrong.tolist()
+    assert doors <= len(plan.doorways)
+    assert 24 == arrangements
+    assert pairs > 90_000
+    assert seen > 2_000

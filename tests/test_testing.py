@@ -1,0 +1,94 @@
+"""The check of one's own algorithms: sound ones pass, each broken promise is named."""
+
+import random
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+
+from fleet2d import Algorithm, RoomDistribution
+from fleet2d.testing import check_algorithm
+
+pytestmark = needs_jit
+SHARED = [0]
+
+
+class Sound(Algorithm):
+    """Share of sightings, with a draw of its own."""
+
+    def start(self, home: Any) -> None:
+        self.counts = np.zeros(len(home.rooms))
+
+    def update(self, history: Any, state: Any) -> Any:
+        self.counts += np.bincount(history.observations.room, minlength=len(self.counts))
+        self.counts[state.random("noise").below(len(self.counts))] += 1
+        return RoomDistribution(self.counts)
+
+
+class Dice(Algorithm):
+    """Draws from the global generator."""
+
+    def update(self, history: Any, state: Any) -> Any:
+        return {"roll": random.random()}
+
+
+class Shared(Algorithm):
+    """Keeps its state in a global list."""
+
+    def update(self, history: Any, state: Any) -> Any:
+        SHARED[0] += 1
+        return {"count": SHARED[0]}
+
+
+class Opaque(Algorithm):
+    """Keeps what no file holds."""
+
+    def start(self, home: Any) -> None:
+        self.home_again = home
+
+    def update(self, history: Any, state: Any) -> Any:
+        return {"x": 1}
+
+
+class Fickle(Algorithm):
+    """Puts out other columns each time."""
+
+    def update(self, history: Any, state: Any) -> Any:
+        return {f"x{state.step}": 1}
+
+
+class NotANumber(Algorithm):
+    """Puts out NaN."""
+
+    def update(self, history: Any, state: Any) -> Any:
+        return {"x": np.nan}
+
+
+class Meddler(Algorithm):
+    """Moves a room's label for everybody."""
+
+    seen: ClassVar[list[Any]] = []
+
+    def update(self, history: Any, state: Any) -> Any:
+        state.outputs["x"] = 1
+
+
+def test_a_sound_algorithm_passes() -> None:
+    check_algorithm(Sound, period="30 min")
+
+
+@pytest.mark.parametrize(
+    ("cls", "words"),
+    [
+        (Dice, "two runs with one seed differ"),
+        (Shared, "two runs with one seed differ"),
+        (Opaque, "'home_again'"),
+        (Fickle, "the names must be the same"),
+        (NotANumber, "not finite"),
+        (Meddler, "does not support item assignment"),
+    ],
+)
+def test_each_broken_promise_is_named(cls: type[Algorithm], words: str) -> None:
+    with pytest.raises(AssertionError, match=words):
+        check_algorithm(cls)
