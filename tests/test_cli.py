@@ -107,6 +107,33 @@ def test_a_summary_for_people_names_what_matters(fleet2d: Cli) -> None:
         json.loads(out)
 
 
+def test_the_table_shows_what_matters_of_many_numbers_and_json_all(fleet2d: Cli) -> None:
+    content = small(algorithms={"rtp": {"type": "rtp"}})
+    content["metrics"] = {
+        "rtp_score": {"of": "rtp", "period": "5 min"},
+        "ltp_gap": {"of": "rtp", "period": "5 min"},
+    }
+    code, out, _ = fleet2d("run", written(content), "--out", "people", "--seed", 4)
+    assert 0 == code
+    everything = package.open_run("people").metrics
+    gaps = everything["ltp_gap"]["ana"]
+    rows = [line.split("│")[1].strip() for line in out.splitlines() if "│" in line]
+    scores = [f"ana · {name}" for name in ("log_loss", "brier", "top_1", "skill")]
+    worst = max((room for room in gaps if room != "mean"), key=lambda room: gaps[room])
+    mean = [f"{who} · {name}" for who in ("ana", "anyone") for name in ("mean", worst)]
+    assert [*mean, *scores] == rows
+    scored = everything["rtp_score"]["ana"]
+    hidden = sum(map(len, scored.values())) - 4 + 2 * (len(gaps) - 2)
+    assert f"{hidden} more numbers are in the run" in out
+    code, out, _ = fleet2d("run", written(content), "--out", "programs", "--seed", 4, "--json")
+    assert everything == json.loads(out)["metrics"]
+
+
+def test_the_table_hides_nothing_of_few_numbers(fleet2d: Cli) -> None:
+    _, out, _ = fleet2d("run", written(small()), "--out", "run")
+    assert "more numbers" not in out
+
+
 def test_quiet_prints_nothing(fleet2d: Cli) -> None:
     assert (0, "", "") == fleet2d("run", written(small()), "--out", "run", "--quiet")
     assert "complete" == package.open_run("run").status
@@ -213,6 +240,7 @@ def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> No
         {"simulation": {"durations": "1 h"}},
         {"simulaton": {}},
         {"users": {"ana": {"type": "meander", "speed": [3]}}},
+        {"algorithms": {"x": {"type": "ltp", "estimator": {"type": "likelihood", "stagez": 2}}}},
     ],
 )
 def test_what_is_wrong_does_not_fit_the_schema(
@@ -242,6 +270,7 @@ def test_components_as_json_are_a_list(fleet2d: Cli) -> None:
     types = {(kind, name) for kind in component.PACKAGES for name in component.components(kind)}
     assert types == {entry for entry in listed if entry[0] in component.PACKAGES}
     assert {("behavior", "schedule"), ("floorplan", "bundled"), ("metric", "distance")} <= listed
+    assert {("presence_estimator", "fremen"), ("presence_model", "hmm")} <= listed
 
 
 # --- show --------------------------------------------------------------------------------------
@@ -372,7 +401,7 @@ def test_ctrl_c_during_set_up_exits_130(
         raise KeyboardInterrupt
 
     scenario_file = written(small())
-    monkeypatch.setattr("fleet2d.engine.simulation.Home", interrupt)
+    monkeypatch.setattr("fleet2d.engine.world.Home", interrupt)
     code, out, err = fleet2d(command, scenario_file)
     assert (130, "") == (code, out)
     assert "Traceback" not in err

@@ -164,7 +164,8 @@ def test_known_failure_02_a_month_runs_to_its_end() -> None:
 def test_known_failure_02_ten_years_run_to_their_end() -> None:
     """Ten years, a minute at a time, and a robot that moves a dozen times a day."""
     calm = "robots.astro.behaviors.0.dwell=2 h"
-    stored = fleet2d.run(None, "simulation.duration.days=3652", "simulation.step=1 min", calm)
+    long = "simulation.duration.days=3652"
+    stored = fleet2d.run("bundled:rounds", long, "simulation.step=1 min", calm)
     assert ("complete", 3652 * 1440) == (stored.status, stored.manifest["steps"])
     days = table(stored, "trajectories", entity="ana")
     assert 3652 * 24 == len(days["step"])

@@ -44,6 +44,8 @@ PACKAGES = {
     "behavior": "fleet2d.entities",
     "object": "fleet2d.entities.objects",
     "algorithm": "fleet2d.algorithms",
+    "presence_estimator": "fleet2d.algorithms.presence",
+    "presence_model": "fleet2d.algorithms.presence",
     "metric": "fleet2d.metrics",
     "sight": "fleet2d.sight",
 }

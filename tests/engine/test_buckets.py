@@ -94,7 +94,7 @@ def test_every_draw_of_every_camera_has_a_stream_of_its_own() -> None:
     content["robots"]["curio"]["perception"] = robot["perception"]
     simulation = fleet2d.Simulation(content)
     keys: list[int] = []
-    for eye in simulation._eyes:
+    for eye in simulation._world.eyes:
         used = eye.errors.keys if eye.errs else eye.errors.keys[..., :1]
         keys += used.ravel().tolist() + eye.errors.ghost_keys.ravel().tolist()
         keys += [key for sense in eye.activity_senses for key in sense.keys.tolist()]
@@ -103,5 +103,5 @@ def test_every_draw_of_every_camera_has_a_stream_of_its_own() -> None:
 
 
 def test_a_run_without_users_or_without_robots_has_no_eyes() -> None:
-    assert not fleet2d.Simulation(scenario(robots={"r": {}}))._eyes
-    assert not fleet2d.Simulation(scenario(users={"ana": {}}))._eyes
+    assert not fleet2d.Simulation(scenario(robots={"r": {}}))._world.eyes
+    assert not fleet2d.Simulation(scenario(users={"ana": {}}))._world.eyes

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.entities.robots.robots import (
+    OUT,
     assert_same_for_every_max_span,
     home_with,
     names,
@@ -118,6 +119,7 @@ def test_events_at_the_begin_of_a_plan_are_told_though_it_waits() -> None:
     still = {"type": "patrol", "waypoints": [[3.0, 3.5]], "dwell": "1 d", "look_around": False}
     content = polite(stands(3.6, 3.5), [find, still], patience="1 min")
     content["robots"]["astro"]["start"] = [3.0, 3.5]
+    content["users"]["ben"] = OUT
     stored = assert_same_for_every_max_span(content, 61)
     assert ["find_begins", "gave_up"] == [n for n in names(stored) if n != "gives_way"]
 

@@ -106,6 +106,21 @@ def test_reading_what_is_missing_is_refused_with_what_there_is() -> None:
         assert word in str(caught.value)
 
 
+@pytest.mark.parametrize("type_", ["ltp_error", "ltp_gap", "rtp_score"])
+def test_a_metric_of_an_algorithm_that_is_missing_is_refused_with_what_there_is(type_: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        fleet2d.Simulation(
+            watched(algorithms=chain(ltp=[]), metrics={"error": {"type": type_, "of": "lpt"}})
+        )
+    for word in ("metrics.error", "'lpt'", "did you mean 'ltp'"):
+        assert word in str(caught.value)
+
+
+def test_a_metric_of_an_algorithm_is_refused_where_there_is_none() -> None:
+    with pytest.raises(ScenarioError, match="There are: none"):
+        fleet2d.Simulation(watched(metrics={"error": {"type": "ltp_error", "of": "ltp"}}))
+
+
 def test_a_reader_sees_the_output_of_the_same_step_others_that_of_before() -> None:
     seen: dict[str, list[Any]] = {"reader": [], "behavior": [], "metric": []}
 

@@ -3,12 +3,10 @@
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
 import pytest
-from tests.scenes import digests, every_step, everything, path, run, scenario, table
+from tests.scenes import digests, every_step, everything, run, scenario, table
 
 from fleet2d.engine import recorder
-from fleet2d.errors import ScenarioError
 
 
 def small(**artifacts: Any) -> dict[str, Any]:
@@ -55,39 +53,6 @@ def test_rows_are_in_order_of_step_and_entity(name: str) -> None:
         assert len(keys) == len(set(keys))
     assert len(keys) > 20
     assert keys == sorted(keys)
-
-
-@pytest.mark.parametrize(
-    ("every", "steps"), [("1 min", 60), ("10 min", 600), ("every step", 1), ("1 s", 1), (90, 90)]
-)
-def test_trajectories_are_stored_as_often_as_asked(every: Any, steps: int) -> None:
-    rows = table(run(small(trajectories=every)), "trajectories", entity="ben")
-    assert list(range(0, 1800, steps)) == rows["step"].tolist()
-
-
-def test_what_is_sampled_rarely_is_part_of_what_is_sampled_often() -> None:
-    often, rarely = (
-        table(run(small(trajectories=every)), "trajectories") for every in ("every step", "3 min")
-    )
-    kept = often["step"] % 180 == 0
-    for column, values in rarely.items():
-        assert often[column][kept].tolist() == values.tolist()
-
-
-def test_stored_poses_are_those_rebuilt_from_key_frames() -> None:
-    stored = run(everything("1 h"), "artifacts.trajectories=every step")
-    for name in ("ana", "ben", "astro", "bolt", "drift", "ego"):
-        rows, poses = table(stored, "trajectories", entity=name), path(stored, name)
-        here = ~rows["away"]
-        assert rows["away"].tolist() == poses.away.tolist()
-        assert rows["x"][here].tolist() == poses.x[here].tolist()
-        assert rows["y"][here].tolist() == poses.y[here].tolist()
-        assert rows["heading"].tolist() == poses.heading.tolist()
-
-
-def test_an_interval_that_is_no_multiple_of_the_step_is_refused() -> None:
-    with pytest.raises(ScenarioError, match=r"artifacts\.trajectories.*multiple"):
-        run(small(trajectories="1.5 s"))
 
 
 @pytest.mark.parametrize("name", ["trajectories", "key_frames", "observations", "events"])
@@ -147,15 +112,6 @@ def test_nobody_who_is_away_is_observed() -> None:
     steps = table(stored, "observations", user="ana")["step"]
     assert truth["away"].any()
     assert not truth["away"][steps].any()
-
-
-def test_where_somebody_away_is_is_not_told() -> None:
-    truth = table(run(everything("2 h")), "trajectories", entity="ana")
-    gone = truth["away"]
-    assert gone.any()
-    assert np.isnan(truth["x"][gone]).all()
-    assert not np.isnan(truth["x"][~gone]).any()
-    assert all(room is None or room != room for room in truth["room"][gone])
 
 
 def test_the_record_of_a_per_step_algorithm_is_in_the_order_of_steps() -> None:

@@ -157,15 +157,15 @@ def test_branches_share_the_floor_plan_and_nothing_else() -> None:
     simulation.advance(600)
     branch = copy.deepcopy(simulation)
     assert branch.home.plan is simulation.home.plan
-    assert branch._users[0] is not simulation._users[0]
-    assert branch._users[0].behaviors[0] is not simulation._users[0].behaviors[0]
+    assert branch._world.users[0] is not simulation._world.users[0]
+    assert branch._world.users[0].behaviors[0] is not simulation._world.users[0].behaviors[0]
 
 
 def test_a_branch_can_be_changed_without_the_other_noticing() -> None:
     simulation = fleet2d.Simulation(small())
     simulation.advance(200)
     branch = copy.deepcopy(simulation)
-    robot = branch._robots[0]
+    robot = branch._world.robots[0]
     robot.state = robot.state._replace(x=robot.state.x + 2)
     robot.ask_at = branch.step
     assert digests(run(small())) == digests(simulation.run())

@@ -16,7 +16,7 @@ def actor(
     content = scenario(users={name: {"start": [1.0, 3.0], **body}}, simulation={"seed": seed})
     if plan:
         content["floorplan"] = plan
-    return fleet2d.Simulation(content)._users[0]
+    return fleet2d.Simulation(content).actors[name]
 
 
 def room_of(body: Actor, point: tuple[int, int]) -> str:

@@ -110,7 +110,8 @@ def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[i
     for end in [*ends, len(poses.x)]:
         part = Poses(*(np.ascontiguousarray(column[begin:end]) for column in poses))
         watch(watched, part, begin, glances, bench, record)
-        binned[begin // BIN :] += record.binned[: 8 - begin // BIN]
+        reached = slice(begin // BIN, (end - 1) // BIN + 1)
+        binned[reached] += record.binned[: reached.stop - reached.start]
         begin = end
     settle(watched, glances, bench, record.last)
     return Seen(record.first, record.last, record.exposure.tolist(), binned.tolist())

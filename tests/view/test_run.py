@@ -120,7 +120,7 @@ def test_run_that_stored_less_says_so(tmp_path: Path, override: str, told: str) 
     ],
 )
 def test_short_and_long_runs_are_drawn(tmp_path: Path, overrides: tuple[str, ...]) -> None:
-    assert "ana" in drawn(fleet2d.run(None, *overrides), tmp_path)
+    assert "ana" in drawn(fleet2d.run("bundled:rounds", *overrides), tmp_path)
 
 
 def test_of_many_users_four_are_shown_and_the_rest_counted(tmp_path: Path) -> None:

@@ -1,11 +1,12 @@
 """Evidence: what robots watched and whom they perceived there, in bins of time."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.observations import NOWHERE, Observations
+from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.kernels.presence import count_sightings
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
@@ -60,17 +61,35 @@ def cells_of_rooms(plan: "FloorPlan") -> NDArray[np.int64]:
     return np.bincount(rooms[rooms != NOWHERE], minlength=len(plan.rooms))
 
 
+class Sighted(Protocol):
+    """Who was perceived where, in order of time: Observations, or what is needed of them."""
+
+    @property
+    def step(self) -> NDArray[np.int64]:
+        """When."""
+
+    @property
+    def user(self) -> NDArray[np.integer[Any]]:
+        """For whom somebody was taken, below 0 for nobody known."""
+
+    @property
+    def room(self) -> NDArray[np.integer[Any]]:
+        """In which room, NOWHERE for none."""
+
+
+class Sightings(NamedTuple):
+    """Who was perceived where, in order of time; arrays of one length."""
+
+    step: NDArray[np.int64]
+    user: NDArray[np.int64]
+    room: NDArray[np.int16]
+
+
 def count_seen(
-    observations: Observations, begin: int, bins: int, bin_steps: int, users: int, rooms: int
+    sighted: Sighted, begin: int, bins: int, bin_steps: int, users: int, rooms: int
 ) -> NDArray[np.int64]:
     """Return Evidence.seen: a user perceived twice at a step in a room counts once."""
     seen = np.zeros((bins, users + 1, rooms), np.int64)
-    step, room = observations.step.astype(np.int64) - begin, observations.room.astype(np.int64)
-    user = observations.user.astype(np.int64)
-    inside = (room != NOWHERE) & (step >= 0) & (step < bins * bin_steps)
-    for known, who in ((inside & (user >= 0), user), (inside, np.full(len(user), users))):
-        keys = np.unique((step[known] * (users + 1) + who[known]) * rooms + room[known])
-        rest, place = np.divmod(keys, rooms)
-        at, whose = np.divmod(rest, users + 1)
-        np.add.at(seen, (at // bin_steps, whose, place), 1)
+    user, room = sighted.user.astype(np.int64), sighted.room.astype(np.int64)
+    count_sightings(sighted.step - begin, user, room, bin_steps, seen)
     return seen

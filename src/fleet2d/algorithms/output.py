@@ -84,7 +84,7 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
         return {"room": np.array(rooms, dtype=object), "share": output.share}
     if isinstance(output, HomeChanges):
         return output.to_columns()
-    if isinstance(output, Tabular):
+    if not isinstance(output, Mapping) and isinstance(output, Tabular):
         output = output.to_columns(rooms)
     if not isinstance(output, Mapping) or not output:
         raise ComponentError(
@@ -110,7 +110,9 @@ def _check_column(name: str, values: NDArray[Any], where: str) -> None:
             f"{where} put out {name!r} of shape {values.shape}; a number or an array of one"
             " dimension is wanted"
         )
-    words = values.dtype.kind == "O" and all(isinstance(value, str) for value in values)
+    words = values.dtype.kind == "O" and all(
+        issubclass(kind, str) for kind in set(map(type, values.tolist()))
+    )
     if values.dtype.kind not in "biuf" and not words:
         what = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
         raise ComponentError(f"{where} put out {name!r} with {what}; numbers or strings are wanted")

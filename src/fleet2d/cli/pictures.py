@@ -35,30 +35,44 @@ def show(
     if fov is not None if is_run else layer is not None or step is not None:
         raise InputError("--layer and --step are for a run's directory, --fov for a floor plan")
     if what is not None and is_run:
-        from fleet2d.artifacts.reader import open_run
-
-        if layer is not None:
-            from fleet2d.view.layers import draw_layer
-
-            target = out or what / f"{layer}.png"
-            draw_layer(open_run(what), layer, target, step)
-        else:
-            from fleet2d.view.run import draw_run
-
-            target = out or what / "picture.png"
-            draw_run(open_run(what), target)
+        target = _draw_run(what, out, layer, step)
     elif what is not None and what.is_dir():
         raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
     else:
-        from fleet2d.floorplan.load import load_floorplan
-        from fleet2d.view.floorplan import draw_floorplan
-
-        plan = load_floorplan(what, resolution=resolution) if what else load_floorplan()
-        target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
-        if fov is not None:
-            from fleet2d.view.fov import draw_fov, parse_pose
-
-            draw_fov(plan, parse_pose(fov), target)
-        else:
-            draw_floorplan(plan, target)
+        target = _draw_floorplan(what, out, fov, resolution)
     typer.echo(target)
+
+
+def _draw_run(run: Path, out: Path | None, layer: str | None, step: int | None) -> Path:
+    """Draw a stored run in its home, or one of its layers; return where."""
+    from fleet2d.artifacts.reader import open_run
+
+    if layer is not None:
+        from fleet2d.view.layers import draw_layer
+
+        target = out or run / f"{layer}.png"
+        draw_layer(open_run(run), layer, target, step)
+    else:
+        from fleet2d.view.run import draw_run
+
+        target = out or run / "picture.png"
+        draw_run(open_run(run), target)
+    return target
+
+
+def _draw_floorplan(
+    what: Path | None, out: Path | None, fov: str | None, resolution: float | None
+) -> Path:
+    """Draw a floor plan, or what a camera sees in it; return where."""
+    from fleet2d.floorplan.load import load_floorplan
+    from fleet2d.view.floorplan import draw_floorplan
+
+    plan = load_floorplan(what, resolution=resolution) if what else load_floorplan()
+    target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
+    if fov is not None:
+        from fleet2d.view.fov import draw_fov, parse_pose
+
+        draw_fov(plan, parse_pose(fov), target)
+    else:
+        draw_floorplan(plan, target)
+    return target

@@ -5,10 +5,11 @@ import sys
 import time
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
+    from fleet2d.metrics.metric import Metric
 
 _LOADED = time.perf_counter()
 
@@ -49,15 +50,19 @@ def print_summary(summary: dict[str, Any], stored: "Run") -> None:
         highlight=False,
         soft_wrap=True,
     )
-    table = Table("metric", "of", "value", "", show_edge=False)
+    table, hidden = Table("metric", "of", "value", "", show_edge=False), 0
     for metric, result in summary["metrics"].items():
-        of = unit = _unit_of(stored, metric)
-        for name, value in _flat(result):
-            shown = _shown(value, unit or of)
-            table.add_row(metric, name, shown, unit)
+        measured = _class_of(stored, metric)
+        rows = _flat(measured.summary(result))
+        hidden += len(_flat(result)) - len(rows)
+        of = unit = measured.unit
+        for name, value in rows:
+            table.add_row(metric, name, _shown(value, of), unit)
             metric = unit = ""
     if table.row_count:
         console.print(table)
+    if hidden:
+        console.print(f"{hidden} more numbers are in the run: --json shows them", highlight=False)
     for note in stored.notes or stored.manifest["notes"]:
         console.print(f"note: {note}", highlight=False)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
@@ -73,13 +78,12 @@ def _shown(value: Any, unit: str) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
-def _unit_of(stored: "Run", metric: str) -> str:
-    """Return the unit that a metric's class declares."""
+def _class_of(stored: "Run", metric: str) -> "type[Metric]":
+    """Return the class of a metric, which knows its unit and what of it matters."""
     from fleet2d.component import lookup
 
     configured = stored.manifest["scenario"]["metrics"][metric]
-    unit: str = getattr(lookup("metric", configured["type"]), "unit", "")
-    return unit
+    return cast("type[Metric]", lookup("metric", configured["type"]))
 
 
 def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:

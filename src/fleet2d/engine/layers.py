@@ -7,7 +7,7 @@ import numpy as np
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import steps_of_bin
-from fleet2d.algorithms.history import Log
+from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
@@ -81,22 +81,8 @@ class LayerBook:
         self._exposes = "exposure" in needed
         self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0
         self._told_bins = 0
-        self.areas: list[SeenArea] = []
-        if wanted:
-            every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
-            keeps_last = bool({"last_seen", "time_since_seen"} & wanted)
-            self.areas = [
-                SeenArea(actor, row, every=every, keeps_last=keeps_last, bin_steps=self._bin_steps)
-                for row, actor in enumerate(actors)
-                if isinstance(actor.entity, Robot) and actor.entity.eyes
-            ]
-        for name, cells in _SEEN.items():
-            configured = scenario.floorplan.layers.get(name)
-            if configured is None and name not in needed:
-                continue
-            settings = _kept(cells, configured or LayerSettings(store=False))
-            for area in self.areas:
-                home.layers.add_layer(f"{name}.{area.robot.name}", settings, getattr(area, name))
+        self.areas = self._open_areas(scenario, actors, wanted) if wanted else []
+        self._lay_seen(scenario, needed)
         self.next_due(0)
 
     def span(self, block: PoseBlock, first: int, count: int) -> None:
@@ -138,6 +124,30 @@ class LayerBook:
         for layer in self._home.layers.values():
             if layer.store and end > 0 and self._stored_at.get(layer.name) != end - 1:
                 self._put(layer, end - 1)
+
+    def _open_areas(
+        self, scenario: Scenario, actors: Sequence[Actor], wanted: Set[str]
+    ) -> list[SeenArea]:
+        """Return what each robot with a camera has seen, before the first step."""
+        every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
+        keeps_last = bool({"last_seen", "time_since_seen"} & wanted)
+        return [
+            SeenArea(actor, row, every=every, keeps_last=keeps_last, bin_steps=self._bin_steps)
+            for row, actor in enumerate(actors)
+            if isinstance(actor.entity, Robot) and actor.entity.eyes
+        ]
+
+    def _lay_seen(self, scenario: Scenario, needed: Set[str]) -> None:
+        """Add the layers of what robots have seen that are asked for to the home."""
+        for name, cells in _SEEN.items():
+            configured = scenario.floorplan.layers.get(name)
+            if configured is None and name not in needed:
+                continue
+            settings = _kept(cells, configured or LayerSettings(store=False))
+            for area in self.areas:
+                self._home.layers.add_layer(
+                    f"{name}.{area.robot.name}", settings, getattr(area, name)
+                )
 
     def _period(self, layer: Layer) -> int:
         """Return how many steps lie between two times that a layer is stored; 0 for none."""

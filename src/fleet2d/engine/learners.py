@@ -84,11 +84,13 @@ class Learners:
         self.outputs: dict[str, Any] = {}
         self.fresh: dict[str, Any] = {}
         self.all: list[Learner] = []
+        _check_reads(metrics, algorithms)
         for name in update_order(algorithms):
             self._add(name, f"algorithms.{name}", algorithms[name])
         for name, metric in metrics.items():
             self._add(name, f"metrics.{name}", metric)
         self._room_names = [room.name for room in home.rooms]
+        self._due = self._earliest_due()
 
     @property
     def readable(self) -> Mapping[str, Any]:
@@ -97,6 +99,9 @@ class Learners:
 
     def next_due(self) -> int | None:
         """Return the step before which somebody is due; None if there is nobody."""
+        return self._due  # asked for at every span
+
+    def _earliest_due(self) -> int | None:
         return min((learner.due for learner in self.all), default=None)
 
     def earliest_needed(self) -> int:
@@ -116,7 +121,7 @@ class Learners:
                 if isinstance(learner.component, Algorithm) and output is not None:
                     # A copy: a component may go on with its own arrays.
                     fresh[learner.name] = copy.deepcopy(output)
-        self.fresh = fresh
+        self.fresh, self._due = fresh, self._earliest_due()
         self.outputs = {**self.outputs, **fresh}  # a new one: who kept the old sees the old
 
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
@@ -233,6 +238,17 @@ def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
                 f"{learner.path} put out {name!r} as {kind}, but as {learner.kinds[name]} before:"
                 " the first output fixes what a column holds (0.0 for fractions, not 0)"
             )
+
+
+def _check_reads(metrics: Mapping[str, Metric], algorithms: Mapping[str, Algorithm]) -> None:
+    """Refuse metrics that measure an algorithm that there isn't."""
+    for name, metric in metrics.items():
+        for read in metric.reads():
+            if read not in algorithms:
+                raise ScenarioError(
+                    f"metrics.{name} measures {read!r}, which is no algorithm of the scenario"
+                    f"{did_you_mean(read, algorithms)} There are: {', '.join(algorithms) or 'none'}"
+                )
 
 
 def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.clock import Clock
-from fleet2d.engine.recorder import KEY_KINDS, PLANNED, WALK
+from fleet2d.engine.key_frames import KEY_KINDS, PLANNED, WALK
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander
 from fleet2d.entities.plan import State

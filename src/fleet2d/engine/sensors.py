@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fleet2d.algorithms.history import SensorRow
+from fleet2d.algorithms.log import SensorRow
 from fleet2d.clock import Clock
 from fleet2d.engine.buckets import PoseBlock
 from fleet2d.entities.actor import Actor

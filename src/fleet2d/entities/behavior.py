@@ -173,6 +173,10 @@ class Behavior(Component):
         """Return when it wants to be asked while the body follows the plan of one behind it."""
         return None
 
+    def about(self) -> tuple[str, ...]:
+        """Return the users that its fields name: a scenario without one of them is refused."""
+        return ()
+
     def reads(self) -> tuple[str, ...]:
         """Return the algorithms that it goes by: a scenario without one of them is refused."""
         return ()

@@ -2,20 +2,15 @@
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.problems import problem, shown
 from fleet2d.units import format_time_of_day, parse_time_of_day
+from fleet2d.weekdays import weekdays_of
 
 DAY = timedelta(days=1)
-WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
-Days = Literal[
-    "daily", "weekdays", "weekend",
-    "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
-]  # fmt: skip
-GROUPS = {"daily": range(7), "weekdays": range(5), "weekend": range(5, 7)}
 
 
 class Span(NamedTuple):
@@ -72,26 +67,6 @@ def parse_span(value: object) -> Span:
     names = "" if len(words) == 1 else f"{words[0]} "
     text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"
     return Span(tuple(days), begin, end if end > begin else end + DAY, text)
-
-
-def weekdays_of(names: str | Sequence[str]) -> set[int]:
-    """Return the days of the week that names stand for, 0 is Monday.
-
-    >>> sorted(weekdays_of(["weekend", "friday"]))
-    [4, 5, 6]
-    """
-    return {day for name in ((names,) if isinstance(names, str) else names) for day in _days(name)}
-
-
-def _days(name: str) -> Sequence[int]:
-    if name in GROUPS:
-        return GROUPS[name]
-    if name in WEEKDAYS:
-        return (WEEKDAYS.index(name),)
-    raise problem(
-        f"unknown day {name!r}; there are: {', '.join((*GROUPS, *WEEKDAYS))}, or a list of those"
-        " like 'monday,friday'"
-    )
 
 
 def _midnight(time: datetime) -> datetime:

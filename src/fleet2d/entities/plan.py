@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
+from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.motion import (
@@ -219,7 +220,7 @@ class Plan:
     def _step_to(self, x: int, y: int) -> None:
         """Go straight to a point, whatever is in the way."""
         if (x, y) != (self.x, self.y):
-            self._walk(np.array([(self.x, self.y), (x, y)], np.int64))
+            self._walk(straight_way((self.x, self.y), (x, y)))
 
     def reaches(self, x: int, y: int) -> bool:
         """Tell whether there is a way to a lattice point from where the plan ends at present."""

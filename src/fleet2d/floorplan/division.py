@@ -1,6 +1,6 @@
 """How the free space of a plan is divided into rooms, by what its source says of them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -171,14 +171,7 @@ def label_rooms(
     notes = [
         lost_note(lattice, merged[box], f"{why}: it is no room") for box, why in found.lost.items()
     ]
-    for box, other in found.merged.items():
-        while found.merged[other] != other:
-            other = found.merged[other]
-        if other != box:
-            types = tuple(dict.fromkeys(merged[other].types + merged[box].types))
-            merged[other] = replace(merged[other], types=types)
-            what, with_what = (" and ".join(merged[k].types) for k in (box, other))
-            notes.append(f"a region {what} lies under smaller ones: it is one room, {with_what}")
+    notes += _merge(merged, found.merged)
     first = len(merged)
     sizes = np.bincount(found.of_cell[free], minlength=first + found.rests)[first:]
     rank = np.empty(first + found.rests + 1, np.int64)  # its last entry serves -1
@@ -199,6 +192,20 @@ def label_rooms(
         if room.type == HALLWAY and not room.labels
     ]
     return room_of_cell, rooms, notes
+
+
+def _merge(regions: list[Region], into: Mapping[int, int]) -> list[str]:
+    """Add the labels of regions to those that cover them; return notes of it."""
+    notes = []
+    for box, other in into.items():
+        while into[other] != other:
+            other = into[other]
+        if other != box:
+            types = tuple(dict.fromkeys(regions[other].types + regions[box].types))
+            regions[other] = replace(regions[other], types=types)
+            what, with_what = (" and ".join(regions[k].types) for k in (box, other))
+            notes.append(f"a region {what} lies under smaller ones: it is one room, {with_what}")
+    return notes
 
 
 def found_rooms(

@@ -64,6 +64,12 @@ def load_floorplan(
             f"{did_you_mean(plan, names)} Bundled homes: {', '.join(names)}; synthetic ones:"
             " synthetic:0, synthetic:1, …"
         )
+    return _load_document(path, cell)
+
+
+def _load_document(path: Path, cell: float | None) -> FloorPlan:
+    """Read a file of which its content tells the format."""
+    usual = USUAL_CELL_M if cell is None else cell
     content = read_document(path)
     kind = _format_of(content)
     if kind == "native":

@@ -267,3 +267,8 @@ def _shared(array: I64) -> I64:
     """Refuse changes: everybody who asks gets the same array."""
     array.setflags(write=False)
     return array
+
+
+def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:
+    """Return the way straight on: int64 (2, 2), read-only as those of `Space.route` are."""
+    return _shared(np.array([begin, end], np.int64))

@@ -47,8 +47,8 @@ class Record(NamedTuple):
         exposure: int64 (rooms,), cells of each room in view, summed over the steps.
         counted: int64 (rows, columns), the last look that counted each cell, which several cameras
             may show; empty for one camera.
-        binned: int64 (bins, rooms), as `exposure`, by time: set anew by every call of `watch`;
-            empty where nobody asks for it.
+        binned: int64 (bins, rooms), as `exposure`, by time: `watch` sets as many anew as its steps
+            reach; empty where nobody asks for it.
     """
 
     first: Int64
@@ -163,13 +163,18 @@ def _glance(
 
 
 @kernel
-def _let_go(glances: Glances, record: Record, slot: int, step: int, steps: int, row: int) -> None:
-    """Add what a pose shows, that was held for so many steps and at `step` last."""
+def _let_go(
+    last: Int64, cells: Int32, exposure: Int64, binned: Int64, held: tuple[int, int, int, int]
+) -> None:
+    """Add what a pose shows: its slot, the step at which it was held last, for how many, the bin.
+
+    It gets the few arrays that it needs: to hand over a tuple of many takes longer than to add.
+    """
+    slot, step, steps, row = held
     if slot >= 0:
-        exposure, binned = record.exposure, record.binned
-        glances.last[slot] = step
+        last[slot] = step
         for room in range(exposure.shape[0]):
-            seen = steps * np.int64(glances.cells[slot, room])
+            seen = steps * np.int64(cells[slot, room])
             exposure[room] += seen
             if binned.shape[0] > 0:
                 binned[row, room] += seen
@@ -208,25 +213,31 @@ def watch(
     xs, ys, headings, aways = poses.x, poses.y, poses.heading, poses.away
     pose, last, cells, taken = glances.pose, glances.last, glances.cells, glances.taken
     lenses, every, bin_steps = watched.lenses, watched.every, watched.bin_steps
-    bins = record.binned.shape[0] > 0
-    record.binned[:] = 0
+    exposure, binned = record.exposure, record.binned
+    bins = binned.shape[0] > 0
+    if bins and xs.shape[0] > 0:
+        binned[: (begin + xs.shape[0] - 1) // bin_steps - begin // bin_steps + 1] = 0
     begin_bin, row = begin // bin_steps, 0
+    next_bin = (begin_bin + 1) * bin_steps
     pans = lenses.pan_count.max() > 0
     panned, looked = 0, NEVER
     slot, looks = -1, 0  # the pose that is held, and for how many looks
     held_x, held_y, held_heading, held_panned = 0, 0, 0, 0
-    for j in range(-begin % every, xs.shape[0], every):
-        x, y, heading, step = xs[j], ys[j], headings[j], begin + j
+    j, count = -begin % every, xs.shape[0]
+    while j < count:
+        x, y, heading, away, step = xs[j], ys[j], headings[j], aways[j], begin + j
+        j += every
         if pans:
             panned = _panned(lenses, step * watched.step_us)
-        if bins and step // bin_steps - begin_bin != row:
-            _let_go(glances, record, slot, looked, looks * every, row)
+        if bins and step >= next_bin:
+            _let_go(last, cells, exposure, binned, (slot, looked, looks * every, row))
             row, looks = step // bin_steps - begin_bin, 0
+            next_bin = (step // bin_steps + 1) * bin_steps
         same = x == held_x and y == held_y and heading == held_heading and panned == held_panned
-        if not same or slot < 0 or aways[j]:
-            _let_go(glances, record, slot, looked, looks * every, row)
+        if not same or slot < 0 or away:
+            _let_go(last, cells, exposure, binned, (slot, looked, looks * every, row))
             slot, looks = -1, 0
-            if aways[j]:
+            if away:
                 continue
             if 2 * taken[0] >= last.shape[0]:
                 if record.last.shape[0] > 0:
@@ -243,6 +254,13 @@ def watch(
                 last[slot] = step
                 glances.told[slot] = step
                 taken[0] += 1
-        looked = step
         looks += 1
-    _let_go(glances, record, slot, looked, looks * every, row)
+        # Mostly it stands: as long as it does, nothing is to be done.
+        end = 0 if pans else min(count, next_bin - begin) if bins else count
+        while j < end and not aways[j]:
+            if xs[j] != x or ys[j] != y or headings[j] != heading:
+                break
+            j += every
+            looks += 1
+        looked = begin + j - every
+    _let_go(last, cells, exposure, binned, (slot, looked, looks * every, row))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.headings import TURN, heading_of
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import time_route
@@ -166,7 +167,7 @@ class FixFollower:
         """Return the way from a fix to another: straight if that is free."""
         (ax, ay), (bx, by) = self.fixes.xy[i].tolist(), self.fixes.xy[j].tolist()
         space = self.actor.space
-        straight = np.array([[ax, ay], [bx, by]], np.int64)
+        straight = straight_way((ax, ay), (bx, by))
         if (ax, ay) == (bx, by):
             return straight
         if line_of_sight(space.mesh, ax, ay, locate(space.mesh, ax, ay), bx, by):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.plan import Note
+from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.motion import time_route
 from fleet2d.logs.log import AWAY
 from fleet2d.logs.nearest import Nearest
@@ -166,7 +167,7 @@ class RoomFollower:
         """Return the breakpoints (time since setting out, x, y, heading) of the way to a spot."""
         route = self.actor.space.route((plan.x, plan.y), spot)
         if route is None:  # a door is shut at present: straight on, for the log knows better
-            route = np.array([(plan.x, plan.y), spot], np.int64)
+            route = straight_way((plan.x, plan.y), spot)
         rows = np.empty((2 * len(route), 4), np.int64)
         count = time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate, rows)
         return rows[:count]

@@ -63,6 +63,24 @@ def map_rooms(
     Raises:
         LogError: A label is unknown, or stands for no room of this home.
     """
+    _check_given(labels, given, rooms)
+    mapped: dict[str, RoomChoice | None] = {}
+    for label, count in labels.items():
+        choice = given[label] if label in given else _usual(label, rooms)
+        if choice is None and label not in given:
+            raise LogError(
+                f"no room of this home stands for {label!r}, which {count} readings of the log"
+                f" name; say which does by rooms: {{{label}: …}}, one of"
+                f" {', '.join(_names(rooms))}, away, door, or null to leave them out"
+            )
+        mapped[label] = choice
+    return mapped
+
+
+def _check_given(
+    labels: Mapping[str, int], given: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
+) -> None:
+    """Refuse labels that the log hasn't, and rooms that the home hasn't."""
     for label, choice in given.items():
         if label not in labels:
             raise LogError(
@@ -75,20 +93,6 @@ def map_rooms(
                 f"rooms: {label!r} is to be {' or '.join(choice)}, but there is no such room"
                 f"{did_you_mean(choice[0], names)} There are: {', '.join(names)}, away, door"
             )
-    mapped: dict[str, RoomChoice | None] = {}
-    for label, count in labels.items():
-        if label in given:
-            mapped[label] = given[label]
-            continue
-        choice = _usual(label, rooms)
-        if choice is None:
-            raise LogError(
-                f"no room of this home stands for {label!r}, which {count} readings of the log"
-                f" name; say which does by rooms: {{{label}: …}}, one of"
-                f" {', '.join(_names(rooms))}, away, door, or null to leave them out"
-            )
-        mapped[label] = choice
-    return mapped
 
 
 def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:

@@ -1,6 +1,6 @@
 """Metrics: algorithms that only record. They know the truth, and nobody acts on what they say."""
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -31,6 +31,10 @@ class Metric(Component):
         default=timedelta(days=1), description="how often it is updated"
     )
 
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithms that it measures: a scenario without one of them is refused."""
+        return ()
+
     def start(self, home: "Home") -> None:
         """Prepare for a run."""
 
@@ -41,3 +45,8 @@ class Metric(Component):
     def result(self) -> dict[str, Any]:
         """Return the few numbers that sum up the run, for the manifest and the closing table."""
         return {}
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return what of a result the closing table shows: of many numbers, those that matter."""
+        return result

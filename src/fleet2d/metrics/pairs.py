@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.history import BodyPoses, History
+from fleet2d.algorithms.history import History
+from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.kernels.points import points_in_sight
 
 if TYPE_CHECKING:

@@ -1,5 +1,6 @@
 """Where users really are: the share of time per room."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
 
 AWAY = "away"
+MOST = 4  # places that the closing table shows of each user
 
 
 @register("metric", "room_share")
@@ -50,4 +52,12 @@ class RoomShare(Metric):
         return {
             user: {n: float(s / steps.sum()) for n, s in zip(self.names, steps, strict=True) if s}
             for user, steps in self.seconds.items()
+        }
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return where each user is most of the time, the longest first."""
+        return {
+            user: dict(sorted(shares.items(), key=lambda item: -item[1])[:MOST])
+            for user, shares in result.items()
         }

@@ -28,8 +28,9 @@ class Sightings(Metric):
         """Count detections by step."""
         observations = history.observations
         for index, user in enumerate(state.users):
-            steps = np.unique(observations.step[observations.user == index])
-            self.seen[user] = self.seen.get(user, 0) + len(steps)
+            steps = observations.step[observations.user == index]  # in order
+            seen = int(np.count_nonzero(np.diff(steps))) + (len(steps) > 0)
+            self.seen[user] = self.seen.get(user, 0) + seen
             at_home = int(history.poses(user).time_in_rooms[:-1].sum())
             self.at_home[user] = self.at_home.get(user, 0) + at_home
 

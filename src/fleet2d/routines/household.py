@@ -22,13 +22,14 @@ from fleet2d.routines.activity import AnyTakes, find_activity
 from fleet2d.routines.laws import uniform
 from fleet2d.routines.life import Life
 from fleet2d.routines.periods import AnyPeriod, without
-from fleet2d.routines.persona import AnyPersona, Dates, OnDays, Timing, holds_on, weekdays_of
+from fleet2d.routines.persona import AnyPersona, Dates, Timing, holds_on
 from fleet2d.routines.planner import DAY_S, MILLION, NEVER, NO_GAP_S, SLEEP, DayPlan, Doing, Job
 from fleet2d.routines.templates import starts
 from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import Share
+from fleet2d.weekdays import OnDays, weekdays_of
 
 # So many days are remembered.
 REMEMBERED = 8

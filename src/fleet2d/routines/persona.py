@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import date, timedelta
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import (
     BeforeValidator,
@@ -25,16 +25,10 @@ from fleet2d.routines.templates import check, day_plans
 from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
 from fleet2d.units import Duration, Share, TimeOfDay, format_time_of_day
+from fleet2d.weekdays import WEEKDAYS, OnDays, weekdays_of
 
 BUNDLED = Path(__file__).parent / "personas"
 DAY = timedelta(days=1)
-WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
-Days = Literal[
-    "daily", "weekdays", "weekend",
-    "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
-]  # fmt: skip
-GROUPS = {"daily": range(7), "weekdays": range(5), "weekend": range(5, 7)}
-OnDays = Days | Annotated[tuple[Days, ...], Field(min_length=1)]
 Dates = tuple[date | tuple[date, date], ...]
 
 
@@ -180,20 +174,6 @@ class DayTemplate(Settings):
     def weekdays(self) -> set[int]:
         """The days of the week it holds on, 0 = Monday."""
         return weekdays_of(self.on)
-
-
-def weekdays_of(on: OnDays | None) -> set[int]:
-    """Return the days of the week that are named, 0 = Monday.
-
-    >>> weekdays_of(("weekend", "friday")), weekdays_of(None)
-    ({4, 5, 6}, set())
-    """
-    names = () if on is None else (on,) if isinstance(on, str) else on
-    return {
-        day
-        for name in names
-        for day in (GROUPS[name] if name in GROUPS else (WEEKDAYS.index(name),))
-    }
 
 
 def holds_on(dates: Dates, day: date) -> bool:

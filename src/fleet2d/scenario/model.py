@@ -181,6 +181,19 @@ class Scenario(Settings):
                 taken[name] = noun
         return self
 
+    @model_validator(mode="after")
+    def _users_are_there(self) -> Self:
+        for robot, entity in self.robots.items():
+            for i, behavior in enumerate(entity.behaviors):
+                for user in behavior.about():
+                    if user not in self.users:
+                        raise problem_at(
+                            ("robots", robot, "behaviors", i),
+                            f"there is no user {user!r}{did_you_mean(user, self.users)}"
+                            f" There are: {', '.join(self.users) or 'none'}",
+                        )
+        return self
+
     @property
     def folder(self) -> Path:
         """The folder of the file that the scenario was read from."""

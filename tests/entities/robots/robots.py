@@ -9,6 +9,7 @@ from fleet2d.artifacts.reader import Run
 
 CAMERA = {"range": [0.2, 4.5], "angle_deg": 108, "lost_after": "5 s"}
 SIT = {"days": [{"items": [{"at": "00:00", "place": [7.0, 6.0]}]}]}
+OUT = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}
 SHARE = {"share": {"type": "tests.own_components:Share", "period": "5 min"}}
 
 

@@ -2,11 +2,18 @@
 
 import numpy as np
 import pytest
-from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
+from tests.entities.robots.robots import (
+    OUT,
+    assert_same_for_every_max_span,
+    events,
+    home_with,
+    names,
+)
 from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
+from fleet2d.errors import InputError
 
 pytestmark = needs_jit
 
@@ -64,11 +71,25 @@ def test_it_follows_no_longer_than_told() -> None:
 
 
 def test_only_whom_it_is_told_to() -> None:
-    assert [] == names(
-        run(home_with([{"type": "follow", "user": "ben"}], "5 min", astro={"start": [5.0, 6.0]}))
-    )
+    content = home_with([{"type": "follow", "user": "ben"}], "5 min", astro={"start": [5.0, 6.0]})
+    content["users"]["ben"] = OUT
+    assert [] == names(run(content))
 
 
 def test_a_robot_without_a_camera_is_refused() -> None:
     with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with(["follow"], astro={"camera": None}))
+
+
+@pytest.mark.parametrize(
+    "behavior",
+    [
+        {"type": "find", "user": "anna", "every": "1 h"},
+        {"type": "follow", "user": "anna"},
+        {"type": "opportunistic", "users": ["ana", "anna"]},
+    ],
+    ids=lambda behavior: str(behavior["type"]),
+)
+def test_a_user_that_there_is_not_is_refused_before_the_run(behavior: dict[str, object]) -> None:
+    with pytest.raises(InputError, match=r"behaviors\.1: there is no user 'anna'.*'ana'"):
+        fleet2d.load_scenario(robots={"astro": {"behaviors": ["patrol", behavior]}})

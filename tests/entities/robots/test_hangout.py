@@ -43,6 +43,12 @@ def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
     assert "kitchen_0" == rooms(run(content))[-1]
 
 
+def test_a_kind_of_room_that_the_home_lacks_is_avoided_all_the_same() -> None:
+    content = home_with([hangout(avoid=["garage"])], "10 min", **told(bathroom_0=1))
+    plain = home_with([hangout()], "10 min", **told(bathroom_0=1))
+    assert rooms(run(plain)) == rooms(run(content))
+
+
 def test_it_stands_off_doors_ways_and_seats() -> None:
     content = home_with([hangout()], "5 min", **told(bathroom_0=1))
     content["floorplan"] = {"type": "bundled", "furnish": True}
@@ -119,7 +125,7 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was() -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"avoid": ["attic"]}, "no room 'attic'"),
+        ({"avoid": ["bathrom"]}, "no room 'bathrom'"),
         ({"avoid": ["any"]}, "no place to hang out"),
         ({"quiet": "22:00"}, "hours are wanted"),
         ({"quiet": "workdays 22:00-23:00"}, "unknown day 'workdays'"),
@@ -127,8 +133,28 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was() -> None:
         ({"explore": 1.5}, "share is 0 to 1"),
         ({"blocking": -1}, "blocking"),
         ({"source": "ltp"}, "goes by 'ltp'"),
+        ({"user": "anna"}, "there is no user 'anna'"),
     ],
 )
 def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(home_with([hangout(**fields)], **told(kitchen_0=1)))
+
+
+def test_ways_from_where_it_stands_are_those_of_the_home_as_it_is_then() -> None:
+    content = home_with([hangout(moving=0.5)], **told(kitchen_0=1))
+    simulation = Simulation(
+        content | {"objects": {"gate": {"type": "door", "doorway": "kitchen_0-bathroom_0"}}}
+    )
+    astro = simulation.actors["astro"]
+    behavior: Any = astro.behaviors[0]
+    found = {}
+    for change in ({"open": "gate"}, {"shut": "gate"}, {"open": "gate"}):
+        simulation.change(**change)
+        simulation.advance()
+        found[next(iter(change))] = ways = behavior._ways(astro)
+        assert ways is behavior._ways(astro)
+        behavior.ways = behavior.ways[0], {}
+        assert np.array_equal(ways, behavior._ways(astro))
+    assert np.isinf(found["shut"]).any()
+    assert not np.isinf(found["open"]).any()

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.entities.robots.robots import (
+    OUT,
     assert_same_for_every_max_span,
     events,
     home_with,
@@ -48,7 +49,9 @@ def test_it_leaves_the_same_person_alone_for_a_while() -> None:
 def test_whom_it_does_not_want_and_what_chance_it_misses_change_nothing() -> None:
     alone = path(run(home_with([PATROL])), "astro")
     for fields in ({"users": ["ben"]}, {"chance": 0}):
-        other = path(run(home_with([{"type": "opportunistic", **fields}, PATROL])), "astro")
+        content = home_with([{"type": "opportunistic", **fields}, PATROL])
+        content["users"]["ben"] = OUT
+        other = path(run(content), "astro")
         assert np.array_equal(alone.x, other.x)
         assert np.array_equal(alone.heading, other.heading)
 

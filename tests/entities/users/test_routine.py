@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+import json
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -315,3 +316,45 @@ def test_a_member_says_in_its_household_when_it_is_away() -> None:
     user = {"type": "routine", "household": FAMILY, "away": [["2026-01-06", "2026-01-07"]]}
     with pytest.raises(InputError, match="'trips' and 'visits'"):
         fleet2d.load_scenario(scenario(users={"ana": user}))
+
+
+def test_nobody_goes_through_a_wall_to_furniture_out_of_reach(tmp_path: Path) -> None:
+    outline = [[0, 0], [4, 0], [4, 1], [4.1, 1], [4.1, 0], [6, 0], [6, 3], [4.1, 3], [4.1, 1.3],
+               [4, 1.3], [4, 3], [0, 3]]  # fmt: skip
+    sofa = {"type": "sofa", "footprint": [[4.8, 0.5], [5.6, 0.5], [5.6, 2.5], [4.8, 2.5]]}
+    seat = {"x": 5.0, "y": 1.5, "heading": 3.14, "posture": "sit"}
+    flat = {"format": "fleet2d-floorplan", "version": 1, "free": [{"outline": outline}],
+            "rooms": [{"type": "living_room", "polygon": outline}],
+            "objects": [{**sofa, "uses": [seat, {**seat, "x": 4.5, "posture": "stand"}]}]}  # fmt: skip
+    (tmp_path / "flat.json").write_text(json.dumps(flat))
+    plan = {"type": "native", "path": str(tmp_path / "flat.json")}
+    stored = run({**lives("retired"), "floorplan": plan})
+    way = path(stored, "ana")
+    assert np.nanmax(way.x) < 4.1
+
+
+def locked_out(*changes: dict[str, Any]) -> fleet2d.Run:
+    """A day of somebody who works in an office, whose door is shut and locked from 07:10 on."""
+    door = {"type": "door", "doorway": "office_0"}
+    shut = [{"at": "10 min", "shut": "office"}, {"at": "10 min", "lock": "office"}]
+    life = {**lives("works_from_home"), **HOME, "objects": {"office": door}}
+    return run({**life, "changes": [*shut, *changes]})
+
+
+def test_what_is_done_behind_a_locked_door_is_left_out_and_nothing_else() -> None:
+    events = locked_out().pandas("events")
+    blocked = events[events["event"] == "way_blocked"]
+    assert {"work_at_home"} == set(blocked["detail"])
+    assert len(blocked) < 10
+    done = set(events[events["event"] == "activity"]["detail"])
+    assert {"breakfast", "lunch", "dinner"} <= done
+    assert "work_at_home" not in done
+
+
+def test_what_is_done_behind_a_door_is_done_again_once_it_is_unlocked() -> None:
+    events = locked_out({"at": "4 h", "unlock": "office"}).pandas("events")
+    work = events[(events["event"] == "activity") & (events["detail"] == "work_at_home")]
+    assert len(work)
+    assert work["time"].dt.hour.min() >= 11
+    blocked = events[events["event"] == "way_blocked"]
+    assert blocked["time"].dt.hour.max() < 11

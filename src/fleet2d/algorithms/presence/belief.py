@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
+from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -42,7 +43,8 @@ class Presence:
     share of time with nobody at home.
 
     Attributes:
-        users: Names of the users; `anyone` comes behind them.
+        users: Names of the users.
+        names: Everybody it tells of: the users, and anyone.
         time: The local time it is of.
         track: What was believed bin by bin on the way here, of real-time presence; else None.
 
@@ -77,6 +79,7 @@ class Presence:
             track: What was believed bin by bin.
         """
         self.users, self.time, self.track = tuple(users), time, track
+        self.names = (*self.users, ANYONE)
         self._home, self._away, self._interval = home, away, interval
         self._check()
         for array in (home, away, *(interval or ())):
@@ -99,11 +102,6 @@ class Presence:
                 f" {self._home[row].tolist()}, which sum to {total[row]:g}, away"
                 f" {self._away[row]:g}"
             )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Everybody it tells of: the users, and anyone."""
-        return (*self.users, ANYONE)
 
     @property
     def arrays(self) -> tuple[F64, F64]:
@@ -167,8 +165,7 @@ class Presence:
                 f"presence has {self._home.shape[1]} rooms, but the home has {len(rooms)}"
             )
         columns: dict[str, NDArray[Any]] = {
-            "user": np.repeat(np.array(self.names, dtype=object), len(places)),
-            "room": np.tile(np.array(places, dtype=object), len(self.names)),
+            **_labels(self.names, tuple(places)),
             "share": np.concatenate([self._home, self._away[:, None]], axis=1).ravel(),
         }
         if self._interval is not None:
@@ -183,6 +180,16 @@ class Presence:
         """Show the shares of anyone."""
         rounded = self.share().round(3).tolist()
         return f"{type(self).__name__}({self.time.isoformat()}, anyone: {rounded})"
+
+
+@lru_cache(64)
+def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """Return the columns that are the same each time: a row for everybody and each place."""
+    user = np.repeat(np.array(names, dtype=object), len(places))
+    room = np.tile(np.array(places, dtype=object), len(names))
+    for labels in (user, room):
+        labels.setflags(write=False)
+    return {"user": user, "room": room}
 
 
 class WeeklyPresence(Presence):

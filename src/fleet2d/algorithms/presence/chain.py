@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.presence.compiled import backward, forward
 from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.kernels.presence import backward, forward
 
 F64 = NDArray[np.float64]
 

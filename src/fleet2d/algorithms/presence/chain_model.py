@@ -15,12 +15,12 @@ from fleet2d.algorithms.presence.chain import (
     unknown_seen,
     with_anyone,
 )
-from fleet2d.algorithms.presence.compiled import advance, forward
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, normalized
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.component import register
+from fleet2d.kernels.presence import advance, forward
 from fleet2d.units import Share
 
 FARTHEST = 10_080  # bins ahead, beyond which a forecast stays as it is

@@ -1,4 +1,4 @@
-"""The base of what estimates long-term presence, and how a scenario names one."""
+"""The base of what estimates long-term presence."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -6,14 +6,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetJsonSchemaHandler
-from pydantic_core import CoreSchema
 
 from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence
-from fleet2d.algorithms.presence.compiled import resampled
 from fleet2d.algorithms.presence.counts import Bins, DayCounts
-from fleet2d.component import Component, OneOf, components
+from fleet2d.component import Component
 from fleet2d.errors import ComponentError
+from fleet2d.kernels.presence import resampled
 
 F64 = NDArray[np.float64]
 
@@ -148,23 +146,3 @@ def normalized(weights: F64) -> F64:
     """
     total = weights.sum(axis=-1, keepdims=True)
     return np.where(total > 0, weights / np.where(total > 0, total, 1), 1 / weights.shape[-1])
-
-
-class Choice(OneOf):
-    """Declares a field for any component of a kind that is part of an algorithm."""
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Name the types there are; what keys each has, only its class tells."""
-        names = list(components(self.kind))
-        own = {"type": "string", "pattern": ":", "description": f"your own {self.kind}"}
-        typed = {"type": {"anyOf": [{"type": "string", "enum": names}, own]}}
-        return {
-            "x-quantity": self.kind.replace("_", " "),
-            "anyOf": [
-                {"type": "string", "enum": names},
-                own,
-                {"type": "object", "properties": typed, "required": ["type"]},
-            ],
-        }

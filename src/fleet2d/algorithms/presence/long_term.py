@@ -9,16 +9,10 @@ from pydantic import Field, model_validator
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.presence import (  # noqa: F401 - to be found by type
-    exposure_ratio,
-    fremen,
-    likelihood,
-    sighting_share,
-)
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.counts import in_time
-from fleet2d.algorithms.presence.estimator import F64, Choice, Estimator
-from fleet2d.component import register
+from fleet2d.algorithms.presence.estimator import F64, Estimator
+from fleet2d.component import OneOf, register
 from fleet2d.problems import problem
 from fleet2d.streams import stream_key
 from fleet2d.units import PositiveDuration, Share
@@ -41,7 +35,7 @@ class LongTermPresence(Algorithm):
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})
 
-    estimator: Annotated[Estimator, Choice("presence_estimator")] = Field(
+    estimator: Annotated[Estimator, OneOf("presence_estimator")] = Field(
         cast("Any", "exposure_ratio"), description="how it is estimated"
     )
     by: Literal["overall", "hour_of_week"] = Field(

@@ -7,11 +7,10 @@ from typing import Annotated, Any, ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from fleet2d.algorithms.presence import likelihood  # noqa: F401 - to be found by type
 from fleet2d.algorithms.presence.belief import HOURS, Presence, Track, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import F64, Choice, Estimator
-from fleet2d.component import Component, register
+from fleet2d.algorithms.presence.estimator import F64, Estimator
+from fleet2d.component import Component, OneOf, register
 
 NEVER = -1
 
@@ -95,7 +94,7 @@ class LastSeen(Model):
 class LongTerm(Model):
     """Long-term presence, whatever was seen just now."""
 
-    estimator: Annotated[Estimator, Choice("presence_estimator")] = Field(
+    estimator: Annotated[Estimator, OneOf("presence_estimator")] = Field(
         cast("Any", "likelihood"), description="how it is estimated"
     )
 

@@ -8,17 +8,10 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.presence import (  # noqa: F401 - to be found by type
-    chain_model,
-    exposure_ratio,
-    fremen,
-    sighting_share,
-)
 from fleet2d.algorithms.presence.belief import Presence, Track
 from fleet2d.algorithms.presence.counts import in_time
-from fleet2d.algorithms.presence.estimator import Choice
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.component import register
+from fleet2d.component import OneOf, register
 from fleet2d.units import PositiveDuration
 
 if TYPE_CHECKING:
@@ -40,7 +33,7 @@ class RealTimePresence(Algorithm):
     period: PositiveDuration = Field(
         default=timedelta(minutes=5), description="how often it is updated"
     )
-    model: Annotated[Model, Choice("presence_model")] = Field(
+    model: Annotated[Model, OneOf("presence_model")] = Field(
         cast("Any", "hmm"), description="how it is worked out"
     )
 

@@ -99,6 +99,10 @@ class Find(Behavior):
             )
         return self
 
+    def about(self) -> tuple[str, ...]:
+        """Return whom it looks for."""
+        return () if self.user == ANYONE else (self.user,)
+
     def start(self, actor: "Actor") -> None:
         """Find where to look round in each room."""
         check_has_camera(actor, "find")

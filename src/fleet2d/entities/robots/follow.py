@@ -41,6 +41,10 @@ class Follow(Behavior):
         default=timedelta(0), description="for how long it follows at most; 0: without end"
     )
 
+    def about(self) -> tuple[str, ...]:
+        """Return whom it follows."""
+        return (self.user,) if self.user else ()
+
     def start(self, actor: "Actor") -> None:
         """Check that it sees anybody."""
         check_has_camera(actor, "follow")

@@ -15,11 +15,13 @@ from fleet2d.entities.robots.approach import face
 from fleet2d.entities.robots.belief import ANYONE, room_belief
 from fleet2d.entities.robots.places import Nearness, Places
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.vocabulary import PRIORITY
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import Length, PositiveDuration, Share
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
+    from fleet2d.floorplan.space import Space
 
 
 @register("behavior", "hangout")
@@ -35,7 +37,7 @@ class Hangout(Behavior):
     the share of the shortest ways between two rooms that lead through the robot's body there, for a
     person of radius 0.25 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
     it; and m = t / (t + tau), with t the seconds on foot from where it is. It moves only to a place
-    that beats the present one by `hysteresis`, and never in quiet hours.With probability
+    that beats the present one by `hysteresis`, and never in quiet hours. With probability
     `explore` it goes to a room drawn with equal chances instead, so that what it believes doesn't
     feed on itself.
 
@@ -67,7 +69,8 @@ class Hangout(Behavior):
         default=0.1, description="share of decisions in which it goes to any room instead"
     )
     avoid: tuple[str, ...] = Field(
-        default=(), description="rooms or kinds of rooms that it stays out of"
+        default=(),
+        description="rooms, or kinds of rooms if the home has them, that it stays out of",
     )
     quiet: Hours = Field(default=(), description="hours in which it doesn't move")
     off_doors: Length = Field(
@@ -76,7 +79,9 @@ class Hangout(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the places, and rate what doesn't depend on where people are."""
-        avoided = frozenset(r.index for name in self.avoid for r in actor.rooms((name,)))
+        there = {name for room in actor.home.rooms for name in (room.name, room.type)}
+        named = [name for name in self.avoid if name in there or name not in PRIORITY]
+        avoided = frozenset(r.index for name in named for r in actor.rooms((name,)))
         self.places = Places(actor, avoided, self.off_doors)
         if not len(self.places.points):
             raise PlacementError(
@@ -85,12 +90,17 @@ class Hangout(Behavior):
             )
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
+        self.ways: tuple[Space, dict[tuple[int, int], NDArray[np.float64]]] = actor.space, {}
         self.place: int | None = None
         self.decides_at = actor.clock.start
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithm that it goes by."""
         return () if self.source is None else (self.source,)
+
+    def about(self) -> tuple[str, ...]:
+        """Return the user that it stays near."""
+        return () if self.user == ANYONE else (self.user,)
 
     def decide(self, now: Situation) -> Plan:
         """Stay, or go where it is better; back to its place, if it was called away."""
@@ -130,13 +140,27 @@ class Hangout(Behavior):
         gain = np.zeros(len(points))
         for room, chance in enumerate(joint.tolist()):  # in a fixed order, unlike a matrix product
             gain += chance * self.nearness[:, room]
-        here = np.array([[actor.state.x, actor.state.y]], np.int64)
-        metres = actor.space.distance_field(here)[points[:, 1] // SUB, points[:, 0] // SUB]
-        seconds = metres * now.home.plan.lattice.units_per_m / actor.speed
-        reached = np.isfinite(seconds)
-        way = np.where(reached, seconds, 0.0)
-        move = way / (way + self.tau.total_seconds())
-        return np.where(reached, gain - self.penalty - self.moving * move, -np.inf)
+        return gain - self.penalty - self._ways(actor)
+
+    def _ways(self, actor: "Actor") -> NDArray[np.float64]:
+        """Return what the way to each place counts: float64 (n,), infinite where none leads.
+
+        It stands at few places, and thinks there often: ways from them are kept, until it can go
+        other ways.
+        """
+        space, points = actor.space, self.places.points
+        if self.ways[0] is not space:
+            self.ways = space, {}
+        cell = actor.state.x // SUB, actor.state.y // SUB
+        if cell not in self.ways[1]:
+            here = np.array([[actor.state.x, actor.state.y]], np.int64)
+            metres = space.distance_field(here)[points[:, 1] // SUB, points[:, 0] // SUB]
+            seconds = metres * actor.home.plan.lattice.units_per_m / actor.speed
+            reached = np.isfinite(seconds)
+            way = np.where(reached, seconds, 0.0)
+            move = way / (way + self.tau.total_seconds())
+            self.ways[1][cell] = np.where(reached, self.moving * move, np.inf)
+        return self.ways[1][cell]
 
     def _face_people(self, now: Situation, plan: Plan) -> None:
         """Turn to the middle of the room that it stands in."""

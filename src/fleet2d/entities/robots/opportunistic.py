@@ -40,6 +40,10 @@ class Opportunistic(Behavior):
         default=timedelta(minutes=15), description="how long it leaves the same person alone"
     )
 
+    def about(self) -> tuple[str, ...]:
+        """Return whom it approaches."""
+        return self.users
+
     def start(self, actor: "Actor") -> None:
         """Check that it sees anybody."""
         check_has_camera(actor, "opportunistic")

@@ -8,10 +8,11 @@ from pydantic import Field
 
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.hours import DAY, Days, weekdays_of
+from fleet2d.entities.hours import DAY
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration, TimeOfDay
+from fleet2d.weekdays import Days, weekdays_of
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor

@@ -132,8 +132,10 @@ class Inhabitant(Behavior):
             if plan.time_us >= midnight_us or day_us + doing.begin * SECOND_US >= midnight_us:
                 break
             end_us = min(day_us + doing.end * SECOND_US, midnight_us)
-            if plan.time_us < end_us:  # else the way to it took longer than it lasts
-                self._do(plan, doing, (ordinal, i), end_us)
+            if plan.time_us >= end_us:  # the way to it took longer than it lasts
+                continue
+            if not self._do(plan, doing, (ordinal, i), end_us):
+                break
         self.last.step = clock.step_at_or_after(plan.time_us)
         return plan
 
@@ -154,12 +156,21 @@ class Inhabitant(Behavior):
             yield from ((ordinal, i, doing) for i, doing in enumerate(self.day(ordinal)))
             ordinal += 1
 
-    def _do(self, plan: Plan, doing: Doing, which: tuple[int, int], end_us: int) -> None:
-        """Do something until `end_us`; which doing it is names its random draws."""
+    def _do(self, plan: Plan, doing: Doing, which: tuple[int, int], end_us: int) -> bool:
+        """Do something until `end_us`; which doing it is names its random draws.
+
+        Returns:
+            Whether it can be done. Where doors keep one from all of its rooms, the plan ends, for
+            they may be open when it is time; if that is now, one stays where one is instead.
+        """
         last = self.last
         if which == last.given_up:
             doing = doing._replace(activity=REST)
-        setting = self.settings[doing.activity]
+        setting = self._at_present(self.settings[doing.activity])
+        if not (setting.rooms or setting.activity.away):
+            if plan.time_us <= plan.began[0] * self.clock.step_us:
+                plan.note("way_blocked", doing.activity).stay_until(end_us)
+            return False
         goes_on = last.which == which and plan.began[0] == last.step
         number = which[0] * DOINGS_A_DAY + which[1]
         draws = Draws(self.key, number + GOING_ON if goes_on else number)
@@ -174,6 +185,16 @@ class Inhabitant(Behavior):
             last.place = self._fidget(plan, setting, last.place, end_us, draws)
         last.which = which
         plan.stay_until(end_us)
+        return True
+
+    def _at_present(self, setting: Setting) -> Setting:
+        """Return where an activity is done while doors keep one from some of its rooms."""
+        reached = self.spots.reached(setting.rooms)
+        if len(reached) < len(setting.rooms):
+            did = setting.activity
+            seats = self.spots.at_furniture(did.objects, reached, did.posture)
+            setting = setting._replace(rooms=reached, seats=seats)
+        return setting._replace(stores=self.spots.reached(setting.stores))
 
     def _go(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
         """Go to where the activity is done: a place at its furniture, else a spot in its room."""
@@ -226,7 +247,9 @@ class Inhabitant(Behavior):
     def _fetch(
         self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
     ) -> None:
-        """Go to another room, stay a moment, and come back, if there is time for that."""
+        """Go to another room, stay a moment, and come back, if there is time and a way."""
+        if not setting.stores:
+            return
         takes_us = setting.fetch_takes.draw(draws) * SECOND_US
         room = draws.choice(setting.stores)
         spot = draws.choice(self.spots.in_room(room))

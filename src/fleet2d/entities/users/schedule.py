@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -12,17 +12,12 @@ from fleet2d.entities.place import Place, Point, RoomChoice, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.problems import problem, problem_at
 from fleet2d.units import Duration, TimeOfDay, format_time_of_day
+from fleet2d.weekdays import OnDays, weekdays_of
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
 DAY = timedelta(days=1)
-WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
-Days = Literal[
-    "daily", "weekdays", "weekend",
-    "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
-]  # fmt: skip
-GROUPS = {"daily": range(7), "weekdays": range(5), "weekend": range(5, 7)}
 AWAY: tuple[()] = ()
 
 
@@ -51,20 +46,13 @@ class Item(Settings):
 class Day(Settings):
     """An agenda, and the days on which it holds."""
 
-    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = Field(
-        default="daily", description="the days on which it holds"
-    )
+    on: OnDays = Field(default="daily", description="the days on which it holds")
     items: tuple[Item, ...] = Field(min_length=1, description="what happens, in order")
 
     @property
     def weekdays(self) -> set[int]:
         """The days of the week it holds on, 0 = Monday."""
-        names = (self.on,) if isinstance(self.on, str) else self.on
-        return {day for name in names for day in _days_of(name)}
-
-
-def _days_of(name: str) -> tuple[int, ...]:
-    return tuple(GROUPS[name]) if name in GROUPS else (WEEKDAYS.index(name),)
+        return weekdays_of(self.on)
 
 
 class Entry(NamedTuple):

@@ -9,6 +9,7 @@ from fleet2d.streams import Draws
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
+    from fleet2d.floorplan.objects import UsePlace
     from fleet2d.floorplan.plan import Room
 
 T = TypeVar("T")
@@ -62,6 +63,13 @@ class Spots:
         self._of_room: dict[int, list[Spot]] = {}
         self._version = -1  # of the home that the spots were found in
 
+    def reached(self, rooms: list["Room"]) -> list["Room"]:
+        """Return the rooms that the body can get to at present: doors may be locked."""
+        actor = self._actor
+        if not actor.home.hinders:
+            return rooms
+        return [room for room in rooms if len(actor.space.cells(room.index, actor.part))]
+
     def in_room(self, room: "Room") -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""
         if self._version != self._actor.home.version:  # furniture was moved, a door was shut
@@ -99,11 +107,20 @@ class Spots:
                 centre = thing.footprint.centroid
                 room = home.plan.room_at(centre.x, centre.y)
                 if room is not None and room.index in indices:
-                    fit = [i for i, use in enumerate(thing.uses) if use.posture == posture]
-                    seats += [Seat(thing.name, i) for i in fit or range(len(thing.uses))]
+                    usable = [i for i, use in enumerate(thing.uses) if self._gets_to(use)]
+                    fit = [i for i in usable if thing.uses[i].posture == posture]
+                    seats += [Seat(thing.name, i) for i in fit or usable]
             if len(seats) >= members:
                 break
         return _shared(seats, rank, members) if seats else []
+
+    def _gets_to(self, use: "UsePlace") -> bool:
+        """Tell whether the body gets to a place at furniture, from nearby if that is too tight."""
+        space = self._actor.space
+        at = (use.x, use.y) if use.approach is None else use.approach
+        x, y = self._actor.home.plan.lattice.to_lattice(at).tolist()
+        there = space.part_at(x, y)
+        return (space.part_near(x, y) if there < 0 else there) == self._actor.part
 
     def _grid(self, room: "Room") -> list[Spot]:
         """Return the spots of a room: a grid of cells, a tighter one in a small room."""

@@ -1,6 +1,7 @@
 """How far long-term presence is from where users really were."""
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -35,6 +36,8 @@ F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
 DAY_S = 86_400
+MEAN = "mean"
+SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
 COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap")
 
 
@@ -50,6 +53,10 @@ class Realised(Metric):
         default=None,
         description="the truth is that of the last such time, in whole periods; null: of all time",
     )
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithm that it measures."""
+        return (self.of,)
 
     def start(self, home: "Home") -> None:
         """Begin counting."""
@@ -182,6 +189,13 @@ class LtpError(Realised):
             for user, row in self.last.items()
         }
 
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return each user's total variation, metres and day of burn-in."""
+        return {
+            user: {name: row[name] for name in SHOWN if name in row} for user, row in result.items()
+        }
+
 
 @register("metric", "ltp_gap")
 class LtpGap(Realised):
@@ -230,8 +244,18 @@ class LtpGap(Realised):
         """Return {user: {room: gap, "mean": of all rooms}} at the end."""
         return {
             user: {
-                "mean": float(gaps.mean()),
+                MEAN: float(gaps.mean()),
                 **dict(zip(self.rooms, gaps.tolist(), strict=True)),
             }
             for user, gaps in self.last.items()
         }
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return each user's mean gap, and the greatest with its room."""
+        found = {}
+        for user, gaps in result.items():
+            rooms = {room: gap for room, gap in gaps.items() if room != MEAN}
+            worst = max(rooms, key=lambda room: rooms[room])
+            found[user] = {MEAN: gaps[MEAN], worst: rooms[worst]}
+        return found

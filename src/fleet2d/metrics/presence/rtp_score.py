@@ -1,5 +1,6 @@
 """How well real-time presence tells where users are, by how long ago they were seen."""
 
+from collections.abc import Mapping
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -35,6 +36,7 @@ I64 = NDArray[np.int64]
 GAP_ENDS = (1, 5, 15, 60, 240)
 GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h")
 ALL = "all"
+SHOWN = ("log_loss", "brier", "top_1", "skill")  # in the closing table
 NEVER = -1
 
 
@@ -69,6 +71,10 @@ class RtpScore(Metric):
         default=timedelta(minutes=5), description="how often it is updated; that of the algorithm"
     )
     given_home: bool = Field(default=False, description="whether only bins at home count")
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithm that it scores."""
+        return (self.of,)
 
     def start(self, home: "Home") -> None:
         """Begin scoring."""
@@ -176,6 +182,13 @@ class RtpScore(Metric):
             if scores:
                 found[user] = scores
         return found
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return each user's main scores over all gaps."""
+        return {
+            user: {name: scores[ALL][name] for name in SHOWN} for user, scores in result.items()
+        }
 
 
 def _summary(truth: I64, belief: F64, naive: F64) -> dict[str, float]:

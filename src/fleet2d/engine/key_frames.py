@@ -1,0 +1,150 @@
+"""Key frames: the few poses from which every pose of a run can be rebuilt."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.store import RunStore
+from fleet2d.clock import Clock
+from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.ordering import in_order
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.plan import Track
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels.headings import in_radians
+from fleet2d.kernels.motion import Breakpoints
+
+# How a row of key_frames is to be read: a breakpoint that was reached, the end of a segment that
+# was broken off before it, or a state from which a random walk is drawn on.
+TRACK, PLANNED, WALK = 0, 1, 2
+KEY_KINDS = ("track", "planned", "walk")
+# A random walk is rebuilt from the last hour's key frame.
+WALK_KEY_US = 3_600_000_000
+
+
+class KeyFrames:
+    """Gathers the key frames of a run."""
+
+    def __init__(
+        self, store: RunStore, clock: Clock, home: Home, actors: Sequence[Actor], changes: bool
+    ) -> None:
+        """Prepare to gather.
+
+        Args:
+            store: Takes the rows.
+            clock: Of the run.
+            home: Of the run.
+            actors: Users, then robots.
+            changes: Whether walls may change during the run.
+        """
+        self._store, self._clock, self._home, self._actors = store, clock, home, actors
+        # A random walk is rebuilt by walking it again between walls that haven't changed since;
+        # where they may have, it is kept step by step.
+        self._walk_kind = TRACK if changes else WALK
+        self._walk_every = 1 if changes else max(1, WALK_KEY_US // clock.step_us)
+        # Breakpoints of the present plan already gathered; the plan before the first has none to
+        # tell.
+        self._emitted = [2] * len(actors)
+        self._told_until = [-1] * len(actors)
+        self._blocks: list[NDArray[np.int64]] = []
+        self._rows = 0
+
+    @property
+    def gathered(self) -> int:
+        """About how many rows wait to be stored; many small blocks take more than their rows."""
+        return self._rows + 8 * len(self._blocks)
+
+    def end_plan(self, row: int, step: int) -> None:
+        """Gather the end of the plan that is about to be replaced at `step`."""
+        self.pass_by(row, step)
+        self.break_off(row, step)
+        motion = self._actors[row].motion
+        track = motion.breakpoints if isinstance(motion, Track) else None
+        self._told_until[row] = (
+            int(track.time[-1])
+            if track is not None and self._emitted[row] == len(track.time)
+            else -1
+        )
+
+    def begin_plan(self, row: int, step: int) -> None:
+        """Gather the beginning of the plan that was just made at `step`."""
+        moment = step * self._clock.step_us
+        # A plan that takes over just where the last one ended needs no key frame to begin.
+        self._emitted[row] = int(self._told_until[row] == moment and step > 0)
+        actor = self._actors[row]
+        if not isinstance(actor.motion, Track):
+            self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
+        self.pass_by(row, step)
+
+    def pass_by(self, row: int, step: int) -> None:
+        """Gather the breakpoints of the present plan that are reached up to a step."""
+        motion = self._actors[row].motion
+        if not isinstance(motion, Track):
+            return
+        moment, track = step * self._clock.step_us, motion.breakpoints
+        begin = self._emitted[row]
+        if begin < len(track.time) and track.time[begin] <= moment:
+            end = int(np.searchsorted(track.time, moment, side="right"))
+            self._blocks.append(_keys(track, begin, end, row, TRACK, self._clock.step_us))
+            self._rows += end - begin
+            self._emitted[row] = end
+
+    def break_off(self, row: int, step: int) -> None:
+        """Gather where the present segment would have ended."""
+        motion = self._actors[row].motion
+        if isinstance(motion, Track):
+            begin = self._emitted[row]
+            if begin < len(motion.breakpoints.time):
+                planned = _keys(
+                    motion.breakpoints, begin, begin + 1, row, PLANNED, self._clock.step_us
+                )
+                planned[:, 0] = step
+                self._blocks.append(planned)
+
+    def span(self, block: PoseBlock, first: int, count: int) -> None:
+        """Gather the states of random walks in a span."""
+        every = self._walk_every
+        for row, actor in enumerate(self._actors):
+            if isinstance(actor.motion, Track):
+                continue
+            for step in range(-(-first // every) * every, first + count, every):
+                if step != actor.planned_at:
+                    state = block.state(row, step - first)
+                    moment = step * self._clock.step_us
+                    self._blocks.append(_key(step, row, self._walk_kind, moment, state))
+
+    def store(self) -> None:
+        """Hand everything gathered to the store."""
+        if not self._blocks:
+            return
+        rows = in_order(self._blocks)
+        self._blocks, self._rows = [], 0
+        xy = self._home.plan.lattice.to_metres(rows[:, 4:6])
+        self._store.append(
+            "key_frames",
+            step=rows[:, 0],
+            time=self._clock.moments(rows[:, 3]),
+            entity=rows[:, 1].astype(np.int32),
+            kind=rows[:, 2].astype(np.int32),
+            x=xy[:, 0],
+            y=xy[:, 1],
+            heading=in_radians(rows[:, 6]),
+            away=rows[:, 7].astype(bool),
+        )
+
+
+def _key(step: int, row: int, kind: int, time_us: int, state: Sequence[int]) -> NDArray[np.int64]:
+    return np.array([[step, row, kind, time_us, *state]], np.int64)
+
+
+def _keys(
+    track: Breakpoints, begin: int, end: int, row: int, kind: int, step_us: int
+) -> NDArray[np.int64]:
+    keys = np.empty((end - begin, 8), np.int64)
+    time = track.time[begin:end]
+    keys[:, 0] = -(-time // step_us)
+    keys[:, 1], keys[:, 2], keys[:, 3] = row, kind, time
+    keys[:, 4], keys[:, 5] = track.x[begin:end], track.y[begin:end]
+    keys[:, 6], keys[:, 7] = track.heading[begin:end], track.away[begin:end]
+    return keys

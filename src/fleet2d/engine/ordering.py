@@ -1,0 +1,15 @@
+"""The order of rows, the same however a run was cut into spans."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def in_order(blocks: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Join blocks of rows (step, entity, …) and sort them; ties stay in the order gathered.
+
+    Example:
+        >>> in_order([np.array([[1, 1, 5]]), np.array([[1, 0, 6], [0, 1, 7]])]).tolist()
+        [[0, 1, 7], [1, 0, 6], [1, 1, 5]]
+    """
+    rows = np.concatenate(blocks)
+    return rows[np.lexsort((rows[:, 1], rows[:, 0]))]

@@ -1,0 +1,98 @@
+"""Samples: where everybody is, as often as a scenario asks for it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.store import RunStore
+from fleet2d.clock import Clock
+from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.ordering import in_order
+from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels.headings import in_radians
+from fleet2d.kernels.mesh import SUB
+from fleet2d.units import micros
+
+
+class Samples:
+    """Gathers the rows of the table of trajectories.
+
+    Attributes:
+        gathered: How many rows wait to be stored.
+    """
+
+    def __init__(
+        self, store: RunStore, settings: ArtifactSettings, clock: Clock, home: Home
+    ) -> None:
+        """Prepare to gather.
+
+        Raises:
+            ScenarioError: The interval between samples is not a multiple of the step.
+        """
+        self._store, self._clock, self._home = store, clock, home
+        self._every = _steps_between(settings, clock)
+        self._blocks: list[NDArray[np.int64]] = []
+        self.gathered = 0
+
+    def span(self, block: PoseBlock, first: int, count: int) -> None:
+        """Gather the samples of a span."""
+        if not self._every:
+            return
+        steps = np.arange(-(-first // self._every) * self._every, first + count, self._every)
+        if not len(steps):
+            return
+        bodies = len(block.x)
+        rows = np.empty((len(steps), bodies, 6), np.int64)
+        rows[:, :, 0] = steps[:, None]
+        rows[:, :, 1] = np.arange(bodies)
+        columns = steps - first
+        rows[:, :, 2] = block.x[:, columns].T
+        rows[:, :, 3] = block.y[:, columns].T
+        rows[:, :, 4] = block.heading[:, columns].T
+        rows[:, :, 5] = block.away[:, columns].T
+        self._blocks.append(rows.reshape(-1, 6))
+        self.gathered += len(steps) * bodies
+
+    def store(self) -> None:
+        """Hand everything gathered to the store."""
+        if not self._blocks:
+            return
+        rows = in_order(self._blocks)
+        self._blocks, self.gathered = [], 0
+        step, entity, x, y, heading, away = rows.T
+        plan = self._home.plan
+        gone = away.astype(bool)
+        xy = plan.lattice.to_metres(rows[:, 2:4])
+        xy[gone] = np.nan
+        room = plan.room_of_place[y // SUB, x // SUB].astype(np.int32)
+        self._store.append(
+            "trajectories",
+            step=step,
+            time=self._clock.times(step),
+            entity=entity.astype(np.int32),
+            x=xy[:, 0],
+            y=xy[:, 1],
+            heading=in_radians(heading),
+            room=np.where(gone, np.int32(-1), room),
+            away=gone,
+        )
+
+
+def _steps_between(settings: ArtifactSettings, clock: Clock) -> int:
+    """Return how many steps lie between two samples, 0 for no samples.
+
+    Raises:
+        ScenarioError: The interval is not a multiple of the step.
+    """
+    if settings.trajectories == "off":
+        return 0
+    if settings.trajectories == "every step":
+        return 1
+    every, rest = divmod(micros(settings.trajectories), clock.step_us)
+    if rest or not every:
+        raise ScenarioError(
+            f"artifacts.trajectories is {settings.trajectories}, which is no multiple of"
+            f" simulation.step ({clock.step_us / 1e6:g} s): choose one, 'every step' or 'off'"
+        )
+    return every

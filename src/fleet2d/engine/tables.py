@@ -1,0 +1,97 @@
+"""The tables of a run: what columns each has."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.engine.buckets import Eye
+from fleet2d.engine.key_frames import KEY_KINDS
+from fleet2d.engine.sensors import Sensors
+from fleet2d.sight.perception import POSTURES
+
+STEP = Column("step", "step", description="step at which the row takes effect")
+TIME = Column("time", "time", description="local time")
+X = Column("x", "float64", "m", nullable=True)
+Y = Column("y", "float64", "m", nullable=True)
+HEADING = Column("heading", "float64", "rad", description="counter-clockwise from +x")
+
+
+def table_specs(
+    users: Sequence[str],
+    robots: Sequence[str],
+    rooms: Sequence[str],
+    settings: ArtifactSettings,
+    objects: Sequence[str] = (),
+    *,
+    changes: bool = False,
+    cameras: Sequence[str] = (),
+    activities: bool = False,
+) -> list[TableSpec]:
+    """Return the tables that a run with these settings stores; `cameras` are told_cameras()."""
+    entity = Column("entity", "category", categories=(*users, *robots))
+    room = Column("room", "category", nullable=True, categories=tuple(rooms))
+    away = Column("away", "bool", description="not at home; x and y are where it left")
+    specs = []
+    if settings.trajectories != "off":
+        specs.append(TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away)))
+    if settings.key_frames:
+        kind = Column("kind", "category", categories=KEY_KINDS)
+        specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
+    if settings.observations and users and robots:
+        specs.append(_observation_table(users, robots, room, cameras, activities))
+    if settings.events:
+        event, detail = Column("event", "category"), Column("detail", "string")
+        user = Column("user", "category", nullable=True, categories=tuple(users))
+        whom = (user,) if users else ()
+        who = entity
+        if changes:
+            what = "what did it, or what it happened to; none: the home itself"
+            names = (*users, *robots, *objects)
+            who = Column("entity", "category", categories=names, nullable=True, description=what)
+        specs.append(TableSpec("events", (STEP, TIME, who, event, *whom, detail)))
+    return specs
+
+
+def told_cameras(eyes: Sequence[Eye]) -> tuple[str, ...]:
+    """Return the names of all cameras if a run has to tell them apart, or from the truth.
+
+    It does where a robot has several, or errs.
+    """
+    if not any(eye.errs or len(eye.cameras) > 1 for eye in eyes):
+        return ()
+    return tuple(dict.fromkeys(name for eye in eyes for name in eye.cameras))
+
+
+def _observation_table(
+    users: Sequence[str],
+    robots: Sequence[str],
+    room: Column,
+    cameras: Sequence[str],
+    activities: bool,
+) -> TableSpec:
+    """Return the table of what was perceived; where that can be wrong, with the truth beside it."""
+    robot = Column("robot", "category", categories=tuple(robots))
+    user = Column("user", "category", nullable=bool(cameras), categories=tuple(users))
+    columns = [STEP, TIME, robot, user, X, Y, room]
+    if cameras:
+        posture = Column("posture", "category", categories=POSTURES)
+        true = {
+            column.name: replace(column, name=f"true_{column.name}", nullable=True)
+            for column in (user, X, Y, HEADING, posture)
+        }
+        camera = Column("camera", "category", categories=tuple(cameras))
+        columns += [HEADING, posture, camera, *true.values()]
+    if activities:
+        doing = "what the user does, as far as a behavior tells"
+        for name in ("activity", "true_activity"):
+            columns.append(Column(name, "category", nullable=True, description=doing))
+    return TableSpec("observations", tuple(columns))
+
+
+def sensor_table(sensors: Sensors) -> TableSpec:
+    """Return the table of what sensors say, in the layout of the CASAS smart homes."""
+    sensor = Column("sensor", "category", categories=tuple(sensors.names))
+    room, state = Column("room", "category"), Column("state", "category")
+    activity = Column("activity", "string", description="what the person does, as far as told")
+    return TableSpec("sensors", (STEP, TIME, room, sensor, state, activity))
