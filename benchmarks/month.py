@@ -34,6 +34,7 @@ DAY = {
     ]
 }
 SCHEDULE = {"type": "schedule", "days": [DAY]}
+ROUTINE = {"type": "routine", "persona": "works_outside"}
 PATROL = {"behaviors": [{"type": "patrol", "dwell": "10 min"}]}
 MEANDER = {"behaviors": [{"type": "meander"}]}
 PHASES = ("setup", "simulate", "save")
@@ -207,10 +208,12 @@ def main() -> None:
     run_once(scenario(plan, {"ana": SCHEDULE}, PATROL, 1))  # compile what is not yet compiled
     run_once(scenario(plan, {"ana": MEANDER}, MEANDER, 1))
     month = scenario(plan, {"ana": SCHEDULE}, PATROL, 30)
+    routine = scenario(plan, {"ana": ROUTINE}, PATROL, 30)
     walks = scenario(plan, {"ana": MEANDER}, MEANDER, 30)
     crowd = scenario(plan, {f"user{i}": SCHEDULE for i in range(50)}, PATROL, 30)
     rows = [
         measure("month: 1 robot patrols, 1 user on a schedule", month, runs, 1, 0.2),
+        measure("the same with a sampled routine", routine, runs),
         measure("the same with meander for both", walks, runs, 1.5, 0.4),
         measure_process(plan, runs),
         measure_first(plan, min(runs, 3)),

@@ -270,7 +270,7 @@ def time_month(repeats: int = 5) -> None:
     best: dict[str, float] = {}
     for turn in range(repeats + 1):
         for who in ("schedule", *bundled()):
-            content = fleet2d.load_scenario("bundled:base").resolved()
+            content = fleet2d.load_scenario("bundled:rounds").resolved()
             if who != "schedule":
                 content["users"] = {"ana": {"type": "routine", "persona": who}}
             with tempfile.TemporaryDirectory() as folder:
@@ -281,7 +281,7 @@ def time_month(repeats: int = 5) -> None:
                 best[who] = min(best.get(who, took), took)
     for who, took in best.items():
         more = took / best["schedule"] - 1
-        print(f"base month, {who:<16} {took:6.3f} s of processor time, {more:+.0%}")
+        print(f"month, {who:<16} {took:6.3f} s of processor time, {more:+.0%}")
 
 
 def time_crowd(users: int, days: int) -> None:

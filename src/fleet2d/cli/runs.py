@@ -118,7 +118,9 @@ def _announce_compilation() -> None:
     from fleet2d.kernels._jit import cache_directory
 
     if not cache_directory().exists():
-        text = "compiling the kernels, once on this machine: 10 to 20 s of this first run …"
+        text = (
+            "compiling the kernels, once on this machine: about half a minute of this first run …"
+        )
         typer.echo(text, err=True)
 
 
