@@ -326,16 +326,19 @@ def merged(below: Any, above: Any) -> Any:
     return above
 
 
-@cache
+_READ: dict[str, Persona] = {}  # bundled personas that were asked for
+
+
 def bundled_persona(name: str) -> Persona:
-    """Return a persona that comes with Fleet2D."""
-    return Persona.model_validate(read_document(BUNDLED / f"{name}.yaml").data)
+    """Return a persona that comes with Fleet2D: the same each time."""
+    if name not in _READ:
+        _READ[name] = Persona.model_validate(read_document(BUNDLED / f"{name}.yaml").data)
+    return _READ[name]
 
 
 def _dump(persona: Persona, dump: SerializerFunctionWrapHandler) -> Any:
     """Write the name of a bundled persona, any other whole: no stored run depends on its file."""
-    names = (name for name in bundled() if bundled_persona(name) is persona)
-    return next(names, None) or dump(persona)
+    return next((name for name, read in _READ.items() if read is persona), None) or dump(persona)
 
 
 AnyPersona = Annotated[

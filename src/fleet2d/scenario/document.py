@@ -1,6 +1,7 @@
 """Read one YAML file into plain data that remembers where each value was written."""
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -62,11 +63,10 @@ def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | No
         ScenarioError: the text is not YAML; with file and line.
     """
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
+        node = _compose(text)
         if node is None:
             return None
-        return _Builder(loader, folder, shown, {} if places is None else places).build(node, ())
+        return _Builder(folder, shown, {} if places is None else places).build(node, ())
     except yaml.MarkedYAMLError as error:
         line = (
             f":{error.problem_mark.line + 1}" if error.problem_mark and places is not None else ""
@@ -117,8 +117,36 @@ def _read_text(path: Path, shown: str) -> str:
         raise ScenarioError(f"can't read {shown}: {error.strerror}") from error
 
 
+# libyaml calls itself for each level of a text, without end; PyYAML's own parser stops in time.
+SHALLOW = 2000
+
+
+def _compose(text: str) -> yaml.Node | None:
+    """Return the tree of nodes of a YAML text, None if it is empty.
+
+    libyaml reads ten times as fast; PyYAML's own parser says better what is wrong.
+    """
+    levels = text.count("[") + text.count("{") + 2 * max(map(len, text.splitlines()), default=0)
+    if levels < SHALLOW:
+        with suppress(yaml.YAMLError, RecursionError):
+            return _composed(_FastLoader(text))
+    return _composed(_Loader(text))
+
+
+def _composed(loader: Any) -> yaml.Node | None:
+    try:
+        node: yaml.Node | None = loader.get_single_node()
+        return node
+    finally:
+        loader.dispose()
+
+
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader with the scalars of YAML 1.2, dates included."""
+
+
+class _FastLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """The same in C, where PyYAML comes with it."""
 
 
 _Loader.yaml_implicit_resolvers = {}
@@ -143,6 +171,7 @@ _TIMESTAMP = [
 ]
 for _digit in "0123456789":
     _Loader.yaml_implicit_resolvers[_digit] += _TIMESTAMP
+_FastLoader.yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
 
 
 def _construct_int(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
@@ -168,11 +197,11 @@ _Loader.add_constructor(_TAG + "timestamp", _construct_timestamp)
 class _Builder:
     """Turns a tree of YAML nodes into plain data."""
 
-    loader: _Loader
     folder: Path
     shown: str
     places: dict[Keys, str]
     open_nodes: list[yaml.Node] = field(default_factory=list)
+    loader: _Loader = field(default_factory=lambda: _Loader(""))  # constructs scalars
 
     def build(self, node: yaml.Node, location: Keys) -> Any:
         """Build a node's value; note where it starts."""
