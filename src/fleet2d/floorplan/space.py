@@ -158,8 +158,26 @@ class Space:
             float64 (rows, columns) [m], steps to sides and corners of cells, so up to 8 % longer
             than the straight way; infinite where the body can't be or come from.
         """
+        return self._metres(self._steps(places))
+
+    def distances(self, place: tuple[int, int], points: I64) -> NDArray[np.float64]:
+        """Return how far some points are on foot from a place, as `distance_field` measures.
+
+        Args:
+            place: Lattice point.
+            points: Lattice points (n, 2).
+
+        Returns:
+            float64 (n,) [m].
+        """
+        steps = self._steps(np.array([place], np.int64))
+        return self._metres(steps[points[:, 1] // SUB, points[:, 0] // SUB])
+
+    def _steps(self, places: I64) -> NDArray[np.int32]:
         cells = np.asarray(places, np.int64).reshape(-1, 2)[:, ::-1] // SUB
-        steps = walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
+        return walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
+
+    def _metres(self, steps: NDArray[np.int32]) -> NDArray[np.float64]:
         return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:

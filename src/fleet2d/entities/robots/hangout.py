@@ -13,6 +13,7 @@ from fleet2d.entities.hours import Hours, holds
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import face
 from fleet2d.entities.robots.belief import ANYONE, room_belief
+from fleet2d.entities.robots.looking import Views, views_of
 from fleet2d.entities.robots.places import Nearness, Places
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.vocabulary import PRIORITY
@@ -22,6 +23,10 @@ from fleet2d.units import Length, PositiveDuration, Share
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.floorplan.space import Space
+
+# A room is looked over when so much of it was shown, or from so many places.
+ENOUGH = 0.95
+MOST_VIEWS = 4
 
 
 @register("behavior", "hangout")
@@ -38,10 +43,10 @@ class Hangout(Behavior):
     person of radius 0.25 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
     it; and m = t / (t + tau), with t the seconds on foot from where it is. It moves only to a place
     that beats the present one by `hysteresis`, and never in quiet hours. With probability
-    `explore` it goes to a room drawn with equal chances instead, so that what it believes doesn't
-    feed on itself.
+    `explore` it goes to a room drawn with equal chances instead, looks all of it over, and comes
+    back, so that what it believes doesn't feed on itself.
 
-    Events: `relocates`, with the room it goes to, and `explores`.
+    Events: `relocates`, with the room it goes to, and `explores`, with the room it looks over.
     """
 
     source: str | None = Field(
@@ -66,7 +71,7 @@ class Hangout(Behavior):
         default=0.1, ge=0, description="by how much another place must be better for it to move"
     )
     explore: Share = Field(
-        default=0.1, description="share of decisions in which it goes to any room instead"
+        default=0.1, description="share of decisions in which it looks over any room instead"
     )
     avoid: tuple[str, ...] = Field(
         default=(),
@@ -91,6 +96,8 @@ class Hangout(Behavior):
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
         self.ways: tuple[Space, dict[tuple[int, int], NDArray[np.float64]]] = actor.space, {}
+        self.explored = [r.index for r in actor.reachable_rooms() if r.index not in avoided]
+        self.views: tuple[int, dict[int, Views]] = actor.home.version, {}
         self.place: int | None = None
         self.decides_at = actor.clock.start
 
@@ -109,7 +116,12 @@ class Hangout(Behavior):
             return plan.stay(until=still)
         if now.time >= self.decides_at or self.place is None:
             self.decides_at = now.time + self.period
-            self._choose(now, plan)
+            draws = now.random("hangout")
+            explores = draws.uniform() < self.explore
+            if self.place is None or not explores:
+                self._choose(now, plan)
+            if explores:
+                self._look_over(now, plan, draws.choice(self.explored))
         x, y = self.places.points[self.place].tolist()
         if (plan.x, plan.y) != (x, y):
             plan.go_to_point(x, y)
@@ -120,19 +132,24 @@ class Hangout(Behavior):
 
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until it thinks again."""
-        draws = now.random("hangout")
-        if draws.uniform() < self.explore:
-            rooms = sorted(set(self.places.room.tolist()))
-            here = np.flatnonzero(self.places.room == draws.choice(rooms)).tolist()
-            self.place = draws.choice(here)
-            plan.note("explores", self._room_name(now))
-            return
         belief = room_belief(now, self.source, self.user)
         scores = self._scores(now, belief.joint)
         best = int(np.argmax(scores))
         if self.place is None or scores[best] > scores[self.place] + self.hysteresis:
             self.place = best
-            plan.note("relocates", self._room_name(now))
+            plan.note("relocates", now.home.plan.rooms[int(self.places.room[best])].name)
+
+    def _look_over(self, now: Situation, plan: Plan, room: int) -> None:
+        """Look round in a room from where nearly all of it is in view; walls as they are now."""
+        actor = now.actor
+        if self.views[0] != actor.home.version:
+            self.views = actor.home.version, {}
+        if room not in self.views[1]:
+            self.views[1][room] = views_of(actor, actor.home.rooms[room], ENOUGH, MOST_VIEWS)
+        plan.note("explores", actor.home.rooms[room].name)
+        for point in self.views[1][room].points:
+            if plan.reaches(*point):
+                plan.go_to_point(*point).turn_by(1.0)
 
     def _scores(self, now: Situation, joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the rating of each place: float64 (n,); products are summed room by room."""
@@ -153,8 +170,7 @@ class Hangout(Behavior):
             self.ways = space, {}
         cell = actor.state.x // SUB, actor.state.y // SUB
         if cell not in self.ways[1]:
-            here = np.array([[actor.state.x, actor.state.y]], np.int64)
-            metres = space.distance_field(here)[points[:, 1] // SUB, points[:, 0] // SUB]
+            metres = space.distances((actor.state.x, actor.state.y), points)
             seconds = metres * actor.home.plan.lattice.units_per_m / actor.speed
             reached = np.isfinite(seconds)
             way = np.where(reached, seconds, 0.0)
@@ -168,9 +184,6 @@ class Hangout(Behavior):
         x, y = now.home.plan.lattice.to_lattice(room.anchor_xy).tolist()
         if (x, y) != (plan.x, plan.y):
             face(plan, x, y)
-
-    def _room_name(self, now: Situation) -> str:
-        return now.home.plan.rooms[int(self.places.room[self.place])].name
 
     def _quiet_begins(self, until: datetime, time: datetime) -> datetime:
         """Return when the next quiet hours begin, or `until` if that is earlier."""
