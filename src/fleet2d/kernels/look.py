@@ -238,8 +238,10 @@ def look(
     given, is_given = crowd.shown, crowd.shown.shape[0] > 0
     found = happened = 0
     awake = int(seen.sum())
+    # What is known at once needs no backlog, whose rows would come in the same order.
+    prompt = int(latency.sum()) + int(errs.sum()) + int(waiting[:, 1].sum()) == 0
     for j in range(robot_x.shape[0]):
-        now = first + j
+        now, before = first + j, found
         for c in range(cameras):
             if robot_away[j] or (period[c] > 1 and now % period[c] != 0):
                 continue
@@ -305,6 +307,15 @@ def look(
                 if not noticed:
                     continue
                 about[c, u, NOTICED] += 1
+                if prompt:
+                    sightings[found, STEP], sightings[found, CAMERA] = now, c
+                    sightings[found, USER], sightings[found, IDENTITY] = u, u
+                    for shift in (X, TRUE_X):
+                        sightings[found, shift], sightings[found, shift + 1] = x + dx, y + dy
+                        sightings[found, shift + 2], sightings[found, shift + 3] = faces, poses
+                    last[u] = now
+                    found += 1
+                    continue
                 row = append(backlog, waiting, c)
                 row[STEP], row[CAMERA], row[USER] = now + latency[c], c, u
                 row[TRUE_X], row[TRUE_Y] = x + dx, y + dy
@@ -319,7 +330,6 @@ def look(
                 if ghost >= ghosts[c, 0]:  # seldom: there are any
                     count = pick(ghosts[c], ghost)
                     imagine(walls, lenses, errors, memory, c, count, now, x, y, heading)
-        before = found
         for c in range(cameras):
             if waiting[c, 1] > 0:
                 found = deliver(memory, c, now, sightings, found)

@@ -16,14 +16,17 @@ if TYPE_CHECKING:
 
 # Who was lost is looked for from as near as this to where that was [m].
 SOUGHT_FROM = 0.3
+# Of who was perceived no farther than this from the last time [m] it looks ever more seldom.
+STILL = 0.3
+SELDOM = timedelta(seconds=32)
 
 
 @register("behavior", "follow")
 class Follow(Behavior):
     """Follow a person at a distance for as long as the cameras have the person in view.
 
-    It looks up where the person is every `update`, and drives there by the shortest path. Who is
-    lost is looked for where the person was perceived last: it drives there and turns round once;
+    It looks up where the person is every `update`, and drives there by the shortest path; while
+    the person rests, at twice the interval each time, up to 32 s. Who is lost is looked for where the person was perceived last: it drives there and turns round once;
     then the robot is left to the behaviors behind, until the person comes into view again. Events:
     `follows`, `lost`, with the person's name.
     """
@@ -50,6 +53,7 @@ class Follow(Behavior):
         check_has_camera(actor, "follow")
         self.whom: str | None = None
         self.last = (0.0, 0.0)  # where the person was perceived last [m]
+        self.pause = self.update
         self.since = actor.clock.start
         self.searching = False
 
@@ -87,9 +91,14 @@ class Follow(Behavior):
 
     def _follow(self, now: Situation, plan: Plan) -> Plan:
         self.searching = False
-        self.last = x, y = now.in_view[self.whom or ""]
+        (x, y), (old_x, old_y) = now.in_view[self.whom or ""], self.last
+        rests = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL**2
+        self.pause = min(2 * self.pause, max(SELDOM, self.update)) if rests else self.update
+        self.last = x, y
         approach(now, plan, x, y, self.distance)
         face(plan, *now.home.plan.lattice.to_lattice((x, y)).tolist())
+        until = now.time + self.pause
+        if self.longest:
+            until = min(until, self.since + self.longest)
         # A long way is looked at again before its end: the person goes on.
-        plan.stay(until=now.time + self.update)
-        return plan.ask_by(now.time + self.update)
+        return plan.interrupt_on("user_lost").stay(until=until).ask_by(until)
