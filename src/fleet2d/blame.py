@@ -7,6 +7,8 @@ from typing import Any
 
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
+FRAMES = 4  # of the user's own code that are told, the innermost
+
 
 class blame:  # noqa: N801  (used as a function)
     """Name the component and the step when a component's code fails.
@@ -38,18 +40,19 @@ class blame:  # noqa: N801  (used as a function)
         if isinstance(error, InputError) and self.step is None:
             return
         own = isinstance(error, ComponentError)
-        if own and self.path in str(error):
-            return
-        what = str(error) if own else f"{type(error).__name__}: {error}"
         when = "when it was started" if self.step is None else f"at step {self.step}"
+        if own and self.path in str(error):
+            if when in str(error):
+                return
+            raise ComponentError(f"{error} ({when})") from error
+        what = str(error) if own else f"{type(error).__name__}: {error}"
         raise ComponentError(f"{self.path} failed {when}: {what}{_place(error)}") from error
 
 
 def _place(error: BaseException) -> str:
-    """Return where in a file outside Fleet2D an error arose: the user's own code."""
+    """Return where in files outside Fleet2D an error arose: the user's own code, caller first."""
     frames = traceback.extract_tb(error.__traceback__)
     others = (str(Path(__file__).parent), sys.prefix, sys.base_prefix, "<")
     own = [f for f in frames if not f.filename.startswith(others)]
-    if not own:
-        return ""
-    return f" ({Path(own[-1].filename).name}:{own[-1].lineno}, in {own[-1].name}: {own[-1].line})"
+    lines = [f"{Path(f.filename).name}:{f.lineno}, in {f.name}: {f.line}" for f in own[-FRAMES:]]
+    return f" ({'; '.join(lines)})" if lines else ""

@@ -436,7 +436,7 @@ def test_outputs_may_be_left_unstored() -> None:
         (lambda s: {"x": {"a": 1}}, ["'x'"]),
         (lambda s: {"x": np.zeros((2, 2))}, ["x"]),
         (lambda s: {"step": 1}, ["step"]),
-        (lambda s: s.outputs["ltp"], ["KeyError", "ltp"]),
+        (lambda s: s.outputs["ltp"], ["no algorithm 'ltp'", "There are: mine"]),
         (lambda s: s.home.plan.room("attic"), ["no room 'attic'"]),
         (lambda s: 1 / 0, ["ZeroDivisionError"]),
     ],

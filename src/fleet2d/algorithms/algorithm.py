@@ -52,7 +52,9 @@ class Present:
 class Algorithm(Component):
     """Base of what computes from history and state; a subclass writes `update`.
 
-    It is updated after every full `period`, with the history of exactly that period. What it
+    It is updated after every full `period`, with the history of exactly that period; or, with `on`,
+    at the end of each step in which one of these events happens, with the history since the update
+    before. What it
     returns (a RoomDistribution, or a mapping of names to numbers or arrays; None for nothing) is
     stored as rows of a table of its own, and everybody reads it from the next step on. Run state is
     set in `start`.
@@ -80,6 +82,11 @@ class Algorithm(Component):
 
     period: PositiveDuration = Field(
         default=timedelta(hours=1), description="how often it is updated"
+    )
+    on: tuple[str, ...] = Field(
+        default=(),
+        description="events that update it, instead of the period: user_seen, user_lost, sensor, or"
+        " what a robot's plan notes",
     )
     reads: tuple[str, ...] = Field(
         default=(), description="algorithms whose output it uses; they are updated before it"

@@ -1,6 +1,6 @@
 """What happened in a stretch of steps, handed to who may know it: algorithms and metrics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,7 @@ class History:
     step_s: float
     visible: frozenset[str]  # the bodies whose poses may be asked for
     oldest: int = 0  # the first step that is kept for who looks back
+    needs: frozenset[str] = frozenset()  # what the asker's class said that it would ask for
 
     def between(self, first: int, end: int) -> "History":
         """Return the history of the steps from `first` to `end` - 1.
@@ -70,7 +71,7 @@ class History:
                 f"the steps from {first} to {end} were asked for, but those from {self.oldest} to"
                 f" {self.end} are kept: say by looks_back in the class how far back you look"
             )
-        return History(self.log, first, end, self.step_s, self.visible, self.oldest)
+        return replace(self, first=first, end=end)
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -129,6 +130,7 @@ class History:
         Raises:
             ComponentError: The asker has no needs = {"exposure"}.
         """
+        self._check_needs("exposure")
         return self.log.exposure(self.first, self.end)
 
     @cached_property
@@ -138,8 +140,16 @@ class History:
         Raises:
             ComponentError: The asker has no needs = {"evidence"}, or no period of whole minutes.
         """
+        self._check_needs("evidence")
         users = sum(path.startswith("users.") for path in self.log.paths)
         return self.log.evidence(self.first, self.end, users)
+
+    def _check_needs(self, what: str) -> None:
+        if what not in self.needs:
+            raise ComponentError(
+                f"{what} was asked for, but isn't worked out unless somebody says so before: write"
+                f" needs = {{{what!r}}} in the class of the component"
+            )
 
     def _check_metric(self, what: str) -> None:
         if self.visible != frozenset(self.log.index):

@@ -1,7 +1,8 @@
 """What is kept of a run: motions, observations and events, as far back as somebody may ask."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -25,6 +26,10 @@ from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.floorplan.home import Home
+
+
+HOME = ""  # the entity of events of the home itself
+SENSOR = "sensor"  # what is called when a sensor says something
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,37 @@ class SensorRow(NamedTuple):
     activity: str
 
 
+class Sights(NamedTuple):
+    """Who came into view of the cameras of a body, and who was lost, in a span.
+
+    Attributes:
+        entity: Name of the body.
+        events: What is called when somebody is lost, and when somebody is seen.
+        others: Names of those that it can see; behind them comes somebody unknown.
+        step: int64 (n,), in order.
+        user: int64 (n,), index of who.
+        kind: int64 (n,), index of the event.
+        end: One past the last step of the span.
+    """
+
+    entity: str
+    events: tuple[str, str]
+    others: Sequence[str]
+    step: NDArray[np.int64]
+    user: NDArray[np.int64]
+    kind: NDArray[np.int64]
+    end: int
+
+    def between(self, first: int, end: int) -> list[Event]:
+        """Return those of the steps from `first` to `end` - 1."""
+        here = slice(*np.searchsorted(self.step, (first, end)).tolist())
+        rows = zip(
+            *(column[here].tolist() for column in (self.step, self.user, self.kind)), strict=True
+        )
+        names = (*self.others, "")
+        return [Event(step, self.entity, self.events[kind], names[who]) for step, who, kind in rows]
+
+
 class Log:
     """The motions and observations of a run, as far back as somebody may ask."""
 
@@ -64,7 +100,9 @@ class Log:
         self.pieces: list[list[Piece]] = [[] for _ in actors]
         self.observations: list[NDArray[np.int64]] = []  # (n, OBSERVATION) each
         self._actors = actors
-        self._events: list[Event] = []  # of plans that were replaced
+        # Of plans that were replaced, with the step at which they were: no later than the event.
+        self._events: list[tuple[int, Event]] = []
+        self.sights: list[Sights] = []
         self.readings: list[SensorRow] = []
         self.cameras: list[tuple[int, str]] = []  # index of the robot, and name
         self._looks: dict[int, NDArray[np.int64]] = {}
@@ -85,7 +123,8 @@ class Log:
             del pieces[:keep]
         self.observations = [o for o in self.observations if o[-1, STEP] >= before]
         self.readings = [row for row in self.readings if row.step >= before]
-        self._events = [event for event in self._events if event.step >= before]
+        self._events = [(at, event) for at, event in self._events if event.step >= before]
+        self.sights = [sights for sights in self.sights if sights.end > before]
         self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
         self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
         if self._bins is not None:
@@ -95,14 +134,36 @@ class Log:
     def tell(self, actor: "Actor", step: int) -> None:
         """Keep what the plan of a body said happens up to `step`, at which it is replaced."""
         if actor.plan.notes:
-            self._events += [event for event in _events(actor) if event.step <= step]
+            self._events += [(step, event) for event in _events(actor) if event.step <= step]
+
+    def next_note(self, step: int, names: Set[str]) -> int | None:
+        """Return the next step from `step` on at which a plan says one of these happens."""
+        notes = [event for actor in self._actors for event in _events(actor)]
+        notes += [event for _, event in self._told_from(step)]
+        steps = (event.step for event in notes if event.event in names and event.step >= step)
+        return min(steps, default=None)
+
+    def _told_from(self, step: int) -> list[tuple[int, Event]]:
+        """Return what plans that were replaced at `step` or later said."""
+        return list(takewhile(lambda item: item[0] >= step, reversed(self._events)))[::-1]
 
     def events(self, first: int, end: int) -> list[Event]:
-        """Return what plans said happens in the steps from `first` to `end` - 1, in order."""
+        """Return what happened in the steps from `first` to `end` - 1, in order.
+
+        What plans said happens, and who came into view or was lost.
+        """
         going_on = [event for actor in self._actors for event in _events(actor)]
-        found = [event for event in self._events + going_on if first <= event.step < end]
+        found = [event for _, event in self._told_from(first)] + going_on
+        found = [event for event in found if first <= event.step < end]
+        for sights in takewhile(lambda sights: sights.end > first, reversed(self.sights)):
+            found += sights.between(first, end)
         order = self.index
         return sorted(found, key=lambda event: (event.step, order[event.entity]))
+
+    def happened(self, step: int) -> list[Event]:
+        """Return what happened at one step, readings of sensors among it."""
+        said = [Event(step, HOME, SENSOR, "") for row in self.readings if row.step == step]
+        return self.events(step, step + 1) + said[:1]
 
     def poses(self, name: str, first: int, end: int) -> BodyPoses:
         """Return the poses of a body in the steps from `first` to `end` - 1."""
@@ -147,9 +208,13 @@ class Log:
             self._looks[step] = np.concatenate(counts)
 
     def looks(self, first: int, end: int, users: int) -> Looks:
-        """Return the looks in the steps from `first` to `end` - 1, both counted before."""
+        """Return the looks in the steps from `first` to `end` - 1.
+
+        Raises:
+            ComponentError: They weren't counted before one of these.
+        """
         none = np.zeros((len(self.cameras), users, 2), np.int64)
-        counts = self._looks.get(end, none) - self._looks.get(first, none)
+        counts = _known_at(self._looks, end, none) - _known_at(self._looks, first, none)
         robots = np.array([robot for robot, _ in self.cameras], np.int32)
         names = tuple(name for _, name in self.cameras)
         return Looks(robots, names, counts[..., 0], counts[..., 1])
@@ -166,14 +231,9 @@ class Log:
         """Return what was watched and perceived in the steps from `first` to `end` - 1.
 
         Raises:
-            ComponentError: Nobody said before the run that it would be asked for, or the steps
-                aren't whole bins.
+            ComponentError: The steps aren't whole bins.
         """
-        if self._bins is None:
-            raise ComponentError(
-                "evidence was asked for, but isn't worked out unless somebody says so before: write"
-                " needs = {'evidence'} in the class of the component"
-            )
+        assert self._bins is not None, "nobody needs evidence"
         if first % self.bin_steps or end % self.bin_steps:
             raise ComponentError(
                 f"evidence comes in bins of {self.bin_steps} steps, but the period from step"
@@ -194,16 +254,26 @@ class Log:
     def exposure(self, first: int, end: int) -> NDArray[np.int64]:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
 
+        Before the run somebody must have said that it would be asked for.
+
         Raises:
-            ComponentError: Nobody said before the run that it would be asked for.
+            ComponentError: It wasn't added up before one of these.
         """
-        if end not in self._exposures:
-            raise ComponentError(
-                "exposure was asked for, but isn't worked out unless somebody says so before: write"
-                " needs = {'exposure'} in the class of the component"
-            )
-        before = self._exposures.get(first)
-        return self._exposures[end] - (0 if before is None else before)
+        none = np.zeros_like(next(iter(self._exposures.values())))
+        return _known_at(self._exposures, end, none) - _known_at(self._exposures, first, none)
+
+
+def _known_at(
+    sums: Mapping[int, NDArray[np.int64]], step: int, at_first: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return what was added up before a step."""
+    if step in sums or step == 0 or not sums:  # without cameras there are no sums
+        return sums.get(step, at_first)
+    raise ComponentError(
+        f"what cameras looked at is added up from update to update, and step {step} is none: ask"
+        f" for exposure and looks between those of {', '.join(map(str, sorted(sums)[-5:]))}, or for"
+        " evidence"
+    )
 
 
 def _events(actor: "Actor") -> list[Event]:

@@ -1,6 +1,6 @@
 """What algorithms put out, and how it becomes rows of a table."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.change import HomeChanges
+from fleet2d.problems import did_you_mean
 
 # The columns of every table.
 RESERVED = frozenset({"step", "time"})
@@ -57,6 +58,60 @@ class RoomDistribution:
     def __repr__(self) -> str:
         """Show the shares."""
         return f"RoomDistribution({self.share.round(4).tolist()})"
+
+
+class Outputs(Mapping[str, Any]):
+    """The newest output of each algorithm, by name; to be read, and asked for what is there.
+
+    Args:
+        newest: The outputs.
+        known: The names of all algorithms, with those that have put out nothing so far.
+
+    Example:
+        >>> outputs = Outputs({"ltp": 3}, ["ltp", "rtp"])
+        >>> outputs["ltp"], outputs.get("rtp"), "rtp" in outputs
+        (3, None, False)
+        >>> outputs["xyz"]
+        Traceback (most recent call last):
+        fleet2d.errors.ComponentError: there is no algorithm 'xyz'. There are: ltp, rtp
+    """
+
+    def __init__(self, newest: Mapping[str, Any], known: Iterable[str]) -> None:
+        self._newest, self._known = newest, tuple(known)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return an output.
+
+        Raises:
+            ComponentError: There is no such algorithm, or it has put out nothing so far.
+        """
+        if name in self._newest:
+            return self._newest[name]
+        if name in self._known:
+            raise ComponentError(
+                f"{name!r} has put out nothing so far: ask by outputs.get({name!r}), which is None"
+                " until then"
+            )
+        raise ComponentError(
+            f"there is no algorithm {name!r}{did_you_mean(name, self._known)}"
+            f" There are: {', '.join(self._known) or 'none'}"
+        )
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return an output, or something else if there is none."""
+        return self._newest.get(name, default)
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether an algorithm has put out anything so far."""
+        return name in self._newest
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names of those that have put out something."""
+        return iter(self._newest)
+
+    def __len__(self) -> int:
+        """Return how many outputs there are."""
+        return len(self._newest)
 
 
 def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArray[Any]]:

@@ -1,11 +1,12 @@
 """The bodies of a run over one span: traced together, and looked at by every camera."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ActivitySense
+from fleet2d.algorithms.log import Sights
 from fleet2d.blame import blame
 from fleet2d.engine.verdicts import points_seen
 from fleet2d.entities.actor import Actor
@@ -109,6 +110,7 @@ class Eye:
         activity_senses: How each camera tells activities.
         memory: All that is carried along.
         perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
+        awaited: Events that somebody else waits for: they end the span, too.
     """
 
     def __init__(
@@ -148,6 +150,7 @@ class Eye:
             np.empty(rows, np.int64), np.empty(rows, np.int32), np.empty(rows, np.int32)
         )
         self.found = self.happened = 0
+        self.awaited: Set[str] = frozenset()
 
     def _set_up(self) -> None:
         owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
@@ -222,9 +225,16 @@ class Eye:
 
     @property
     def stops(self) -> tuple[bool, bool]:
-        """Whether it ends the span when somebody is lost, and when somebody is seen."""
+        """Whether it ends its plan when somebody is lost, and when somebody is seen."""
         wanted, names = self.owner.plan.interrupts, self.event_names
         return names[USER_LOST] in wanted, names[USER_SEEN] in wanted
+
+    @property
+    def ends(self) -> tuple[bool, bool]:
+        """Whether it ends the span when somebody is lost, and when somebody is seen."""
+        lost, seen = self.stops
+        names = self.event_names
+        return lost or names[USER_LOST] in self.awaited, seen or names[USER_SEEN] in self.awaited
 
     @property
     def counts(self) -> I64:
@@ -238,7 +248,7 @@ class Eye:
 
     def look(self, block: PoseBlock, first: int, count: int) -> int:
         """Look at all others for `count` steps; return the steps done."""
-        lost, seen = self.stops
+        lost, seen = self.ends
         home, poses = self.owner.home, block.row(self.row, count)
         crowd = block.crowd(self._rows, count)
         if self._method is not None:
@@ -259,6 +269,14 @@ class Eye:
             self.events,
         )
         return int(done)
+
+    def sights(self, end: int) -> Sights:
+        """Return who came into view and who was lost in the span that ended before step `end`."""
+        events, count = self.events, self.happened
+        columns = events.step[:count], events.user[:count], events.kind[:count]
+        step, user, kind = (column.astype(np.int64) for column in columns)
+        others = [other.name for other in self.others]
+        return Sights(self.owner.name, self.event_names, others, step, user, kind, end)
 
     def remember(self) -> None:
         """Keep where each identity was perceived last."""

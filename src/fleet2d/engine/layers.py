@@ -73,8 +73,11 @@ class LayerBook:
         self._home, self._store, self._clock = home, store, clock
         self._stored_at: dict[str, int] = {}
         self._robots, self._first_robot = len(scenario.robots), len(scenario.users)
-        learners = [*scenario.algorithms.values(), *scenario.metrics.values()]
-        needed = {need for learner in learners for need in _needs_of(learner)}
+        learners = {
+            **{f"algorithms.{name}": learner for name, learner in scenario.algorithms.items()},
+            **{f"metrics.{name}": learner for name, learner in scenario.metrics.items()},
+        }
+        needed = {need for path, learner in learners.items() for need in _needs_of(path, learner)}
         behaviors = [behavior for actor in actors for behavior in actor.behaviors]
         needed |= {need for behavior in behaviors for need in behavior.needs}
         wanted = {*needed, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
@@ -197,7 +200,7 @@ _SEEN = {
 _COSTS = _seen("int32", 0, "what a way costs besides its length, -1 where none leads", "%")
 
 
-def _needs_of(learner: Component) -> Set[str]:
+def _needs_of(path: str, learner: Component) -> Set[str]:
     """Return what an algorithm or a metric needs.
 
     Raises:
@@ -207,7 +210,7 @@ def _needs_of(learner: Component) -> Set[str]:
     for need in learner.needs:
         if need not in NEEDS:
             raise ComponentError(
-                f"{type(learner).__name__} needs {need!r}{did_you_mean(need, NEEDS)} There are:"
-                f" {', '.join(NEEDS)}"
+                f"{path}: {type(learner).__name__} needs {need!r}{did_you_mean(need, NEEDS)} There"
+                f" are: {', '.join(NEEDS)}"
             )
     return set(learner.needs)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.learned import load_learned, save_learned
-from fleet2d.algorithms.output import to_columns
+from fleet2d.algorithms.log import HOME, Event
+from fleet2d.algorithms.output import Outputs, to_columns
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.blame import blame
@@ -34,11 +34,12 @@ class Learner:
     """An algorithm or a metric in a run.
 
     Attributes:
-        every: Steps between two updates.
+        every: Steps between two updates; 0 if events update it.
         table: The name of the table of what it puts out.
         kinds: The kinds of that table's columns; empty before the first output.
         since: First step of its next history.
         back: How many steps before that it may look back.
+        heard: Whether an event that it waits for has happened.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Learner:
     kinds: dict[str, Kind] = field(default_factory=dict)
     since: int = 0
     back: int = 0
+    heard: bool = False
 
     @property
     def oldest(self) -> int:
@@ -56,9 +58,12 @@ class Learner:
         return max(0, self.since - self.back)
 
     @property
-    def due(self) -> int:
-        """The step before which it is updated next: its history ends with the step before."""
-        return self.since + self.every
+    def due(self) -> int | None:
+        """The step before which it is updated next: its history ends with the step before.
+
+        None if that isn't known beforehand, as events update it.
+        """
+        return self.since + self.every if self.every else None
 
 
 class Learners:
@@ -84,6 +89,7 @@ class Learners:
         self.outputs: dict[str, Any] = {}
         self.fresh: dict[str, Any] = {}
         self.all: list[Learner] = []
+        self._known = tuple(algorithms)
         _check_reads(metrics, algorithms)
         for name in update_order(algorithms):
             self._add(name, f"algorithms.{name}", algorithms[name])
@@ -91,28 +97,31 @@ class Learners:
             self._add(name, f"metrics.{name}", metric)
         self._room_names = [room.name for room in home.rooms]
         self._due = self._earliest_due()
+        self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 
     @property
     def readable(self) -> Mapping[str, Any]:
         """The outputs, for others to read."""
-        return MappingProxyType(self.outputs)
+        return Outputs(self.outputs, self._known)
 
     def next_due(self) -> int | None:
         """Return the step before which somebody is due; None if there is nobody."""
         return self._due  # asked for at every span
 
     def _earliest_due(self) -> int | None:
-        return min((learner.due for learner in self.all), default=None)
+        dues = (learner.due for learner in self.all)
+        return min((due for due in dues if due is not None), default=None)
 
     def earliest_needed(self) -> int:
         """Return the first step that is still part of somebody's next history."""
         return min(learner.oldest for learner in self.all)
 
-    def update(self, end: int, log: Log) -> None:
-        """Update everybody whose period ends before step `end`."""
+    def update(self, end: int, log: Log, happened: Sequence[Event] = ()) -> None:
+        """Update everybody whose period ends before step `end`, or who waits for what happened."""
         fresh: dict[str, Any] = {}
         for learner in self.all:
-            if learner.due == end:
+            if learner.due == end or self._hears(learner, happened):
+                learner.heard = True
                 component = learner.component  # metrics come last, and see all
                 reads = component.reads if isinstance(component, Algorithm) else fresh
                 seen = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
@@ -123,6 +132,15 @@ class Learners:
                     fresh[learner.name] = copy.deepcopy(output)
         self.fresh, self._due = fresh, self._earliest_due()
         self.outputs = {**self.outputs, **fresh}  # a new one: who kept the old sees the old
+
+    def _hears(self, learner: Learner, happened: Sequence[Event]) -> bool:
+        """Tell whether one of these events updates an algorithm or a metric."""
+        everybody = isinstance(learner.component, Metric)
+        return any(
+            event.event in learner.component.on
+            and (everybody or event.entity == HOME or event.entity in self.robots)
+            for event in happened
+        )
 
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
         """Give metrics what is left of a period; return the results of all metrics by name."""
@@ -135,6 +153,14 @@ class Learners:
                 with blame(learner.path, end):
                     results[learner.name] = checked_result(learner.component.result())
         return results
+
+    def unheard(self) -> list[str]:
+        """Say who waited for events of which none happened."""
+        return [
+            f"{learner.path} was never updated: no {' or '.join(learner.component.on)} happened"
+            for learner in self.all
+            if learner.component.on and not learner.heard
+        ]
 
     def remember(self, directory: Path) -> list[str]:
         """Write what each algorithm has learned to a file of its own; return what can't be kept."""
@@ -152,7 +178,9 @@ class Learners:
 
     def _add(self, name: str, path: str, component: Algorithm | Metric) -> None:
         every, rest = divmod(micros(component.period), self.clock.step_us)
-        if rest or not every:
+        if component.on:
+            every = 0
+        elif rest or not every:
             raise ScenarioError(
                 f"{path}.period is {component.period}, which is no multiple of simulation.step"
                 f" ({self.clock.step_us / 1e6:g} s): choose a multiple"
@@ -174,10 +202,11 @@ class Learners:
         knows_truth = isinstance(learner.component, Metric)
         visible = frozenset((*self.users, *self.robots) if knows_truth else self.robots)
         step_s = self.clock.step_us / 1e6
-        history = History(log, learner.since, end, step_s, visible, learner.oldest)
+        needs = frozenset(learner.component.needs)
+        history = History(log, learner.since, end, step_s, visible, learner.oldest, needs)
         state = Present(
             learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
-            self.users, self.robots, MappingProxyType({**outputs}), self.seed
+            self.users, self.robots, Outputs({**outputs}, self._known), self.seed
         )  # fmt: skip
         with blame(learner.path, end - 1):
             output = learner.component.update(history, state)

@@ -6,7 +6,7 @@ them at once. What a span is never shows in a result: every draw is addressed by
 plan by time.
 """
 
-from fleet2d.algorithms.log import Log, Piece
+from fleet2d.algorithms.log import SENSOR, Log, Piece
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.engine.buckets import look_together
@@ -45,6 +45,9 @@ class Loop:
         self._move(first, count)
         count = world.clearance.limit(block, first, count)
         count = world.encounters.limit(block, first, count)
+        if SENSOR in world.learners.awaited:
+            with blame("objects", first):
+                count = world.sensors.limit(block, first, count, world.home)
         if world.eyes or world.gazes:
             count = look_together([*world.eyes, *world.gazes], block, first, count)
         observations = world.recorder.span(block, first, count, world.eyes, world.gazes)
@@ -60,6 +63,9 @@ class Loop:
         if world.log:
             if observations is not None and len(observations):
                 world.log.observations.append(observations)
+            world.log.sights += [
+                eye.sights(self.step) for eye in [*world.eyes, *world.gazes] if eye.happened
+            ]
             self._learn(world.log)
         world.layers.keep(self.step)
 
@@ -90,9 +96,11 @@ class Loop:
     def _learn(self, log: Log) -> None:
         """Update the algorithms and metrics that are due."""
         learners = self._world.learners
-        if learners.next_due() == self.step:
+        awaited = learners.awaited
+        happened = log.happened(self.step - 1) if awaited else []
+        if learners.next_due() == self.step or any(event.event in awaited for event in happened):
             self.count_looks(log)
-            learners.update(self.step, log)
+            learners.update(self.step, log, happened)
             self._take_up_changes()
             log.forget(learners.earliest_needed())
 
@@ -156,6 +164,9 @@ class Loop:
         for due in dues:
             if due is not None:
                 end = min(end, max(due, self.step + 1))
+        if self._world.log and self._world.learners.awaited:
+            noted = self._world.log.next_note(self.step, self._world.learners.awaited)
+            end = end if noted is None else min(end, noted + 1)
         return end
 
     def _interrupt(self, step: int) -> None:

@@ -1,6 +1,7 @@
 """The sensors of a run: what they say over each span, and beside what activity."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -76,6 +77,16 @@ class Sensors:
         for user in range(self.users):
             self._activities[user] = self._activity(actors, user, first + count - 1)
         return rows
+
+    def limit(self, block: PoseBlock, first: int, count: int, home: Home) -> int:
+        """Return the steps of a span up to the first in which a sensor says something."""
+        before = self._before
+        view = self._view(block, first, count)
+        self._before = before
+        for sensor, memory in zip(self.sensors, self._memories, strict=True):
+            said = copy(memory).read(*sensor.sense(view, home), first + count)
+            count = min([count, *(reading.step - first + 1 for reading in said)])
+        return count
 
     def _view(self, block: PoseBlock, first: int, count: int) -> SensorView:
         here = (block.x[:, :count], block.y[:, :count], block.away[:, :count] == 0)

@@ -238,7 +238,12 @@ class Simulation:
         results: dict[str, Any] = {}
         if self._world.log and status != "failed":
             self._loop.count_looks(self._world.log)
-            results = self._world.learners.finish(self.step, self._world.log)
+            try:
+                results = self._world.learners.finish(self.step, self._world.log)
+                self._store.manifest.notes += self._world.learners.unheard()
+            except BaseException as error:
+                self._fail(error)
+                raise
         self._simulate_s += time.perf_counter() - began
         began = time.perf_counter()
         self._world.recorder.end(self.step)
@@ -323,6 +328,8 @@ class Simulation:
         self._store.manifest.notes.append(f"failed at step {self.step}: {why}")
         with suppress(Exception):
             self.finish("failed")
+        if self.directory is not None and self._run is not None:
+            error.add_note(f"the run until then, {self.time}, is in {self.directory}")
 
     def _state_of(self, actor: Actor) -> dict[str, Any]:
         state = actor.state

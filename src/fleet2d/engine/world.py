@@ -103,6 +103,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Worl
     )
     layers = LayerBook(scenario, home, actors, store, clock)
     learners = _learners(scenario, home, clock, seed, store)
+    for eye in [*gazes, *eyes]:
+        eye.awaited = learners.awaited
     log = _log(home, actors, eyes, recorder) if learners.all else None
     return World(
         home, users, robots, block, gazes, eyes, encounters, clearance, changes, sensors, recorder,
@@ -135,9 +137,11 @@ def _placing(scenario: Scenario, path: str) -> Iterator[None]:
     """Say where in the scenario somebody was put that can't be there."""
     try:
         yield
-    except PlacementError as error:
+    except (PlacementError, ScenarioError) as error:
         where = scenario.where(path)
-        raise PlacementError(f"{where}: {error}" if where else str(error)) from error
+        if not where or str(error).startswith(where):
+            raise
+        raise type(error)(f"{where}: {error}") from error
 
 
 def _actors(scenario: Scenario, bucket: str, home: Home, clock: Clock, seed: int) -> list[Actor]:

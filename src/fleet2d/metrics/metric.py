@@ -18,17 +18,24 @@ if TYPE_CHECKING:
 class Metric(Component):
     """Base of what measures a run; a subclass writes `update` and `result`.
 
-    Like an algorithm it is updated after every full `period`, and what `update` returns is stored.
-    Unlike one it may ask for the poses of users.
+    Like an algorithm it is updated after every full `period`, or `on` events, of users, too; what
+    `update` returns is stored. Unlike one it may ask for the poses of users.
     """
 
     kind: ClassVar[str] = "metric"
     looks_back: ClassVar[timedelta] = timedelta(0)  # how far beyond its period; timedelta.max: all
     needs: ClassVar[Set[str]] = frozenset()  # of exposure, explored, first_seen, last_seen …
     unit: ClassVar[str] = ""  # of its result, for people to read
+    units: ClassVar[Mapping[str, str]] = {}  # of single numbers by name, where theirs is another
 
     period: PositiveDuration = Field(
         default=timedelta(days=1), description="how often it is updated"
+    )
+
+    on: tuple[str, ...] = Field(
+        default=(),
+        description="events that update it, instead of the period: those of the events table, and"
+        " sensor",
     )
 
     def reads(self) -> tuple[str, ...]:

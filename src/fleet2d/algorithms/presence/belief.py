@@ -92,14 +92,12 @@ class Presence:
                 f"presence of {rows - 1} users and anyone needs {rows} rows of shares and as many"
                 f" numbers of away; found shapes {self._home.shape} and {self._away.shape}"
             )
-        total = self._home.sum(axis=1)
-        good = (np.abs(total - 1) <= SUM_ERROR) & (self._home >= 0).all(axis=1)
-        good &= (self._away >= 0) & (self._away <= 1)  # a NaN is not good, either
+        good = are_distributions(self._home, self._away)
         if not good.all():
             row = int(np.argmin(good))
             raise ComponentError(
                 f"presence of {self.names[row]!r} is no distribution: shares"
-                f" {self._home[row].tolist()}, which sum to {total[row]:g}, away"
+                f" {self._home[row].tolist()}, which sum to {self._home[row].sum():g}, away"
                 f" {self._away[row]:g}"
             )
 
@@ -190,6 +188,18 @@ def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArra
     for labels in (user, room):
         labels.setflags(write=False)
     return {"user": user, "room": room}
+
+
+def are_distributions(home: F64, away: F64) -> NDArray[np.bool_]:
+    """Tell which shares (..., rooms) sum to one, with an away (...) from 0 to 1; a NaN doesn't.
+
+    Example:
+        >>> are_distributions(np.array([[0.5, 0.5], [0.5, 0.6], [np.nan, 1]]), np.zeros(3)).tolist()
+        [True, False, False]
+    """
+    good = (np.abs(home.sum(axis=-1) - 1) <= SUM_ERROR) & (home >= 0).all(axis=-1)
+    found: NDArray[np.bool_] = good & (away >= 0) & (away <= 1)
+    return found
 
 
 class WeeklyPresence(Presence):

@@ -4,14 +4,16 @@ from collections.abc import Mapping, Set
 from datetime import timedelta
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
+import numpy as np
 from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.presence.belief import Presence, Track
+from fleet2d.algorithms.presence.belief import ANYONE, Presence, Track, are_distributions
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.component import OneOf, register
+from fleet2d.errors import ComponentError
 from fleet2d.units import PositiveDuration
 
 if TYPE_CHECKING:
@@ -53,6 +55,7 @@ class RealTimePresence(Algorithm):
         if not len(bins.day):
             return None
         home, away = self.model.observe(bins)
+        self._check(home, away, len(bins.day), state)
         track = Track(evidence.begin, evidence.bin_steps, home, away)
         time = state.start + timedelta(
             microseconds=(evidence.begin + len(bins.day) * bins.bin_steps) * step_us
@@ -64,6 +67,26 @@ class RealTimePresence(Algorithm):
         if self.recalled is not None:
             self.model.recall(self.recalled)
         self.begun = True
+
+    def _check(self, home: Any, away: Any, bins: int, state: Present) -> None:
+        """Refuse what a model says of some bin that is no distribution."""
+        users = len(state.users) + 1
+        shapes = np.shape(home), np.shape(away)
+        wanted = (bins, users, self.rooms), (bins, users)
+        if shapes != wanted:
+            raise ComponentError(
+                f"the model {self.model.type_name} said of {bins} bins, {users - 1} users and"
+                f" anyone, and {self.rooms} rooms arrays of shapes {shapes[0]} and {shapes[1]};"
+                f" {wanted[0]} (rooms, given at home) and {wanted[1]} (away) are wanted"
+            )
+        good = are_distributions(home, away)
+        if not good.all():
+            k, row = np.argwhere(~good)[0].tolist()
+            raise ComponentError(
+                f"the model {self.model.type_name} said of {(*state.users, ANYONE)[row]!r} in bin"
+                f" {k} of {bins} what is no distribution: shares {home[k, row].tolist()}, which sum"
+                f" to {home[k, row].sum():g}, away {away[k, row]:g}"
+            )
 
     def remember(self) -> dict[str, Any]:
         """Return what was learned, to start another run from."""

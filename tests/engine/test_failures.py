@@ -1,0 +1,272 @@
+"""What fails in the middle of a run: whose fault it is, when, and that the run so far is readable."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import digests, fleet2d_process, run, scenario, table
+
+import fleet2d
+from fleet2d import Algorithm, Behavior, Metric
+from fleet2d.algorithms.output import RoomDistribution
+from fleet2d.algorithms.presence.belief import Presence
+from fleet2d.algorithms.presence.estimator import Estimator
+from fleet2d.algorithms.presence.model import Model
+from fleet2d.errors import ComponentError
+
+pytestmark = needs_jit
+
+AT = 10_799
+"""The step of the third hour's end, at which everything here fails."""
+
+
+def unknown_key() -> Any:
+    return {}["kitchen"]
+
+
+class Fails(Algorithm):
+    """Puts out a number twice, and then does what its key says."""
+
+    how: str
+
+    def update(self, history: Any, state: Any) -> Any:
+        if state.step < AT:
+            return {"n": 1.0}
+        users, rooms = len(state.users) + 1, len(state.home.rooms)
+        match self.how:
+            case "raises":
+                return unknown_key()
+            case "not a number":
+                return {"n": np.nan}
+            case "negative":
+                return RoomDistribution([-1.0] * rooms)
+            case "sum":
+                home = np.full((users, rooms), 1.1 / rooms)
+                return Presence(state.users, home, np.zeros(users), state.time)
+            case "algorithm":
+                return {"n": state.outputs["lpt"].share[0]}
+            case "silent":
+                return {"n": state.outputs["rtp"].share[0]}
+            case "user":
+                return {"n": state.outputs["ltp"].share("an")[0]}
+            case "body":
+                return {"n": history.poses("astor").distance}
+            case "truth":
+                return {"n": history.poses("ana").distance}
+            case "layer":
+                return {"n": state.home.layers["dust"].values.sum()}
+            case "evidence":
+                return {"n": len(history.evidence)}
+            case "exposure":
+                return {"n": history.exposure.sum()}
+            case "past":
+                return {"n": len(history.between(0, 60))}
+        raise AssertionError(self.how)
+
+
+class FailsMetric(Metric):
+    """Fails when it is updated, or at the end."""
+
+    when: str
+
+    def update(self, history: Any, state: Any) -> Any:
+        if self.when == "update" and state.step == AT:
+            unknown_key()
+
+    def result(self) -> Any:
+        return {"n": np.nan} if self.when == "not a number" else unknown_key()
+
+
+class FailsEstimator(Estimator):
+    """Fails in the third hour."""
+
+    how: str
+
+    def width(self, rooms: int) -> int:
+        return rooms + 1
+
+    def sums(self, bins: Any) -> Any:
+        if bins.minute[0] >= 9 * 60 and self.how == "raises":
+            unknown_key()
+        return np.ones((*bins.seen.shape[:2], self.rooms + 1))
+
+    def shares(self, sums: Any) -> Any:
+        home = sums[..., :-1] / sums[..., :-1].sum(axis=-1, keepdims=True)
+        bad = sums[..., -1].max() > 120 and self.how == "not a number"
+        return home * (np.nan if bad else 1.0), np.zeros(sums.shape[:-1])
+
+
+class FailsModel(Model):
+    """Fails in the third hour."""
+
+    how: str
+
+    def observe(self, bins: Any) -> Any:
+        home = np.full((len(bins.day), self.users + 1, self.rooms), 1 / self.rooms)
+        away = np.zeros(home.shape[:2])
+        if bins.minute[0] >= 9 * 60:
+            match self.how:
+                case "raises":
+                    unknown_key()
+                case "sum":
+                    home[7, 0] *= 2
+                case "not a number":
+                    away[7, 0] = np.nan
+                case "short":
+                    return home[1:], away[1:]
+        return home, away
+
+
+class FailsBehavior(Behavior):
+    """Goes nowhere, and fails."""
+
+    def decide(self, now: Any) -> Any:
+        if now.step >= AT:
+            unknown_key()
+        return now.plan().stay(now.time.replace(hour=9, minute=59, second=59) - now.time)
+
+
+def content(**more: Any) -> dict[str, Any]:
+    found = scenario(
+        "5 h",
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol", "dwell": "30 s"}},
+        algorithms={"ltp": {"type": "ltp"}, "rtp": {"type": f"{__name__}:Quiet"}},
+    )
+    for section, entries in more.items():
+        found[section] = {**found[section], **entries} if section in found else entries
+    return found
+
+
+class Quiet(Algorithm):
+    """Puts out nothing."""
+
+    def update(self, history: Any, state: Any) -> None:
+        """Do nothing."""
+
+
+MINE = f"{__name__}:"
+ALGORITHMS = {
+    "raises": ["KeyError: 'kitchen'", "in update: return unknown_key(); ", "in unknown_key: "],
+    "not a number": ["'n'", "not finite"],
+    "negative": ["at least 0"],
+    "sum": ["presence of 'ana' is no distribution", "sum to 1.1"],
+    "algorithm": ["'lpt'", "did you mean 'ltp'?", "There are: ltp, rtp, mine"],
+    "silent": ["'rtp'", "has put out nothing so far"],
+    "user": ["'an'", "tells of: ana, anyone"],
+    "body": ["'astor'", "no such body", "astro"],
+    "truth": ["'ana'", "only metrics know"],
+    "layer": ["no layer 'dust'"],
+    "evidence": ["needs = {'evidence'}"],
+    "exposure": ["needs = {'exposure'}"],
+    "past": ["looks_back"],
+}
+CASES = [
+    *(({"algorithms": {"mine": {"type": f"{MINE}Fails", "how": how, "reads": ["ltp"]}}}, "algorithms.mine", words)
+      for how, words in ALGORITHMS.items()),
+    *(({"algorithms": {"mine": {"type": "ltp", "estimator": {"type": f"{MINE}FailsEstimator", "how": how}}}},
+       "algorithms.mine", words)
+      for how, words in {"raises": ["KeyError"], "not a number": ["no distribution", "nan"]}.items()),
+    *(({"algorithms": {"mine": {"type": "rtp", "period": "1 h", "model": {"type": f"{MINE}FailsModel", "how": how}}}},
+       "algorithms.mine", words)
+      for how, words in {
+          "raises": ["KeyError"],
+          "sum": ["FailsModel", "'ana' in bin 7 of 60", "sum to 2"],
+          "not a number": ["FailsModel", "'ana' in bin 7 of 60", "away nan"],
+          "short": ["FailsModel", "(59, 2, 6) and (59, 2)", "(60, 2, 6)"],
+      }.items()),
+    ({"metrics": {"mine": {"type": f"{MINE}FailsMetric", "when": "update", "period": "1 h"}}}, "metrics.mine", ["KeyError"]),
+    ({"robots": {"mine": {"type": f"{MINE}FailsBehavior"}}}, "robots.mine", ["KeyError", "in decide"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "path", "words"), CASES)
+def test_an_error_names_who_failed_and_when_and_the_run_so_far_is_whole(
+    changes: dict[str, Any], path: str, words: list[str], tmp_path: Path
+) -> None:
+    with pytest.raises(ComponentError) as caught:
+        run(content(**changes), out=tmp_path / "run")
+    for word in (path, f"step {AT}", *words):
+        assert word in str(caught.value)
+    assert any(str(tmp_path / "run") in note for note in caught.value.__notes__)
+
+    stored = fleet2d.open_run(tmp_path / "run")
+    assert "failed" == stored.status
+    assert [] == stored.verify()
+    assert any(str(caught.value) in note for note in stored.notes)
+    if path == "robots.mine":
+        return
+    assert AT + 1 == stored.manifest["steps"]
+    # Everybody lived until then as in a run that ended there.
+    alike = digests(run(content(), f"simulation.duration={AT + 1} s"))
+    assert alike["key_frames"] == digests(stored)["key_frames"]
+    assert 179 * 60 == table(stored, "trajectories", entity="ana")["step"].max()
+    if "mine" in stored.tables:
+        assert {3599, 7199} <= set(table(stored, "mine")["step"].tolist())
+
+
+@pytest.mark.parametrize("when", ["result", "not a number"])
+def test_a_metric_that_fails_at_the_end_leaves_the_run_readable(when: str, tmp_path: Path) -> None:
+    broken = {"mine": {"type": f"{MINE}FailsMetric", "when": when}}
+    with pytest.raises(ComponentError, match=r"metrics\.mine failed at step 18000"):
+        run(content(metrics=broken), out=tmp_path / "run")
+    stored = fleet2d.open_run(tmp_path / "run")
+    assert "failed" == stored.status
+    assert [] == stored.verify()
+    assert digests(run(content()))["key_frames"] == digests(stored)["key_frames"]
+
+
+def test_undeclared_needs_are_refused_whoever_else_has_them() -> None:
+    """Another one that declares them makes no difference."""
+    with pytest.raises(ComponentError, match=r"needs = \{'evidence'\}"):
+        run(content(algorithms={"mine": {"type": f"{MINE}Fails", "how": "evidence"}}))
+
+
+class Greedy(Algorithm):
+    """Asks for exposure between other steps than those of updates."""
+
+    needs = frozenset({"exposure"})
+    looks_back = timedelta.max
+
+    def update(self, history: Any, state: Any) -> Any:
+        first = 1234 if state.step >= AT else 0
+        return {"cells": history.between(first, history.end).exposure.sum(dtype=float)}
+
+
+def test_exposure_between_other_steps_than_updates_is_refused_not_wrong() -> None:
+    with pytest.raises(ComponentError, match="from update to update, and step 1234 is none"):
+        run(content(algorithms={"mine": {"type": f"{MINE}Greedy"}}))
+
+
+USERS_OWN = """
+import fleet2d
+
+def deeper(rooms):
+    return rooms[99]
+
+class Broken(fleet2d.Algorithm):
+    def update(self, history, state):
+        return {"name": deeper(state.home.rooms).name}
+"""
+
+
+def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(USERS_OWN)
+    override = "algorithms.broken.type=mine:Broken"
+    done = fleet2d_process(
+        "run", "simulation.duration=2 h", override, "--out", "out", "--quiet", cwd=tmp_path
+    )
+    assert 1 == done.returncode
+    error, where = done.stderr.strip().splitlines()
+    assert (
+        "error: algorithms.broken failed at step 3599: IndexError: tuple index out of range"
+        ' (mine.py:9, in update: return {"name": deeper(state.home.rooms).name};'
+        " mine.py:5, in deeper: return rooms[99])"
+    ) == error
+    assert "the run until then, 2026-01-05 01:00:00, is in out" == where
+    shown = fleet2d_process("show", "out", cwd=tmp_path)
+    assert 0 == shown.returncode, shown.stderr
+    assert (tmp_path / "out" / "picture.png").stat().st_size > 10_000
