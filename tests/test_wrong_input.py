@@ -389,7 +389,7 @@ FAILING = {
         "Raises": ["at step 59", "RuntimeError", "no model today"],
         "NotANumber": ["'mean'", "not finite"],
         "WrongLength": ["2 shares", "6 rooms"],
-        "ReadsMissing": ["KeyError", "ltp"],
+        "ReadsMissing": ["no algorithm 'ltp'", "ltp"],
         "Peeks": ["'ana'", "only metrics know where users are"],
     },
     "users.ana": {

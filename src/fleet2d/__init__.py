@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from fleet2d.metrics.metric import Metric as Metric
     from fleet2d.scenario.model import Scenario as Scenario
     from fleet2d.scenario.model import load_scenario as load_scenario
+    from fleet2d.sight.fov import FieldOfView as FieldOfView
     from fleet2d.sight.region import VisibleRegion as VisibleRegion
     from fleet2d.units import Duration as Duration
     from fleet2d.units import Length as Length
@@ -46,6 +47,7 @@ _HOME_OF = {
     "Behavior": "entities.behavior",
     "ComponentError": "errors",
     "Duration": "units",
+    "FieldOfView": "sight.fov",
     "Fleet2DError": "errors",
     "FloorPlan": "floorplan.plan",
     "History": "algorithms.history",

@@ -366,6 +366,10 @@ def test_homes_without_doors_pay_nothing() -> None:
         ({"changes": [{"at": "1 s", "move": "cart", "to": [99, 9]}]}, "is not in the home"),
         ({"changes": [{"at": "1 s", "move": "bed", "to": [6, 2]}]}, r"no object.*'bed'.*cart"),
         ({"changes": [{"at": "1 s", "room": "attic", "type": "office"}]}, "no room 'attic'"),
+        (
+            {"changes": [{"at": "1 s", "room": "kitchen_0", "type": "ofice"}]},
+            r"changes\.0: there is no room type 'ofice': did you mean 'office'\? There are: kitchen",
+        ),
         ({"objects": {"gate": {"type": "door", "doorway": "attic"}}}, r"no doorway 'attic'"),
         ({"objects": {"gate": {"type": "door", "doorway": "hallway_0"}}}, "has 2 doorways"),
         (
@@ -413,3 +417,14 @@ def test_track_crosses_a_line_at_the_moment_it_does() -> None:
 
 def test_change_may_name_a_local_time() -> None:
     assert HomeChange(at="2026-01-05T07:00", shut="door").at == datetime(2026, 1, 5, 7)
+
+
+@pytest.mark.parametrize(
+    ("word", "kind"), [("Arbeitszimmer", "office"), ("Living Room", "living_room")]
+)
+def test_a_room_is_used_as_what_a_word_usually_means(plan: str, word: str, kind: str) -> None:
+    simulation = fleet2d.Simulation(
+        home(plan, changes=[{"at": "1 s", "room": "kitchen_0", "type": word}])
+    )
+    simulation.advance(2)
+    assert kind == next(room.type for room in simulation.home.rooms if room.name == "kitchen_0")

@@ -145,7 +145,8 @@ def test_places_follow_what_was_merged(tmp_path: Path, monkeypatch: pytest.Monke
     assert "home.yaml:3" == document.place(("simulation", "seed"))
     assert "base.yaml:3" == document.place(("simulation", "step"))
     assert "override 'users.ana.radius=1'" == document.place(("users", "ana", "radius"))
-    assert "base.yaml:4" == document.place(("users", "ana"))
+    changed = "base.yaml:4, changed by override 'users.ana.radius=1'"
+    assert changed == document.place(("users", "ana")) == document.place(("users", "ana", "x"))
     assert "argument speedup=3" == document.place(("simulation", "speedup"))
 
 

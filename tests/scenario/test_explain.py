@@ -1,11 +1,14 @@
 """Validation errors in plain words."""
 
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 from pydantic import Field, ValidationError, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError
 from fleet2d.scenario.document import Document
 from fleet2d.scenario.explain import describe, explain
 
@@ -74,3 +77,46 @@ def test_error_says_where_and_what(data: dict[str, Any], said: str) -> None:
 
 def test_unlisted_error_is_told_in_pydantics_words() -> None:
     assert "Odd" == describe({"type": "odd", "loc": (), "msg": "Odd", "input": 3})
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        (
+            "robots.bo.type=find",
+            "low.yaml:4, changed by override 'robots.bo.type=find': robots.bo:",
+        ),
+        (
+            "simulation.duration.dys=1",
+            "low.yaml:1, changed by override 'simulation.duration.dys=1'",
+        ),
+        ("robots.bo.speed=fast", "override 'robots.bo.speed=fast': robots.bo.speed: found 'fast'"),
+        ("robots.bo.rooms=[attic]", "low.yaml:4, changed by override 'robots.bo.rooms=[attic]'"),
+    ],
+)
+def test_what_an_override_broke_is_not_blamed_on_the_file_alone(
+    override: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("low.yaml").write_text(
+        "simulation: {duration: {days: 1}}\nfloorplan: bundled\n"
+        "robots:\n  bo: {type: patrol, speed: 0.2}\n"
+    )
+    with pytest.raises(InputError) as caught:
+        Simulation("low.yaml", override)
+    assert str(caught.value).startswith(said)
+
+
+def test_what_a_file_broke_in_the_one_that_it_extends_names_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("low.yaml").write_text(
+        "simulation: {duration: {days: 1}}\nfloorplan: bundled\nalgorithms:\n  ltp: {}\n"
+    )
+    Path("high.yaml").write_text(
+        "extends: low.yaml\nalgorithms:\n  ltp:\n    interval: 0.9\n    by: hour_of_week\n"
+    )
+    with pytest.raises(InputError) as caught:
+        Simulation("high.yaml")
+    assert str(caught.value).startswith("low.yaml:4, changed by high.yaml:4: algorithms.ltp:")

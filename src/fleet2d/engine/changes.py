@@ -26,6 +26,7 @@ from fleet2d.floorplan.change import HomeChange
 from fleet2d.floorplan.gates import Segment
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.space import grown_shape
+from fleet2d.floorplan.vocabulary import PRIORITY, usual_type
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros
@@ -77,7 +78,6 @@ class Changes:
     def __init__(
         self,
         objects: Mapping[str, HomeObject],
-        changes: Sequence[HomeChange],
         home: Home,
         clock: Clock,
     ) -> None:
@@ -93,12 +93,24 @@ class Changes:
             if not door.open:
                 self._put(0, HomeChange(shut=self.names[number]), "at first")
             self._schedule(number, door)
-        for index, change in enumerate(changes):
-            self._add_declared(index, change)
 
     def next_due(self) -> int | None:
         """Return the step at which something changes next."""
         return self._queue[0].step if self._queue else None
+
+    def declare(self, index: int, change: HomeChange) -> None:
+        """Take in a change of the scenario.
+
+        Raises:
+            ScenarioError: It doesn't say when, or there is nothing of that name.
+        """
+        if change.at is None:
+            raise ScenarioError(f"changes.{index}: there is no 'at': say when it happens")
+        try:
+            self._check(change)
+        except ScenarioError as error:
+            raise ScenarioError(f"changes.{index}: {error}") from None
+        self._put(self._step_of(change.at), change, "scenario")
 
     def ask(self, change: HomeChange, step: int, by: str) -> None:
         """Let a change happen at a step, as an algorithm or a script wants it.
@@ -149,7 +161,7 @@ class Changes:
         verb, target = change.verb, change.target
         if verb == "room":
             room = self.home.plan.room(target)
-            self.home.use_room_as(room, str(change.type))
+            self.home.use_room_as(room, usual_type(str(change.type)))
             return [Happened(step, None, "room_changed", f"{target}: {change.type}")]
         if verb == "move":
             return self._move(due, change, step, actors)
@@ -294,15 +306,6 @@ class Changes:
             change = HomeChange(lock=name) if locked else HomeChange(unlock=name)
             self._put(step, change, "schedule")
 
-    def _add_declared(self, index: int, change: HomeChange) -> None:
-        if change.at is None:
-            raise ScenarioError(f"changes.{index}: there is no 'at': say when it happens")
-        try:
-            self._check(change)
-        except ScenarioError as error:
-            raise ScenarioError(f"changes.{index}: {error}") from None
-        self._put(self._step_of(change.at), change, "scenario")
-
     def _step_of(self, at: datetime | timedelta) -> int:
         elapsed = micros(at) if isinstance(at, timedelta) else self.clock.elapsed(at)
         return max(0, self.clock.step_at_or_after(elapsed))
@@ -326,6 +329,17 @@ class Changes:
             )
         if change.verb == "move":
             self._check_move(change)
+        if change.type is not None:
+            self._check_type(change.type)
+
+    def _check_type(self, word: str) -> None:
+        """Refuse a room type that is neither in the vocabulary nor that of any room."""
+        known = [*PRIORITY, *(room.type for room in self.home.rooms)]
+        if usual_type(word) not in known:
+            raise ScenarioError(
+                f"there is no room type {word!r}{did_you_mean(word, known)}"
+                f" There are: {', '.join(dict.fromkeys(known))}"
+            )
 
     def _check_move(self, change: HomeChange) -> None:
         plan = self.home.plan

@@ -86,7 +86,10 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Worl
         eye.owner.in_view = partial(_in_view, eye)
     _check_reads(scenario, actors)
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
-    changes = Changes(scenario.objects, scenario.changes, home, clock)
+    changes = Changes(scenario.objects, home, clock)
+    for index, change in enumerate(scenario.changes):
+        with _placing(scenario, f"changes.{index}"):
+            changes.declare(index, change)
     with _placing(scenario, "objects"):
         sensors = Sensors(scenario.objects, changes.names, home, clock, len(users))
     _add_tables(store, scenario, home, eyes, sensors)

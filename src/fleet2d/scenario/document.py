@@ -24,10 +24,39 @@ class Document:
     places: dict[Keys, str] = field(default_factory=dict)
 
     def place(self, location: Location) -> str:
-        """Return where a key was written, or where the nearest key around it was."""
+        """Return where a key was written, or where the nearest key around it was.
+
+        Of a mapping that something else has changed since, it tells that, too: what is wrong with
+        the whole may come from there.
+
+        Example:
+            >>> document = Document()
+            >>> document.places[("users", "bo")] = "home.yaml:4"
+            >>> document.places[("users", "bo", "type")] = "override 'users.bo.type=schedule'"
+            >>> document.place(("users", "bo", "days"))
+            "home.yaml:4, changed by override 'users.bo.type=schedule'"
+        """
         keys = tuple(map(str, location))
-        around = (self.places.get(keys[:n]) for n in range(len(keys), -1, -1))
-        return next((place for place in around if place is not None), "")
+        around = (keys[:n] for n in range(len(keys), -1, -1))
+        nearest = next((outer for outer in around if outer in self.places), None)
+        if nearest is None:
+            return ""
+        place, depth = self.places[nearest], len(nearest)
+        inner = (where for key, where in self.places.items() if key[:depth] == nearest)
+        first = {_file(where): where for where in reversed(list(inner))}
+        changes = [where for file, where in first.items() if file not in ("", _file(place))][::-1]
+        if not depth or not changes:
+            return place
+        return f"{place}, changed by {' and '.join(changes)}" if place else changes[0]
+
+
+def _file(place: str) -> str:
+    """Return the file of a place like 'home.yaml:12', or the override that it is.
+
+    >>> _file("home.yaml:12"), _file("override 'simulation.seed=4'")
+    ('home.yaml', "override 'simulation.seed=4'")
+    """
+    return re.sub(r":\d+$", "", place)
 
 
 def read_document(path: Path, shown: str | None = None) -> Document:
