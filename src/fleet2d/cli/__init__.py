@@ -6,7 +6,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from fleet2d.calibrate.command import calibrating
-from fleet2d.cli import inputs, pictures, runs
+from fleet2d.cli import inputs, paper, pictures, runs
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.fit.command import fitting
 
@@ -27,6 +27,7 @@ for command in (
     inputs.convert,
     runs.export,
     runs.reproduce,
+    paper.reproduce_paper,
 ):
     app.command()(command)
 app.add_typer(fitting, name="fit")
@@ -51,12 +52,10 @@ def main() -> NoReturn:
     """Run the command line; exit 0 done, 2 wrong input, 1 our fault, 130 interrupted."""
     try:
         app(standalone_mode=True)
-    except InputError as error:
-        typer.echo(f"error: {error}", err=True)
-        sys.exit(2)
     except Fleet2DError as error:
-        typer.echo(f"error: {error}", err=True)
-        sys.exit(1)
+        for line in (f"error: {error}", *getattr(error, "__notes__", ())):
+            typer.echo(line, err=True)
+        sys.exit(2 if isinstance(error, InputError) else 1)
     except KeyboardInterrupt:
         sys.exit(130)
     sys.exit(0)

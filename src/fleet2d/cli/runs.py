@@ -36,7 +36,7 @@ def run(
     """Simulate a scenario and store the run."""
     scenario, overrides = split(arguments)
     if not quiet:
-        _announce_compilation()
+        announce_compilation()
     from fleet2d.engine.simulation import Simulation
     from fleet2d.scenario.model import load_scenario
 
@@ -114,7 +114,8 @@ def _fresh_directory(name: str) -> Path:
             return directory
 
 
-def _announce_compilation() -> None:
+def announce_compilation() -> None:
+    """Say that the kernels are compiled first, if they are."""
     from fleet2d.kernels._jit import cache_directory
 
     if not cache_directory().exists():

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
     from fleet2d.metrics.metric import Metric
 
+SEPARATOR = " · "
+
 _LOADED = time.perf_counter()
 
 
@@ -55,10 +57,11 @@ def print_summary(summary: dict[str, Any], stored: "Run") -> None:
         measured = _class_of(stored, metric)
         rows = _flat(measured.summary(result))
         hidden += len(_flat(result)) - len(rows)
-        of = unit = measured.unit
+        said = None
         for name, value in rows:
-            table.add_row(metric, name, _shown(value, of), unit)
-            metric = unit = ""
+            unit = measured.units.get(name.rsplit(SEPARATOR, 1)[-1], measured.unit)
+            table.add_row(metric, name, _shown(value, unit), "" if unit == said else unit)
+            metric, said = "", unit
     if table.row_count:
         console.print(table)
     if hidden:
@@ -92,7 +95,7 @@ def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
     return [
         row
         for key, value in result.items()
-        for row in _flat(value, f"{prefix} · {key}" if prefix else key)
+        for row in _flat(value, f"{prefix}{SEPARATOR}{key}" if prefix else key)
     ]
 
 

@@ -1,0 +1,98 @@
+"""Fig. 7 right: how often the room is told right, by how long ago the user was seen.
+
+Real-time presence by several models and by the naive guess (the room of the last sighting), scored
+every minute by bin of last-seen gap: share told right, and log loss, which is a proper score. Mean
+over seeds, each a month of another life with a robot on patrol, and its bootstrap interval.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from fleet2d.paper.months import USER, Request, Tell, interval, month, run_all
+from fleet2d.paper.result import Result, Table, counted
+
+NAME = "rtp-gap"
+TITLE = "Fig. 7 right: accuracy of real-time presence by last-seen gap"
+MODELS = ("hmm", "semi_markov", "markov", "hour_of_week", "long_term")
+GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h", "all")
+NAIVE = "naive"
+SCORES = {"top_1": "share told right", "log_loss": "log loss [nats], smaller is better"}
+PAPER = (
+    "the paper's figure: a model's accuracy above that of the naive guess, the more so the longer"
+    " the user was out of sight; its numbers are not printed",
+)
+
+Scores = dict[str, dict[str, dict[str, float]]]
+# By score, model and gap: mean, and ends of the interval; missing where no month has such a gap.
+Means = dict[str, dict[str, dict[str, tuple[float, float, float]]]]
+
+
+def watched_month(seed: int, days: int) -> dict[str, Any]:
+    """Return the month of a life, with all models in it: a robot on patrol heeds none."""
+    return month(
+        {"type": "patrol", "order": "random", "dwell": "5 min"},
+        algorithms={
+            model: {"type": "real_time_presence", "model": model, "period": "1 h"}
+            for model in MODELS
+        },
+        metrics={
+            f"score_{model}": {"type": "rtp_score", "of": model, "period": "1 h"}
+            for model in MODELS
+        },
+        seed=seed,
+        days=days,
+    )
+
+
+def scores(content: Mapping[str, Any]) -> Scores:
+    """Run a month; return the scores by model and gap, the naive guess as one more model."""
+    import fleet2d
+
+    stored = fleet2d.run(content)
+    found: Scores = {name: stored.metrics[f"score_{name}"][USER] for name in content["algorithms"]}
+    found[NAIVE] = {
+        gap: {score: values[f"naive_{score}"] for score in SCORES}
+        for gap, values in found[MODELS[0]].items()
+    }
+    return found
+
+
+def means(found: list[Scores]) -> Means:
+    """Return the mean of each score over seeds, with its interval."""
+    return {
+        score: {
+            name: {
+                gap: interval(one[name][gap][score] for one in found if gap in one[name])
+                for gap in GAPS
+                if any(gap in one[name] for one in found)
+            }
+            for name in (*MODELS, NAIVE)
+        }
+        for score in SCORES
+    }
+
+
+def reproduce(request: Request, tell: Tell) -> Result:
+    """Run all months; return the tables of scores."""
+    seeds, days = request.size(10, 30, 2, 3)
+    cases = [watched_month(seed, days) for seed in range(seeds)]
+    found = run_all(scores, cases, request, tell)
+    by_score = means(found)
+    tables = tuple(
+        Table(
+            f"{words}; {counted(seeds, 'seed')} of {counted(days, 'day')}",
+            ("model", *GAPS),
+            tuple(
+                (name.replace("_", " "), *(_shown(by_gap.get(gap)) for gap in GAPS))
+                for name, by_gap in by_score[score].items()
+            ),
+            PAPER if score == "top_1" else (),
+        )
+        for score, words in SCORES.items()
+    )
+    numbers = {"seeds": seeds, "days": days, "means": by_score, "scores": found}
+    return Result(NAME, TITLE, tables, numbers)
+
+
+def _shown(value: tuple[float, float, float] | None) -> str:
+    return "" if value is None else f"{value[0]:.3f}"

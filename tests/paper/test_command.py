@@ -1,0 +1,102 @@
+"""The command `fleet2d reproduce-paper`: what it prints and writes, and how it refuses."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.homes import needs_jit
+
+from fleet2d import cli
+from fleet2d.cli import paper
+from fleet2d.errors import InputError
+
+Result = tuple[int, str, str]
+TINY = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")
+
+
+@pytest.fixture
+def reproduce(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Callable[..., Result]:
+    """The command in this process, in an empty folder: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Result:
+        monkeypatch.setattr(sys, "argv", ["fleet2d", "reproduce-paper", *arguments])
+        with pytest.raises(SystemExit) as caught:
+            cli.main()
+        out, err = capsys.readouterr()
+        return int(caught.value.code or 0), out, err
+
+    return call
+
+
+@needs_jit
+def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Result]) -> None:
+    code, out, _ = reproduce("ltp-gap", *TINY)
+    assert 0 == code
+    assert "Fig. 7 left" in out
+    assert "the paper's figure" in out
+    assert "living_room_0" in out
+    assert ["ltp-gap.json", "ltp-gap.png"] == sorted(path.name for path in Path("paper").iterdir())
+    assert 2 == json.loads(Path("paper/ltp-gap.json").read_text(encoding="utf-8"))["days"]
+
+
+@needs_jit
+def test_units_in_brackets_are_printed(reproduce: Callable[..., Result]) -> None:
+    code, out, _ = reproduce("rtp-gap", *TINY, "--out", "here/there")
+    assert 0 == code
+    assert "log loss [nats]" in out
+    assert Path("here/there/rtp-gap.json").exists()
+
+
+@needs_jit
+def test_without_matplotlib_numbers_are_still_written(
+    reproduce: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paper, "_can_draw", lambda: False)
+    code, _, _ = reproduce("ltp-gap", *TINY)
+    assert 0 == code
+    assert ["ltp-gap.json"] == [path.name for path in Path("paper").iterdir()]
+
+
+def test_missing_matplotlib_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "fleet2d.view", None)
+    monkeypatch.delattr("fleet2d.view", raising=False)
+
+    class Absent:
+        """Finds fleet2d.view and says what is missing, as that does."""
+
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == "fleet2d.view":
+                raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"')
+
+    monkeypatch.delitem(sys.modules, "fleet2d.view")
+    monkeypatch.setattr(sys, "meta_path", [Absent(), *sys.meta_path])
+    assert not paper._can_draw()
+    assert 'pip install "fleet2d[viz]"' in capsys.readouterr().err
+
+
+def test_what_does_not_exist_is_refused(reproduce: Callable[..., Result]) -> None:
+    code, _, err = reproduce("ltpgap")
+    assert 2 == code
+    assert "did you mean 'ltp-gap'?" in err
+    assert not Path("paper").exists()
+
+
+@pytest.mark.parametrize("option", ["--seeds", "--days", "--workers"])
+def test_sizes_below_one_are_refused(reproduce: Callable[..., Result], option: str) -> None:
+    code, _, err = reproduce("ltp-gap", option, "0")
+    assert 2 == code
+    assert option in err
+
+
+def test_a_directory_that_is_a_file_is_refused_first(reproduce: Callable[..., Result]) -> None:
+    Path("taken").write_text("")
+    code, _, err = reproduce("ltp-gap", "--out", "taken")
+    assert 2 == code
+    assert "--out" in err

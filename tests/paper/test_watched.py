@@ -1,0 +1,64 @@
+"""Watching a run: frames show who is where, and only what moved changes."""
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+from tests.homes import needs_jit
+
+from fleet2d.engine.simulation import Simulation
+from fleet2d.paper.watched import LiveView, Watching, watch
+from fleet2d.view.traces import ROBOT_COLORS, USER_COLORS
+
+Frame = NDArray[np.uint8]
+
+
+def at_hour(hour: int) -> Simulation:
+    simulation = Simulation("bundled:base", "simulation.duration=1 d", seed=4)
+    simulation.advance(hour * 3600)
+    return simulation
+
+
+def shows(frame: Frame, color: str) -> int:
+    """Return how many pixels are nearly of a colour."""
+    wanted = np.array(to_rgb(color)) * 255
+    return int((np.abs(frame[..., :3] - wanted).max(axis=-1) < 6).sum())
+
+
+@needs_jit
+def test_a_frame_shows_everybody_at_home_and_nobody_away() -> None:
+    simulation = at_hour(3)
+    view = LiveView(simulation, width=800)
+    night = view.frame().copy()
+    assert not simulation.state["ana"]["away"]
+    assert shows(night, USER_COLORS[0]) > 20
+    assert shows(night, ROBOT_COLORS[0]) > 20
+    simulation.advance(8 * 3600)
+    assert simulation.state["ana"]["away"]
+    assert 0 == shows(view.frame(), USER_COLORS[0])
+
+
+@needs_jit
+def test_a_frame_is_the_same_as_one_drawn_afresh() -> None:
+    simulation = at_hour(6)
+    view = LiveView(simulation, width=400)
+    for _ in range(6):
+        simulation.advance(900)
+        frame = view.frame().copy()
+        assert np.array_equal(LiveView(simulation, width=400).frame(), frame)
+
+
+@needs_jit
+def test_watching_changes_nothing_in_the_run() -> None:
+    plain = Simulation("bundled:base", "simulation.duration=2 h", seed=4).run()
+    simulation = Simulation("bundled:base", "simulation.duration=2 h", seed=4)
+    view = LiveView(simulation, width=200)
+    while not simulation.done:
+        simulation.advance(60)
+        view.frame()
+    assert plain.digest == simulation.finish().digest
+
+
+@needs_jit
+def test_watching_counts_simulated_time_from_the_first_frame() -> None:
+    found = watch(Watching("minute", 60, 10, from_hour=1))
+    assert 600 == round(found["speedup"] * found["seconds"])
