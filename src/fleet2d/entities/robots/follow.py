@@ -26,9 +26,10 @@ class Follow(Behavior):
     """Follow a person at a distance for as long as the cameras have the person in view.
 
     It looks up where the person is every `update`, and drives there by the shortest path; while
-    the person rests, at twice the interval each time, up to 32 s. Who is lost is looked for where the person was perceived last: it drives there and turns round once;
-    then the robot is left to the behaviors behind, until the person comes into view again. Events:
-    `follows`, `lost`, with the person's name.
+    the person rests, at twice the interval each time, up to 32 s. Who is lost is looked for where
+    the person was perceived last: it drives there and turns round once; then the robot is left to
+    the behaviors behind, until the person comes into view again. Events: `follows`, `lost`, with
+    the person's name.
     """
 
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
