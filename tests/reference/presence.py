@@ -3,7 +3,7 @@
 import cmath
 import math
 from collections.abc import Sequence
-from itertools import permutations, product
+from itertools import pairwise, permutations, product
 from typing import Any
 
 import numpy as np
@@ -112,17 +112,73 @@ def brier(p: Sequence[float], truth: int) -> float:
     return sum((x - (1 if i == truth else 0)) ** 2 for i, x in enumerate(p))
 
 
+def in_groups(said: Sequence[float], masses: int) -> list[list[int]]:
+    """Indices of what was said by group: as often as not smaller, equal ones together."""
+    groups: list[list[int]] = [[] for _ in range(masses)]
+    for i, value in enumerate(said):
+        below = sum(other < value for other in said)
+        same = sum(other == value for other in said)
+        middle = (below + below + same - 1) // 2
+        groups[middle * masses // len(said)].append(i)
+    return groups
+
+
+def gaps(said: Sequence[float], true: Sequence[float], masses: int) -> float:
+    """Mean gap between what was said and what came true, by groups."""
+    total = 0.0
+    for group in in_groups(said, masses):
+        if group:
+            mean = sum(said[i] for i in group) / len(group)
+            share = sum(true[i] for i in group) / len(group)
+            total += len(group) / len(said) * abs(share - mean)
+    return total
+
+
+def among_best(row: Sequence[float], truth: int, k: int) -> float:
+    """Share of all orders of places, likeliest first, in which the truth is among the first k."""
+    orders = [
+        order
+        for order in permutations(range(len(row)))
+        if all(row[a] >= row[b] for a, b in pairwise(order))
+    ]
+    return sum(truth in order[:k] for order in orders) / len(orders)
+
+
 def calibration_error(p: Any, truth: Sequence[int], masses: int) -> float:
     """Gap between accuracy and confidence, by groups of equal size."""
-    rows = sorted(
-        ((max(row), i, row, t) for i, (row, t) in enumerate(zip(p, truth, strict=True))),
-        key=lambda r: (r[0], r[1]),
-    )
-    total = 0.0
-    for g in range(masses):
-        group = rows[g * len(rows) // masses : (g + 1) * len(rows) // masses]
-        if group:
-            right = sum((list(row).index(max(row)) == t) for _, _, row, t in group) / len(group)
-            sure = sum(c for c, *_ in group) / len(group)
-            total += len(group) / len(rows) * abs(right - sure)
-    return total
+    sure = [max(row) for row in p]
+    right = [
+        (row[t] == max(row)) / sum(x == max(row) for x in row)
+        for row, t in zip(p, truth, strict=True)
+    ]
+    return gaps(sure, right, masses)
+
+
+def classwise_error(p: Any, truth: Sequence[int], masses: int) -> float:
+    """Mean over places of the gap of each place's probability."""
+    places = range(len(p[0]))
+    return sum(
+        gaps([row[c] for row in p], [float(t == c) for t in truth], masses) for c in places
+    ) / len(places)
+
+
+def murphy(p: Any, truth: Sequence[int]) -> tuple[float, float, float]:
+    """Reliability, resolution and uncertainty, grouped by what exactly was said of each place."""
+    n, reliability, resolution, uncertainty = len(truth), 0.0, 0.0, 0.0
+    for c in range(len(p[0])):
+        mean = sum(t == c for t in truth) / n
+        uncertainty += mean * (1 - mean)
+        for value in {row[c] for row in p}:
+            group = [t == c for row, t in zip(p, truth, strict=True) if row[c] == value]
+            share = sum(group) / len(group)
+            reliability += len(group) / n * (value - share) ** 2
+            resolution += len(group) / n * (share - mean) ** 2
+    return reliability, resolution, uncertainty
+
+
+def kendall(one: Sequence[float], other: Sequence[float]) -> float:
+    """Kendall's tau-a, pair by pair."""
+    pairs = [(i, j) for j in range(len(one)) for i in range(j)]
+    agree = sum((one[i] - one[j]) * (other[i] - other[j]) > 0 for i, j in pairs)
+    differ = sum((one[i] - one[j]) * (other[i] - other[j]) < 0 for i, j in pairs)
+    return (agree - differ) / len(pairs)

@@ -22,6 +22,10 @@ def show(
     step: Annotated[
         int | None, typer.Option(help="With --layer: as it was after this step; else the last.")
     ] = None,
+    reliability: Annotated[
+        str | None,
+        typer.Option(help="Of a run: how often what this algorithm believed of presence was true."),
+    ] = None,
     fov: Annotated[
         str | None,
         typer.Option(
@@ -32,10 +36,15 @@ def show(
 ) -> None:
     """Draw a floor plan of any format, or a stored run in its home."""
     is_run = what is not None and (what / "manifest.json").exists()
-    if fov is not None if is_run else layer is not None or step is not None:
-        raise InputError("--layer and --step are for a run's directory, --fov for a floor plan")
+    of_run = any(option is not None for option in (layer, step, reliability))
+    if fov is not None if is_run else of_run:
+        raise InputError(
+            "--layer, --step and --reliability are for a run's directory, --fov for a floor plan"
+        )
+    if reliability is not None and (layer is not None or step is not None):
+        raise InputError("one picture at a time: --layer or --reliability")
     if what is not None and is_run:
-        target = _draw_run(what, out, layer, step)
+        target = _draw_run(what, out, layer, step, reliability)
     elif what is not None and what.is_dir():
         raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
     else:
@@ -43,8 +52,10 @@ def show(
     typer.echo(target)
 
 
-def _draw_run(run: Path, out: Path | None, layer: str | None, step: int | None) -> Path:
-    """Draw a stored run in its home, or one of its layers; return where."""
+def _draw_run(
+    run: Path, out: Path | None, layer: str | None, step: int | None, reliability: str | None
+) -> Path:
+    """Draw a stored run in its home, one of its layers, or a reliability diagram; return where."""
     from fleet2d.artifacts.reader import open_run
 
     if layer is not None:
@@ -52,6 +63,11 @@ def _draw_run(run: Path, out: Path | None, layer: str | None, step: int | None) 
 
         target = out or run / f"{layer}.png"
         draw_layer(open_run(run), layer, target, step)
+    elif reliability is not None:
+        from fleet2d.view.reliability import draw_reliability
+
+        target = out or run / f"{reliability}-reliability.png"
+        draw_reliability(open_run(run), reliability, target)
     else:
         from fleet2d.view.run import draw_run
 

@@ -20,10 +20,14 @@ from fleet2d.metrics.presence.distances import (
 from fleet2d.metrics.presence.scores import (
     brier_score,
     calibration_error,
+    classwise_error,
+    groups_of,
     log_loss,
+    murphy,
+    reliability_curve,
     sharpness,
     skill,
-    top_1,
+    top_k,
 )
 
 weights = st.lists(st.integers(0, 20), min_size=1, max_size=9).filter(any)
@@ -117,13 +121,64 @@ def test_scores_are_their_definitions(seed: int, count: int, places: int, masses
     assert [-math.log(max(row[t], 1e-6)) for row, t in zip(p, truth, strict=True)] == pytest.approx(
         log_loss(p, truth).tolist()
     )
-    assert (p.argmax(axis=1) == truth).tolist() == top_1(p, truth).tolist()
+    assert (p.argmax(axis=1) == truth).tolist() == top_k(p, truth, 1).tolist()
     assert slow.calibration_error(p, truth.tolist(), masses) == pytest.approx(
         calibration_error(p, truth, masses), abs=1e-12
+    )
+    assert slow.classwise_error(p.tolist(), truth.tolist(), masses) == pytest.approx(
+        classwise_error(p, truth, masses), abs=1e-12
     )
     assert [-sum(x * math.log(x) for x in row) for row in p] == pytest.approx(
         sharpness(p).tolist(), abs=1e-12
     )
+    parts = murphy(p, truth, masses)
+    assert brier_score(p, truth).mean() == pytest.approx(
+        parts.reliability - parts.resolution + parts.uncertainty
+    )
+
+
+@st.composite
+def coarse(draw) -> tuple[np.ndarray, np.ndarray]:
+    """Forecasts in quarters, in which places are often equally likely."""
+    places, count = draw(st.integers(1, 4)), draw(st.integers(1, 25))
+    cuts = st.lists(st.integers(0, 4), min_size=places - 1, max_size=places - 1).map(sorted)
+    rows = [np.diff([0, *draw(cuts), 4]) / 4 for _ in range(count)]
+    return np.array(rows), np.array([draw(st.integers(0, places - 1)) for _ in range(count)])
+
+
+@given(coarse(), st.integers(1, 4), st.integers(1, 9))
+def test_ties_are_shared_and_stay_together(case, k: int, masses: int) -> None:
+    p, truth = case
+    expected = [slow.among_best(row, t, k) for row, t in zip(p.tolist(), truth, strict=True)]
+    assert expected == pytest.approx(top_k(p, truth, k).tolist())
+    said = p[:, 0]
+    groups = groups_of(said, masses)
+    for g, group in enumerate(slow.in_groups(said.tolist(), masses)):
+        assert group == np.flatnonzero(groups == g).tolist()
+    assert slow.calibration_error(p.tolist(), truth.tolist(), masses) == pytest.approx(
+        calibration_error(p, truth, masses), abs=1e-12
+    )
+    confidence, share, size = reliability_curve(said, truth == 0, masses)
+    assert len(p) == size.sum()
+    assert np.abs(share - confidence) @ size / len(p) == pytest.approx(
+        slow.gaps(said.tolist(), (truth == 0).tolist(), masses), abs=1e-12
+    )
+
+
+@given(st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), min_size=1, max_size=40))
+def test_parts_of_the_brier_score_are_those_by_what_was_said(rows) -> None:
+    """Three forecasts, which many groups tell apart however often each was made."""
+    said = np.array([[0.2, 0.3, 0.5], [0.4, 0.4, 0.2], [0.9, 0.1, 0.0]])
+    p, truth = said[[kind for kind, _ in rows]], np.array([t for _, t in rows])
+    expected = slow.murphy(p.tolist(), truth.tolist())
+    assert expected == pytest.approx(tuple(murphy(p, truth, masses=400)), abs=1e-12)
+
+
+@given(two())
+def test_order_of_rooms_is_that_of_pairs(pair) -> None:
+    p, q = pair
+    if len(p) > 1:
+        assert slow.kendall(p.tolist(), q.tolist()) == pytest.approx(rank_correlation(p, q))
 
 
 def test_forecasts_that_are_right_as_often_as_they_say_are_calibrated() -> None:

@@ -44,6 +44,7 @@ def content(duration: str = "3 h", **changes: Any) -> dict[str, Any]:
                 "score": {"type": "rtp_score", "of": "rtp"},
                 "naive": {"type": "rtp_score", "of": "last"},
                 "at_home": {"type": "rtp_score", "of": "rtp", "given_home": True},
+                "beside": {"type": "rtp_score", "of": "rtp", "reference": "last"},
             },
             "artifacts": {"trajectories": "every step"},
             **changes,
@@ -116,7 +117,8 @@ def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> N
         before = steps[steps <= end]
         gap = (end - before.max()) / 60 if len(before) else math.inf
         ends = {1: "0-1 min", 5: "1-5 min", 15: "5-15 min", 60: "15-60 min", 240: "1-4 h"}
-        name = next((name for limit, name in ends.items() if gap <= limit), "over 4 h")
+        usual = "never seen" if math.isinf(gap) else "over 4 h"
+        name = next((name for limit, name in ends.items() if gap <= limit), usual)
         counts[name] = counts.get(name, 0) + 1
     result = stored.metrics["score"][user]
     assert counts == {name: scores["bins"] for name, scores in result.items() if name != "all"}
@@ -140,6 +142,53 @@ def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:
         better = stored.metrics["score"][user]["all"]
         assert better["naive_log_loss"] == scores[user]["naive_log_loss"]
         assert better["log_loss"] < scores[user]["log_loss"]
+
+
+@pytest.mark.parametrize("user", ["ana", "ben", "gone"])
+def test_scores_of_each_gap_are_consistent(stored: Any, user: str) -> None:
+    for scores in stored.metrics["score"][user].values():
+        parts = scores["reliability"] - scores["resolution"] + scores["uncertainty"]
+        assert scores["brier"] == pytest.approx(parts)
+        assert scores["top_1"] <= scores["top_2"] <= 1
+        assert 0 <= scores["ece"] <= 1
+        assert 0 <= scores["ece_classwise"] <= 1
+        assert 0 <= scores["sharpness"] <= math.log(7)
+        assert scores["skill"] == pytest.approx(1 - scores["log_loss"] / scores["naive_log_loss"])
+        assert "reference_skill" not in scores
+
+
+def test_a_reference_is_scored_on_the_same_bins(stored: Any) -> None:
+    for user, by_gap in stored.metrics["beside"].items():
+        for gap, scores in by_gap.items():
+            other = stored.metrics["naive"][user][gap]
+            assert scores["bins"] == other["bins"]
+            for name in ("log_loss", "brier", "top_1"):
+                assert scores[f"reference_{name}"] == pytest.approx(other[name])
+            expected = 1 - scores["log_loss"] / other["log_loss"] if other["log_loss"] else 0
+            assert scores["reference_skill"] == pytest.approx(expected)
+            plain = stored.metrics["score"][user][gap]
+            assert {k: v for k, v in scores.items() if not k.startswith("reference")} == plain
+
+
+def test_a_reference_that_is_missing_is_refused() -> None:
+    metrics = {"score": {"type": "rtp_score", "of": "rtp", "reference": "lats"}}
+    with pytest.raises(Fleet2DError, match="did you mean 'last'"):
+        fleet2d.Simulation(content(metrics=metrics))
+
+
+def test_a_reference_is_left_out_of_bins_of_which_it_tells_nothing() -> None:
+    """Long-term presence without a track knows nothing of the first period."""
+    found = run(
+        content(
+            "1 h",
+            algorithms={"rtp": {"type": "rtp"}, "ltp": {"type": "ltp", "period": "5 min"}},
+            metrics={"score": {"type": "rtp_score", "of": "rtp", "reference": "ltp"}},
+        )
+    )
+    scores = found.metrics["score"]["ben"]["all"]
+    assert 60 == scores["bins"]
+    assert 0 < scores["reference_log_loss"] < 10
+    assert scores["reference_skill"] != scores["skill"]
 
 
 def test_bins_away_do_not_count_given_home(stored: Any) -> None:
