@@ -7,6 +7,7 @@ import pytest
 from tests.entities.robots.robots import (
     OUT,
     assert_same_for_every_max_span,
+    events,
     home_with,
     names,
     rooms,
@@ -97,15 +98,80 @@ def test_steps_of_any_length_and_copies_give_the_same() -> None:
     assert digests(copy.deepcopy(simulation).run()) == digests(simulation.run())
 
 
+def own_approaches(stored: Any, user: str = "ana") -> Any:
+    """How near the robot's own moves bring it to where somebody was, of those that bring it nearer [m]."""
+    one, other = path(stored, "astro"), path(stored, user)
+    before = np.hypot(one.x[:-1] - other.x[:-1], one.y[:-1] - other.y[:-1])
+    after = np.hypot(one.x[1:] - other.x[:-1], one.y[1:] - other.y[:-1])
+    return after[(after < before - 1e-9) & ~other.away[:-1]]
+
+
 @pytest.mark.parametrize(
-    "behaviors", [["meander"], ["opportunistic", "patrol"], ["follow", "patrol"]]
+    "behaviors",
+    [["meander"], [TO_AND_FRO], ["opportunistic", "patrol"], ["follow", "patrol"]],
+    ids=["meander", "patrol", "opportunistic", "follow"],
 )
-def test_it_keeps_clear_in_a_crowd_most_of_the_time(behaviors: list[Any]) -> None:
+def test_it_never_drives_into_anybody_in_a_crowd(behaviors: list[Any]) -> None:
     content = polite("meander", behaviors, "40 min")
     stored = assert_same_for_every_max_span(content, 61)
     assert "gives_way" in names(stored)
+    assert own_approaches(stored).min() >= 0.35
     rude = run(home_with(behaviors, "40 min", "meander"))
-    assert (gap(stored) < 0.35).mean() <= (gap(rude) < 0.35).mean()
+    assert own_approaches(rude).min() < 0.35
+
+
+def test_it_never_drives_into_anybody_for_days_in_a_furnished_home() -> None:
+    member = {
+        "type": "routine",
+        "household": {"members": {"ana": "works_from_home", "ben": "retired"}},
+    }
+    content = {
+        "simulation": {"start": "2026-01-05", "duration": "3 d", "seed": 4},
+        "floorplan": {"type": "bundled", "furnish": True},
+        "users": {"ana": member, "ben": member},
+        "robots": {"astro": {"behaviors": [{"type": "patrol", "dwell": "1 min"}], "gives_way": {}}},
+    }
+    stored = run(content)
+    nearest = [own_approaches(stored, user) for user in ("ana", "ben")]
+    assert min(found.min() for found in nearest) >= 0.35
+    # Nearer than it likes it comes only where it has waited, and there is no more room.
+    assert sum(int((found < KEPT - 0.01).sum()) for found in nearest) < 60
+    rude = run({**content, "robots": {"astro": {"type": "patrol", "dwell": "1 min"}}})
+    assert sum(int((own_approaches(rude, user) < 0.35).sum()) for user in ("ana", "ben")) > 10
+
+
+IN_THE_DOOR = {"type": "tests.own_components:Scripted", "start": [5.05, 3.1], "speed": 1.0}
+
+
+@pytest.mark.parametrize(("stays", "gives_up"), [(60.0, False), (1200.0, True)])
+def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_up: bool) -> None:
+    patrol = {**TO_AND_FRO, "waypoints": [[2.0, 3.1], [7.0, 3.1], [1.0, 6.0]]}
+    ana = {**IN_THE_DOOR, "script": [stays, [7.0, 1.0], 1200.0]}
+    stored = assert_same_for_every_max_span(polite(ana, [patrol], "10 min"), 61, 1)
+    assert own_approaches(stored).min() >= 0.4
+    assert ("gives_up" in names(stored)) == gives_up
+    assert ("kitchen_0" in rooms(stored)) != gives_up
+    assert "bedroom_0" in rooms(stored)  # the stop behind the one that it leaves out
+    steps = [step for step, name, _ in events(stored) if name in ("gives_way", "gives_up")]
+    if gives_up:
+        assert 120 <= steps[1] - steps[0] <= 122
+
+
+def test_a_look_that_was_held_up_counts_as_one() -> None:
+    """Find looks on elsewhere, though it waited for somebody on the way."""
+    find = {"type": "find", "user": "ben", "at": ["07:01"], "deadline": "8 min"}
+    still = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_around": False}
+    content = polite(stands(3.0, 3.0), [find, still], "12 min", patience="3 s")
+    content["users"]["ben"] = OUT
+    found = run(content)
+    assert "gives_way" in names(found)
+    assert {"kitchen_0", "bedroom_0", "bathroom_0"} <= visited(found)
+
+
+def visited(stored: Any) -> set[str]:
+    """The rooms that the robot was in."""
+    poses = path(stored, "astro")
+    return {stored.plan.rooms[room].name for room in set(poses.room.tolist()) if room >= 0}
 
 
 def test_key_frames_tell_the_same_as_the_poses() -> None:
@@ -138,6 +204,7 @@ def test_robots_that_do_not_give_way_are_as_they_were() -> None:
     [
         ({"distance": -1}, "distance"),
         ({"patience": 0}, "longer than 0"),
+        ({"gives_up": 0}, "longer than 0"),
         ({"politeness": 1}, "unknown key"),
     ],
 )

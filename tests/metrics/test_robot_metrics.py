@@ -15,6 +15,7 @@ from tests.scenes import flat_document, run, scenario, table
 
 from fleet2d import Algorithm, Metric
 from fleet2d.artifacts.reader import Run
+from fleet2d.component import lookup
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
 
 pytestmark = needs_jit
@@ -190,6 +191,56 @@ def test_time_to_find_tells_outcomes_and_times(stored: Run) -> None:
     assert found["out_told"] == pytest.approx((rows["end"][~home] == "not_at_home").mean())
     assert 0 < found["spl"] <= 1 <= found["ratio"]
     assert found["median"] <= found["p90"] if "p90" in found else True
+
+
+def test_a_search_that_the_run_ends_is_cut_short_there() -> None:
+    cut = content("1 d")
+    cut["simulation"]["duration"] = "9 min 30 s"
+    cut["users"]["ana"] = {
+        "type": "schedule",
+        "days": [{"items": [{"at": "00:00", "place": "bathroom"}]}],
+    }
+    del cut["robots"]["astro"]["battery"]
+    find = {"type": "find", "user": "ana", "every": "9 min", "source": "rtp", "policy": "random"}
+    cut["robots"]["astro"]["behaviors"] = [find, {"type": "patrol", "waypoints": [[1.0, 3.0]]}]
+    found = run(cut).metrics["time_to_find"]["astro"]
+    assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0} == found
+
+
+def test_who_is_told_not_to_be_at_home_but_is_counts_as_a_false_verdict() -> None:
+    hidden = content("1 d")
+    hidden["users"]["ana"] = {
+        "type": "schedule",
+        "days": [{"items": [{"at": "00:00", "place": "bathroom"}]}],
+    }
+    gate = {"type": "door", "doorway": "bathroom_0", "open": False, "locked": True}
+    hidden["objects"] = {"gate": gate}
+    find = {"type": "find", "user": "ana", "every": "40 min", "out": 0.9, "deadline": "30 min"}
+    hidden["robots"]["astro"]["behaviors"] = ["dock", find]
+    found = run(hidden).metrics["time_to_find"]["astro"]
+    assert (2, 2, 0.0) == (found["searches"], found["false_out"], found["success"])
+
+
+def test_a_battery_that_runs_empty_is_told() -> None:
+    empty = content("1 d")
+    empty["robots"]["astro"]["behaviors"] = [{"type": "dock", "threshold": 0.01}, "meander"]
+    empty["robots"]["astro"]["battery"] = {**BATTERY, "charger": [7.0, 6.0]}
+    stored = run(empty)
+    step = next(step for step, _, detail in events(stored) if detail == "0.0 %")
+    found = stored.metrics["battery"]["astro"]
+    assert found["empty"] == pytest.approx(1 - step / 6000)
+    assert 0 == found["lowest"]
+
+
+@pytest.mark.parametrize("name", [*METRICS, "detections"])
+def test_every_number_of_the_closing_table_has_a_unit(stored: Run, name: str) -> None:
+    metric = lookup("metric", name)
+    result = stored.metrics.get(name) or run({**content(), "metrics": {name: {}}}).metrics[name]
+    shown = flat(metric.summary(result))
+    assert shown
+    assert shown.items() <= flat(result).items()
+    units = {path: metric.units.get(path.rsplit(".")[-1], metric.unit) for path in shown}
+    assert "" not in units.values()
 
 
 # --- Survival ----------------------------------------------------------------------------------

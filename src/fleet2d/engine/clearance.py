@@ -1,8 +1,9 @@
 """Clearance: which robots are about to drive at people, step by step.
 
 It follows from the poses alone. A robot that gives way is in somebody's way at a step if its next
-move would bring it within its distance of where somebody is, and nearer than it is. It is asked
-anew at that step, before it moves, so it makes no difference where spans end.
+move would bring it within its distance of where somebody is, and nearer than it is; one that goes
+round people, if that would bring the bodies together. It is asked anew at that step, before it
+moves, so it makes no difference where spans end.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from fleet2d.engine.buckets import PoseBlock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.giving_way import PASSING
+from fleet2d.entities.giving_way import TOUCHING
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import Poses, empty_poses
 from fleet2d.kernels.sight import line_of_sight
@@ -47,7 +48,8 @@ class Clearance:
                 block.x[crowd, : count + 1],
                 block.y[crowd, : count + 1],
                 block.away[crowd, : count + 1],
-                begin=max(1, robot.pushes_until - first),
+                first,
+                begin=1,
             )
             if met is not None:
                 count = met[0]
@@ -56,27 +58,34 @@ class Clearance:
     def in_way(self, row: int, step: int) -> Actor | None:
         """Return at whom a robot would drive in a step, with everybody where they are."""
         robot = self.robots.get(row)
-        if robot is None or step < robot.pushes_until:
+        if robot is None:
             return None
         poses = empty_poses(2)
         robot.motion.trace(step, robot.state, poses)
         where = np.array([user.state for user in self._users], np.int64)
         twice = np.repeat(where[:, None, :], 2, axis=1)
-        met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], begin=0)
+        met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], step, begin=0)
         return None if met is None else self._users[met[1]]
 
     def people(self, robot: Actor) -> I64:
-        """Return where people at home are, and how far a robot keeps to pass: int64 (n, 3)."""
+        """Return where people at home are, and at which distance the bodies touch: int64 (n, 3)."""
         units = robot.home.plan.lattice.units_per_m
         rows = [
-            (u.state.x, u.state.y, int((u.entity.radius + robot.entity.radius + PASSING) * units))
+            (u.state.x, u.state.y, int((u.entity.radius + robot.entity.radius) * units))
             for u in self._users
             if not u.state.away
         ]
         return np.array(rows, np.int64).reshape(-1, 3)
 
     def _first(
-        self, robot: Actor, poses: Poses, xs: I64, ys: I64, away: NDArray[np.integer], begin: int
+        self,
+        robot: Actor,
+        poses: Poses,
+        xs: I64,
+        ys: I64,
+        away: NDArray[np.integer],
+        first: int,
+        begin: int,
     ) -> tuple[int, int] | None:
         """Return the first column, from `begin` to the last but one, and at whom it drives."""
         assert isinstance(robot.entity, Robot)
@@ -84,8 +93,10 @@ class Clearance:
         units = robot.home.plan.lattice.units_per_m
         best: tuple[int, int] | None = None
         x, y = poses.x, poses.y
+        passes = np.arange(first, first + len(x) - 1) < robot.passes_until
+        gap = np.where(passes, TOUCHING, robot.entity.gives_way.distance)
         for number, user in enumerate(self._users):
-            keeps = user.entity.radius + robot.entity.radius + robot.entity.gives_way.distance
+            keeps = user.entity.radius + robot.entity.radius + gap
             dx, dy = x[:-1] - xs[number, :-1], y[:-1] - ys[number, :-1]
             next_x, next_y = x[1:] - xs[number, :-1], y[1:] - ys[number, :-1]
             ahead = next_x * next_x + next_y * next_y

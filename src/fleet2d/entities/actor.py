@@ -14,7 +14,7 @@ from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.battery import Charge
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.entity import Entity
-from fleet2d.entities.giving_way import JUST_WAITED, Waiting
+from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, State
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
@@ -88,7 +88,8 @@ class Actor:
         self._chosen: Plan | None = None
         self._waiting: Waiting | None = None
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
-        self.pushes_until = 0  # before that step it doesn't give way
+        self.passes_until = 0  # before that step it goes round people: it minds not to touch them
+        self._blocked = ("", -1)  # what was in its way, and up to which step it waits there
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
@@ -292,32 +293,32 @@ class Actor:
             self._watch(now, fresh=True)
 
     def give_way(self, now: Situation, whom: str, people: NDArray[np.int64]) -> None:
-        """Stop before somebody at whom the plan would drive now; in the end go round, or on.
+        """Stop before somebody at whom the plan would drive now; in the end go round, or give up.
 
         Args:
             now: The situation.
             whom: Who is in the way.
-            people: Where people are, and how far to keep from each [lattice], int64 (n, 3).
+            people: Where people are, and at which distance the bodies touch [lattice], int64
+                (n, 3).
         """
         step, just = now.step, micros(JUST_WAITED) // self.clock.step_us + 1
         since = self._waited[0] if step <= self._waited[1] else step
         waits = Waiting(self.plan, step, since, self.arbiter.own)
-        self._waited = since, step + just
-        patience = micros(self.entity.gives_way.patience)  # type: ignore[attr-defined]
-        plan: Plan | None
-        if (step - since) * self.clock.step_us < patience:
+        self._waited, self.passes_until = (since, step + just), step
+        gives_way: GivesWay = self.entity.gives_way  # type: ignore[attr-defined]
+        waited, plan = (step - since) * self.clock.step_us, None
+        if waited >= micros(gives_way.patience):
+            plan = waits.go_round(now, people, gives_way.distance)
+            self.passes_until = step + just if plan is not None else step
+        if plan is None and waited >= micros(max(gives_way.patience, gives_way.gives_up)):
+            plan, self._waited = waits.leave_out(now, whom), (0, -1)
+        if plan is None:
             plan, self._waiting = waits.wait(now, whom), waits
-        else:
-            self.pushes_until = step + just
-            plan = waits.go_on(now, people)
-        if plan is not None:
-            if self.plan.began[0] == step:  # it has begun, and is over at once
-                begun = [n for n in self.plan.notes if n.time_us <= step * self.clock.step_us]
-                plan.notes[:0] = begun
-            self.plan, self.motion, self.planned_at = plan, plan.finish(), step
-            self._watch(now, fresh=True)
-        elif self.plan.began[0] != step:
-            self.decide(now)
+        if self.plan.began[0] == step:  # it has begun, and is over at once
+            begun = [n for n in self.plan.notes if n.time_us <= step * self.clock.step_us]
+            plan.notes[:0] = begun
+        self.plan, self.motion, self.planned_at = plan, plan.finish(), step
+        self._watch(now, fresh=True)
 
     def _watch(self, now: Situation, *, fresh: bool) -> None:
         """Set when it is asked again: the plan is over, or somebody may want to break in."""
@@ -339,7 +340,12 @@ class Actor:
         except (PlacementError, NoWayError) as error:
             if not self.home.hinders:
                 raise
-            return now.plan().note("way_blocked", str(error)).stay(AT_A_DOOR)
+            plan, told = now.plan(), str(error)
+            if self._blocked != (told, now.step):  # else it has waited for that already
+                plan.note("way_blocked", told)
+            plan.stay(AT_A_DOOR)
+            self._blocked = told, self.clock.step_at_or_after(plan.time_us)
+            return plan
 
     def _begin(self) -> State:
         """Return the state at step 0."""

@@ -1,4 +1,4 @@
-"""Giving way: a robot that stops before people, waits, and goes round who doesn't go on."""
+"""Giving way: a robot that stops before people, waits, and goes round them or gives up."""
 
 from datetime import timedelta
 from typing import TYPE_CHECKING
@@ -9,7 +9,7 @@ from pydantic import Field
 
 from fleet2d.component import Settings
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.resume import resumed
+from fleet2d.entities.resume import resumed, without_next_stop
 from fleet2d.floorplan.costmap import NO_WAY, route_by_cost
 from fleet2d.units import Length, PositiveDuration
 
@@ -19,22 +19,29 @@ if TYPE_CHECKING:
 
 # It looks so often whether the way is clear again.
 LOOKS_EVERY = timedelta(seconds=1)
-# So soon after it waited it goes on counting; so long it goes on without giving way again.
+# So soon after it waited it goes on counting; going round, it minds for so long not to touch.
 JUST_WAITED = timedelta(seconds=15)
-# Beside who doesn't go on it passes with so much between the bodies, where there is room [m].
+# Beside who doesn't go on it passes with so much between the bodies, where there is no more room,
+# and with so much at the very least [m].
 PASSING = 0.1
+TOUCHING = 0.03
 
 I64 = NDArray[np.int64]
 
 
 class GivesWay(Settings):
-    """Keep clear of people: wait before them, in doorways as elsewhere, then go round."""
+    """Keep clear of people: wait before them, in doorways as elsewhere; go round, or give up."""
 
     distance: Length = Field(
         default=0.4, ge=0, le=3, description="it comes no nearer on its own, from body to body [m]"
     )
     patience: PositiveDuration = Field(
-        default=timedelta(seconds=10), description="how long it waits before it goes round, or on"
+        default=timedelta(seconds=10),
+        description="how long it waits before it goes round, by 0.1 m where there is no more room",
+    )
+    gives_up: PositiveDuration = Field(
+        default=timedelta(minutes=2),
+        description="how long it waits where there is no way round: then it leaves out that stop",
     )
 
 
@@ -61,11 +68,37 @@ class Waiting:
         plan.interrupts = self.interrupts
         return plan
 
-    def go_on(self, now: "Situation", around: I64 | None = None) -> Plan | None:
-        """Return the rest of the plan, round some places if given; None if nothing is left."""
-        actor = now.actor
-        route = None if around is None else _Detour(actor, around)
-        plan = resumed(actor, now.plan(), self.broken, self.step, route)
+    def go_on(self, now: "Situation") -> Plan | None:
+        """Return the rest of the plan; None if nothing is left."""
+        return self._heard(resumed(now.actor, now.plan(), self.broken, self.step))
+
+    def go_round(self, now: "Situation", people: I64, distance: float) -> Plan | None:
+        """Return the rest of the plan by a way that keeps clear; None if there is none.
+
+        Args:
+            now: The situation.
+            people: Where people are, and at which distance the bodies touch, int64 (n, 3).
+            distance: How far to keep where there is room [m].
+        """
+        actor, lattice = now.actor, now.actor.home.plan.lattice
+        plan = None
+        for gap in (max(distance, PASSING) + lattice.cell, PASSING):
+            around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
+            begun, detour = self._looking_again(now), _Detour(actor, around)
+            plan = plan or resumed(actor, begun, self.broken, self.step, detour)
+        return self._heard(plan)
+
+    def leave_out(self, now: "Situation", whom: str) -> Plan:
+        """Return the plan without the stop that it can't get to; standing, if that was the last."""
+        plan = self._looking_again(now).note("gives_up", whom)
+        found = without_next_stop(now.actor, plan, self.broken, self.step)
+        return self._heard(found) or self._looking_again(now).note("gives_up", whom)
+
+    def _looking_again(self, now: "Situation") -> Plan:
+        """Return a plan that begins with a step of standing: whoever is in the way is seen."""
+        return now.plan().stay(timedelta(microseconds=now.actor.clock.step_us))
+
+    def _heard(self, plan: Plan | None) -> Plan | None:
         if plan is not None:
             plan.interrupts = self.interrupts
         return plan

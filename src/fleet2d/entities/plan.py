@@ -99,8 +99,9 @@ class Plan:
         time_us: The moment up to which it is planned [us since the start].
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
-        posture: How the body stands at the moment up to which it is planned.
-        postures: When it takes another posture [us since the start], and which.
+        asks_us: When the behavior is asked at the latest [us since the start]; None: at its end.
+        root: The plan that it goes on with; itself, unless one was broken off.
+        posture, postures: How the body stands in the end; when it takes another [us], and which.
     """
 
     def __init__(self, actor: "Actor", step: int) -> None:
@@ -113,8 +114,8 @@ class Plan:
         self.x, self.y, self.heading, self.away = state
         self.notes: list[Note] = []
         self.interrupts: frozenset[str] = frozenset()
-        self._asks_us: int | None = None
-        self.endless = False
+        self.asks_us: int | None = None
+        self.root, self.endless = self, False
         self._posture_before = actor.posture_code(self.time_us)
         self.posture: Posture = POSTURES[self._posture_before]
         self.postures: list[tuple[int, int]] = []
@@ -352,14 +353,14 @@ class Plan:
     def ask_by(self, time: datetime) -> Self:
         """Ask the behavior again at a local time at the latest, wherever the body is by then."""
         asks_us = self._actor.clock.elapsed(time)
-        self._asks_us = asks_us if self._asks_us is None else min(asks_us, self._asks_us)
+        self.asks_us = asks_us if self.asks_us is None else min(asks_us, self.asks_us)
         return self
 
     @property
     def over_at(self) -> int | None:
         """The step at which it is over, not the one at which it began; None: never."""
         ends = [] if self.endless else [self.time_us]
-        ends += [] if self._asks_us is None else [self._asks_us]
+        ends += [] if self.asks_us is None else [self.asks_us]
         # One that takes no time would be asked for again and again at the same step.
         clock, least = self._actor.clock, self.began[0] + 1
         return max(clock.step_at_or_after(min(ends)), least) if ends else None
@@ -388,8 +389,7 @@ class Plan:
         self._rows.append((self.time_us, self.x, self.y, self.heading, self.away))
 
     def _breakpoints(self) -> I64:
-        blocks: list[I64] = []
-        single: list[Row] = []
+        blocks, single = list[I64](), list[Row]()
         for row in (*self._rows, np.empty((0, 5), np.int64)):
             if isinstance(row, tuple):
                 single.append(row)

@@ -20,22 +20,51 @@ Detour = Callable[[tuple[int, int], tuple[int, int]], NDArray[np.int64] | None]
 def resumed(
     actor: "Actor", plan: Plan, broken: Plan, step: int, detour: Detour | None = None
 ) -> Plan | None:
-    """Fill an empty plan with the rest of one that was broken off.
+    """Fill a plan with the rest of one that was broken off.
 
     The body goes straight to the next place at which it would have stopped. From there on all is as
     it was planned, only later; of a stop that was under way, what was left of it.
 
     Args:
         actor: The body.
-        plan: An empty plan that begins here and now.
+        plan: A plan that begins here and now, and goes nowhere yet.
         broken: The other plan.
         step: When it was broken off.
-        detour: Finds ways; None: the shortest.
+        detour: Finds ways, if there are any; None: the shortest.
 
     Returns:
         The plan; None where there is nothing to go on with, or no way to it at present.
     """
-    motion, broken_us = broken.finish(), step * actor.clock.step_us
+    return _rest(actor, plan, broken, step * actor.clock.step_us, detour)
+
+
+def without_next_stop(actor: "Actor", plan: Plan, broken: Plan, step: int) -> Plan | None:
+    """Fill a plan with the rest of one that was broken off, but the stop that comes next.
+
+    Returns:
+        The plan; None where no other stop comes, or there is no way to it at present.
+    """
+    motion = broken.finish()
+    if not isinstance(motion, Track):
+        return None
+    x, y, time = motion.breakpoints.x, motion.breakpoints.y, motion.breakpoints.time
+    stop = _next_stop(actor, motion.breakpoints, step * actor.clock.step_us)
+    if stop is None:
+        return None
+    leaves = np.flatnonzero((x[stop:] != x[stop]) | (y[stop:] != y[stop]))
+    found = None
+    if len(leaves):
+        found = _rest(actor, plan, broken, int(time[stop + leaves[0]]), None)
+    if found is not None:
+        found.root = found  # which isn't the whole of what was planned
+    return found
+
+
+def _rest(
+    actor: "Actor", plan: Plan, broken: Plan, broken_us: int, detour: Detour | None
+) -> Plan | None:
+    """Fill a plan with what of another one comes after a moment."""
+    motion = broken.finish()
     if not isinstance(motion, Track) or broken.postures or plan.away:
         return None
     track = motion.breakpoints
@@ -44,8 +73,11 @@ def resumed(
         return None
     goes_on_us = max(int(track.time[stop]), broken_us)
     goal = int(track.x[stop]), int(track.y[stop])
+    route = detour((plan.x, plan.y), goal) if detour else None
+    if detour and route is None:
+        return None
     try:
-        plan.go_to_point(*goal, route=detour and detour((plan.x, plan.y), goal))
+        plan.go_to_point(*goal, route=route)
     except NoWayError:
         return None
     plan.turn_by(turn_between(plan.heading, _heading_at(track, stop, goes_on_us)) / TURN)
@@ -59,6 +91,7 @@ def resumed(
     rest = np.stack([column[stop + 1 :].astype(np.int64) for column in track], axis=-1)
     rest[:, 0] += later
     plan.follow(rest).endless = broken.endless
+    plan.asks_us, plan.root = broken.asks_us, broken.root
     return plan
 
 

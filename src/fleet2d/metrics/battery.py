@@ -1,5 +1,6 @@
 """How robots get along with their batteries."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from fleet2d.algorithms.history import History
@@ -13,13 +14,21 @@ if TYPE_CHECKING:
 
 @register("metric", "battery")
 class BatteryUse(Metric):
-    """Lowest charge that was told, dockings a day, and share of time spent charging, of each robot.
+    """Lowest charge, dockings a day, and share of time charging and empty, of each robot.
 
-    From the events `battery`, `docks` and `charged`: the charge is told at decisions, when it has
-    changed by 5 %. Time from `docks` to `charged` is charging.
+    From the events `battery`, `docks` and `charged`. `lowest` is the lowest charge that they told:
+    it is told at decisions, when it has changed by 5 %, when the robot docks, and when it is empty.
+    `dockings` counts `docks`. `charging` is the share of the run's steps from a `docks` to the
+    `charged` after it, or to the end of the run; a robot charges at its charger at other times,
+    too. `empty` is the share from when nothing was left: it stands still from then on.
     """
 
-    unit: ClassVar[str] = "parts of 1; a day"
+    units: ClassVar[Mapping[str, str]] = {
+        "lowest": "share of a full charge",
+        "dockings": "a day",
+        "charging": "share of time",
+        "empty": "share of time",
+    }
 
     def start(self, home: "Home") -> None:
         """Begin counting."""
@@ -27,6 +36,7 @@ class BatteryUse(Metric):
         self.dockings: dict[str, int] = {}
         self.docked_at: dict[str, int] = {}
         self.charging: dict[str, int] = {}  # steps
+        self.empty_at: dict[str, int] = {}
         self.steps = 0
         self.step_s = 1.0
 
@@ -37,6 +47,8 @@ class BatteryUse(Metric):
             if event.event in ("battery", "docks", "charged"):
                 level = float(event.detail.removesuffix(" %")) / 100
                 self.lowest[name] = min(self.lowest.get(name, 1.0), level)
+                if event.event == "battery" and level == 0:
+                    self.empty_at.setdefault(name, event.step)
             if event.event == "docks":
                 self.dockings[name] = self.dockings.get(name, 0) + 1
                 self.docked_at[name] = event.step
@@ -46,7 +58,7 @@ class BatteryUse(Metric):
         self.steps, self.step_s = history.end, history.step_s
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {lowest, dockings, charging}} of the robots with a battery."""
+        """Return {robot: {lowest, dockings, charging}}, and empty of those that ran empty."""
         found = {}
         for name, lowest in self.lowest.items():
             under_way = self.steps - self.docked_at[name] if name in self.docked_at else 0
@@ -55,4 +67,6 @@ class BatteryUse(Metric):
                 "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / 86400),
                 "charging": (self.charging.get(name, 0) + under_way) / self.steps,
             }
+            if name in self.empty_at:
+                found[name]["empty"] = (self.steps - self.empty_at[name]) / self.steps
         return found

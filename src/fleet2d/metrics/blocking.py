@@ -1,5 +1,6 @@
 """How often robots are in people's way."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -26,7 +27,7 @@ class Blocking(Metric):
     were no robot, so this is how often they would have had to change their way or stop.
     """
 
-    unit: ClassVar[str] = "a day"
+    units: ClassVar[Mapping[str, str]] = {"blocks": "a day", "seconds": "s a day"}
 
     clearance: Length = Field(
         default=0.4, gt=0, le=3, description="distance between the centres [m]"

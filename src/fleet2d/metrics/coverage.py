@@ -1,5 +1,6 @@
 """How much of the home a robot has seen."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -19,11 +20,17 @@ SHARES = {"half": 0.5, "most": 0.9}
 class Coverage(Metric):
     """Share of the floor of all rooms that was in view of a robot, and when it was half, and 90 %.
 
-    Cells count, as in the layer `explored`; a wall touches no line to a cell in view.
+    `share`: cells of rooms that were in view at some step, as in the layer `first_seen` / all cells
+    of rooms, furniture or not. `half_h`, `most_h`: hours from the start of the run to the step at
+    which half, and 90 %, of these cells had been in view; left out where it never came to that.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
-    unit: ClassVar[str] = "part of the floor; h"
+    units: ClassVar[Mapping[str, str]] = {
+        "share": "share of the floor",
+        "half_h": "h",
+        "most_h": "h",
+    }
 
     def start(self, home: "Home") -> None:
         """Begin with nothing seen."""

@@ -1,5 +1,6 @@
 """How good a robot's perception is: precision, recall, and who is taken for whom."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -21,9 +22,20 @@ NO_ONE = "nobody"  # the name there of who isn't there at all: a false positive
 class Detections(Metric):
     """Precision, recall and identity confusion of each robot, over all its cameras.
 
-    Recall is the share of looks at a user in view in which the user was noticed, precision the
-    share of observations that are of somebody, recognized right or not. Stored per period: looks,
-    detections, false positives and identities, by robot and user.
+    A look is one camera at one step at which it takes an image; a user is in view if the camera's
+    geometry shows the user, whatever its perception makes of it.
+
+    - `recall`: looks in which a user in view was noticed / looks with that user in view, added up
+      over users: TP / (TP + FN).
+    - `precision`: observations of somebody who is there, recognized right or not / all
+      observations: TP / (TP + FP).
+    - `recognized`: observations that name the user whom they are of / observations of users; one
+      that names nobody counts as not recognized.
+    - `confusion`: for each user, and for nobody (false positives), the shares of observations that
+      name each user, or nobody (`unknown`); each sums to one.
+
+    A number without anything to divide by is left out. Stored per period: looks, detections, false
+    positives and identities, by robot and user.
     """
 
     unit: ClassVar[str] = "share"
@@ -105,3 +117,11 @@ class Detections(Metric):
         if confusion:
             found["confusion"] = confusion
         return found
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return all but who is taken for whom."""
+        return {
+            robot: {key: value for key, value in numbers.items() if key != "confusion"}
+            for robot, numbers in result.items()
+        }

@@ -1,5 +1,6 @@
 """How much robots are in people's personal space."""
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -62,3 +63,13 @@ class Intrusion(Metric):
                 zone: m / self.days for zone, m in zip(ZONES, minutes, strict=True)
             }
         return found
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the zones in which a robot is an intruder: social distance is where it belongs."""
+        return {
+            robot: {
+                user: {k: v for k, v in n.items() if k != "social"} for user, n in users.items()
+            }
+            for robot, users in result.items()
+        }

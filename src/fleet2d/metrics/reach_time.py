@@ -1,5 +1,6 @@
 """How long people would wait for a robot that they call."""
 
+from collections.abc import Mapping
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -27,7 +28,12 @@ class ReachTime(Metric):
     updated. Calls without a way count as unreached, and in no mean.
     """
 
-    unit: ClassVar[str] = "s"
+    units: ClassVar[Mapping[str, str]] = {
+        "mean": "s",
+        "p90": "s",
+        "calls": "calls",
+        "unreached": "calls",
+    }
 
     every: PositiveDuration = Field(
         default=timedelta(minutes=10), description="time between two calls of a user"
@@ -79,3 +85,12 @@ class ReachTime(Metric):
                 numbers["unreached"] = self.unreached[robot, user]
             found.setdefault(robot, {})[user] = numbers
         return found
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return how long it takes, and how often there was no way."""
+        shown = ("mean", "p90", "unreached")
+        return {
+            robot: {user: {k: v for k, v in n.items() if k in shown} for user, n in users.items()}
+            for robot, users in result.items()
+        }

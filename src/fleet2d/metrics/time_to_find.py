@@ -1,5 +1,6 @@
 """How long robots look for people, and what comes of it."""
 
+from collections.abc import Mapping
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -29,8 +30,8 @@ class Search(NamedTuple):
         step: When it began. user: Who was looked for. at_home: Whether the user was, when it began.
         ideal: Metres of the way on which who knows where the user is has the user in sight. metres:
         Metres that the robot had driven in all when it began; then, during the search. seconds: How
-        long it took. end: What came of it: one of ENDS, or `lost` where the robot took somebody
-        else for the user.
+        long it took. end: What came of it: one of ENDS, `false` where the robot took somebody else
+        for the user, or `open` where the run ended first.
     """
 
     step: int
@@ -44,20 +45,37 @@ class Search(NamedTuple):
 
 @register("metric", "time_to_find")
 class TimeToFind(Metric):
-    """Times and outcomes of the searches of behavior `find`, for each robot.
+    """Times and outcomes of the searches of behavior `find` for a user, for each robot.
 
-    Of the searches for users who were at home when they began: the share found by the deadline
-    (`success`), and of the time to find the Kaplan-Meier `median` and `p90`, and the `mean`
-    restricted to the deadline [s]; a search that was given up, or ended by `not_at_home`, is cut
-    short there. A find is `false`, and cut short, if the user wasn't within `sight` of the robot
-    then. `spl` is the mean of found * l / max(l, d), where d is how far the robot drove [m] and l
-    the way of a clairvoyant: along the shortest path to where the user was at the beginning, until
-    within `sight` and with no wall between; `ratio` is the sum of max(l, d) over that of l, over
-    those found. Of searches for users who were out: the share that ended by `not_at_home`
-    (`out_told`), and its mean time (`out_mean`).
+    A search takes from its event `find_begins` to `found`, `not_at_home` or `gave_up`. It succeeds
+    after that time T if it ends by `found`, and the user then is at home and no farther than
+    `sight` from the robot, from centre to centre; else the find is false. A search that doesn't
+    succeed is censored where it ends, or where the run does: all that is known is that T is later.
+
+    Of searches for users who were at home when they began:
+
+    - `success`: those that succeed with T <= `deadline` / all.
+    - `median`, `p90`: the least t with S(t) <= 0.5, or 0.1 [s], where S(t) = P(T > t) is estimated
+      as Kaplan and Meier do; left out where S stays above.
+    - `mean`: restricted mean: the integral of S from 0 to `deadline`, which is E min(T, deadline)
+      [s]. After the last end S stays as it is.
+    - `spl`: the mean of l / max(l, d), of those that don't succeed 0. Here d is how far the robot
+      drove, and l the clairvoyant's way: along the shortest path to where the user was when the
+      search began, until within `sight` and with no wall between [m].
+    - `ratio`: sum of max(l, d) / sum of l, over those that succeed: 1 is as good as clairvoyant.
+    - `false`, `false_out`: how many ended by a false find, and by `not_at_home`, if any.
+
+    Of searches for users who were out: `out_told`: those that ended by `not_at_home` / all, and
+    `out_mean`: how long these took [s]. A robot that looks for anyone isn't counted.
     """
 
-    unit: ClassVar[str] = "s; shares"
+    units: ClassVar[Mapping[str, str]] = {
+        "searches": "in all",
+        **dict.fromkeys(("success", "spl", "out_told"), "share of searches"),
+        **dict.fromkeys(("median", "p90", "mean", "out_mean"), "s"),
+        "ratio": "times the way",
+        **dict.fromkeys(("false", "false_out"), "searches"),
+    }
 
     deadline: PositiveDuration = Field(
         default=timedelta(minutes=10), description="until then a find is a success"
@@ -71,6 +89,7 @@ class TimeToFind(Metric):
         self.done: dict[str, list[Search]] = {}
         self.driven: dict[str, float] = {}  # metres of each robot before the period
         self.last: dict[str, tuple[float, float]] = {}
+        self.end, self.step_s = 0, 1.0
 
     def update(self, history: History, state: "Present") -> Any:
         """Take in the searches; return a row for each that ended."""
@@ -88,6 +107,7 @@ class TimeToFind(Metric):
             self.driven[robot] = float(driven[-1])
         for robot, search in ended:
             self.done.setdefault(robot, []).append(search)
+        self.end, self.step_s = history.end, history.step_s
         return _rows(ended)
 
     def _driven(self, history: History, robot: str) -> NDArray[np.float64]:
@@ -141,16 +161,32 @@ class TimeToFind(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: numbers}, each where it can be told."""
-        return {robot: self._summary(searches) for robot, searches in self.done.items()}
+        searches = {robot: list(done) for robot, done in self.done.items()}
+        for robot, search in self.open.items():
+            seconds = (self.end - search.step) * self.step_s
+            cut = search._replace(seconds=seconds, end="open")
+            searches.setdefault(robot, []).append(cut)
+        return {robot: self._numbers(found) for robot, found in searches.items()}
 
-    def _summary(self, searches: list[Search]) -> dict[str, Any]:
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return whether and how soon people are found, and by how long ways."""
+        hidden = ("p90", "spl", "out_mean")
+        return {
+            robot: {key: value for key, value in numbers.items() if key not in hidden}
+            for robot, numbers in result.items()
+        }
+
+    def _numbers(self, searches: list[Search]) -> dict[str, Any]:
         until = self.deadline.total_seconds()
         home = [s for s in searches if s.at_home]
         out = [s for s in searches if not s.at_home]
         numbers: dict[str, Any] = {"searches": len(searches)}
-        false = sum(s.end == "false" for s in searches)
-        if false:
-            numbers["false"] = false
+        wrong = {
+            "false": sum(s.end == "false" for s in searches),
+            "false_out": sum(s.end == "not_at_home" for s in home),
+        }
+        numbers |= {name: count for name, count in wrong.items() if count}
         if home:
             found = [s for s in home if s.end == "found"]
             curve = kaplan_meier([s.seconds for s in home], [s.end == "found" for s in home])

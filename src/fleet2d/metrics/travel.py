@@ -1,5 +1,6 @@
 """How much robots move about."""
 
+from collections.abc import Mapping
 from datetime import timedelta
 from math import dist
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -28,7 +29,7 @@ class Travel(Metric):
     from step to step.
     """
 
-    unit: ClassVar[str] = "a day"
+    units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
 
     rest: PositiveDuration = Field(
         default=timedelta(minutes=1), description="standing for so long is a rest"

@@ -35,8 +35,12 @@ DAYS: dict[str, tuple[list[Any], set[str]]] = {
     "all": (
         [
             "dock",
-            {"type": "scheduled", "visits": [{"at": "09:00", "place": "any", "task": "water"}]},
-            {"type": "find", "user": "ana", "at": ["18:30"], "source": "share"},
+            {
+                "type": "scheduled",
+                "visits": [{"at": "09:00", "place": "any", "task": "water"}],
+                "late": "2 h",  # it may be charging
+            },
+            {"type": "find", "user": "ana", "every": "3 h", "source": "share"},
             {"type": "opportunistic", "when": "08:00-22:00", "cooldown": "30 min"},
             {"type": "patrol", "when": "weekdays 10:00-11:00"},
             {"type": "hangout", "source": "share", "quiet": "22:00-07:00"},

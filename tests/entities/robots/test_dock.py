@@ -90,5 +90,5 @@ def test_bad_settings_are_refused(battery: Any, dock: Any, words: str) -> None:
 
 
 def test_dock_without_a_battery_is_refused() -> None:
-    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro: dock needs a battery"):
+    with pytest.raises(InputError, match=r"robots\.astro: dock needs a battery"):
         fleet2d.Simulation(home_with(["dock"]))

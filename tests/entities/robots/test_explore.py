@@ -7,6 +7,7 @@ from tests.homes import needs_jit
 from tests.scenes import path
 
 import fleet2d
+from fleet2d.errors import InputError
 
 pytestmark = needs_jit
 
@@ -59,5 +60,5 @@ def test_a_real_home_is_explored_within_the_hour() -> None:
 
 
 def test_a_robot_without_a_camera_is_refused() -> None:
-    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
+    with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with(["explore"], astro={"camera": None}))

@@ -109,6 +109,29 @@ def test_it_says_not_at_home_once_all_is_looked_at_and_believed() -> None:
     assert ["find_begins", "gave_up"] == names(surer)
 
 
+def test_while_nothing_says_where_people_are_somebody_may_be_out() -> None:
+    blind = search(source=None, out_at=0.8, deadline="20 min")
+    stored = assert_same_for_every_max_span(home_with([blind, STAY], "40 min", OUT), 61)
+    assert ["find_begins", "not_at_home"] == names(stored)
+    sure = run(home_with([{**blind, "out": 0}, STAY], "40 min", OUT))
+    assert ["find_begins", "gave_up"] == names(sure)
+
+
+def test_a_search_that_can_not_begin_in_time_is_left_out() -> None:
+    visit = {
+        "type": "scheduled",
+        "visits": [{"at": "07:05", "place": "kitchen", "dwell": "20 min"}],
+    }
+    for late, begun in (("10 min", []), ("20 min", [1500])):
+        content = home_with([visit, search(late=late), STAY], "40 min", **told(bathroom_0=1))
+        stored = assert_same_for_every_max_span(content, 61)
+        steps = [step for step, name, _ in events(stored) if name == "find_begins"]
+        assert steps == [pytest.approx(step, abs=20) for step in begun]
+    often = {**search(at=["07:06", "07:10", "07:24"], late="5 min")}
+    stored = run(home_with([visit, often, STAY], "40 min", **told(bathroom_0=1)))
+    assert 1 == names(stored).count("find_begins")  # the last of those that were due
+
+
 def test_who_is_in_view_is_found_at_once() -> None:
     content = home_with(
         [search(), STAY], "30 min", astro={"start": [5.5, 6.0]}, **told(kitchen_0=1)
@@ -162,5 +185,5 @@ def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> Non
 
 
 def test_a_robot_without_a_camera_is_refused() -> None:
-    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
+    with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with([search()], astro={"camera": None}, **told(kitchen_0=1)))

@@ -77,7 +77,7 @@ def test_only_whom_it_is_told_to() -> None:
 
 
 def test_a_robot_without_a_camera_is_refused() -> None:
-    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
+    with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with(["follow"], astro={"camera": None}))
 
 

@@ -104,6 +104,18 @@ def test_it_stands_still_in_quiet_hours() -> None:
     assert len([step for step in steps if step >= 5400]) >= 3
 
 
+def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
+    content = home_with(
+        [hangout(avoid=["bedroom"], quiet="06:00-09:00")], "1 h", **told(bathroom_0=1)
+    )
+    content["robots"]["astro"]["start"] = [1.0, 6.0]
+    stored = assert_same_for_every_max_span(content, 61)
+    assert "bedroom_0" not in rooms(stored, 60)
+    assert 1 == len(rooms(stored, 60))
+    elsewhere = home_with([hangout(quiet="06:00-09:00")], "1 h", **told(bathroom_0=1))
+    assert [] == names(run(elsewhere))
+
+
 def test_it_explores_all_rooms_with_equal_chances() -> None:
     stored = run(home_with([hangout(explore=1)], "2 d", **told(bathroom_0=1)))
     details = [detail for _, name, detail in events(stored) if name == "explores"]
@@ -114,12 +126,18 @@ def test_it_explores_all_rooms_with_equal_chances() -> None:
     assert all(abs(share - wanted) < 5 * (wanted / 288) ** 0.5 for share in found.values())
 
 
-def test_turning_it_off_leaves_the_life_of_people_as_it_was() -> None:
-    meander = {"type": "meander"}
-    on = run(home_with([hangout()], "1 h", meander, **told(bathroom_0=1)))
-    off = run(home_with([], "1 h", meander, **told(bathroom_0=1)))
-    for column in ("x", "y", "heading"):
-        assert np.array_equal(getattr(path(on, "ana"), column), getattr(path(off, "ana"), column))
+@pytest.mark.parametrize("ana", ["meander", {"type": "routine", "persona": "works_outside"}])
+def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
+    on = run(home_with([hangout()], "6 h", ana, **told(bathroom_0=1)))
+    off = run(home_with([], "6 h", ana, **told(bathroom_0=1)))
+    gone = run({**home_with([], "6 h", ana), "robots": {}})
+    for column in ("x", "y", "heading", "away", "room"):
+        lives = [getattr(path(stored, "ana"), column) for stored in (on, off, gone)]
+        assert np.array_equal(lives[0], lives[1])
+        assert np.array_equal(lives[0], lives[2])
+    assert [row for row in events(on, "ana") if row[1] == "activity"] == [
+        row for row in events(off, "ana") if row[1] == "activity"
+    ]
 
 
 @pytest.mark.parametrize(

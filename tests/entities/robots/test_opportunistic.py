@@ -68,7 +68,7 @@ def test_a_cooldown_holds_for_everybody() -> None:
 
 def test_a_robot_without_a_camera_is_refused() -> None:
     content = home_with(["opportunistic"], astro={"camera": None})
-    with pytest.raises(fleet2d.Fleet2DError, match=r"robots\.astro.*no camera"):
+    with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(content)
 
 

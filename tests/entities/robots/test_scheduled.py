@@ -49,6 +49,27 @@ def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late() -> None:
     assert [(20, "sweep")] == found
 
 
+GATE = {"gate": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
+
+
+@pytest.mark.parametrize(("opens", "visited"), [("07:25", True), ("07:50", False)])
+def test_a_visit_behind_a_shut_door_is_made_once_it_is_open_or_left_out(
+    opens: str, visited: bool
+) -> None:
+    agenda = [{"at": "07:00", "open": False}, {"at": opens, "open": True}]
+    content = home_with(
+        [{"type": "scheduled", "visits": VISITS[:1]}, REST],
+        objects={"gate": {**GATE["gate"], "schedule": agenda}},
+    )
+    stored = assert_same_for_every_max_span(content, 61)
+    found = [(step, name) for step, name, _ in events(stored)]
+    blocked = [(600, "way_blocked")]
+    assert blocked == found[:1]
+    assert ["way_blocked", *["visits"] * visited] == [name for _, name in found]
+    if visited:
+        assert 1500 < found[1][0] < 1540
+
+
 @pytest.mark.parametrize(
     ("visits", "words"),
     [

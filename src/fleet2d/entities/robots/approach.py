@@ -1,17 +1,21 @@
 """Ways of a robot: how long they take, and where one to a person ends."""
 
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.behavior import Situation
-from fleet2d.errors import ComponentError
+from fleet2d.errors import ScenarioError
 from fleet2d.kernels.headings import TURN, heading_of, turn_between
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
+
+# Where a shut door is in the way, it tries again after so long.
+AT_A_DOOR = timedelta(seconds=10)
 
 Spot = tuple[int, int]
 
@@ -70,11 +74,12 @@ def check_has_camera(actor: "Actor", behavior: str) -> None:
     """Refuse a behavior that goes by what is seen, for a body that sees nothing.
 
     Raises:
-        ComponentError: The body has no camera.
+        ScenarioError: The body has no camera.
     """
     if not actor.entity.eyes:
-        raise ComponentError(
-            f"{actor.path}: {behavior} goes by whom the robot sees, but it has no camera"
+        raise ScenarioError(
+            f"{actor.path}: {behavior} goes by what the robot sees, but it has no camera: give it"
+            " one, like camera: {range: [0.3, 4.5], angle_deg: 108}, or leave the behavior out"
         )
 
 

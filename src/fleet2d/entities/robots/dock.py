@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import ComponentError
+from fleet2d.errors import ScenarioError
 from fleet2d.units import Share, problem
 
 if TYPE_CHECKING:
@@ -43,9 +43,13 @@ class Dock(Behavior):
         return self
 
     def start(self, actor: "Actor") -> None:
-        """Check that there is a battery."""
+        """Check that there is a battery.
+
+        Raises:
+            ScenarioError: There is none.
+        """
         if actor.charge is None:
-            raise ComponentError(
+            raise ScenarioError(
                 f"{actor.path}: dock needs a battery: give the robot one, like battery: {{driving:"
                 " 2 h, standing: 10 h, charging: 3 h, charger: hallway}"
             )

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import approach, check_has_camera, face
+from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_camera, face
 from fleet2d.entities.robots.belief import ANYONE, room_belief
 from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import PlacementError
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
 DAY = timedelta(days=1)
-# Where no room can be entered at present, it waits this long.
-AT_A_DOOR = timedelta(seconds=10)
 
 
 class Missed(NamedTuple):
@@ -66,16 +64,25 @@ class Find(Behavior):
     every: PositiveDuration | None = Field(
         default=None, description="or how much time lies between two searches, from the start on"
     )
+    late: Duration = Field(
+        default=timedelta(minutes=30),
+        description="a search that can't begin within that time is left out",
+    )
     deadline: PositiveDuration = Field(
         default=timedelta(minutes=10), description="after that it gives up"
     )
     out_at: Share = Field(
         default=0.9,
         description="it says that the person isn't at home once that is believed to be so probable,"
-        " and every room has been looked at",
+        " and every room that it can get to has been looked at",
     )
     doubt: Share = Field(
         default=0.1, description="share of belief that counts rooms by their size, whatever is said"
+    )
+    out: Share = Field(
+        default=0.5,
+        description="probability that the person is out, for as long as nothing says where people"
+        " are",
     )
     memory: Duration = Field(
         default=timedelta(minutes=20),
@@ -114,7 +121,8 @@ class Find(Behavior):
             )
         self.search: Search | None = None
         self.plan: Plan | None = None  # the last one it made
-        self.due = self._next(actor.clock.start, None, actor.clock.start)
+        start = actor.clock.start
+        self.due = self._next(start if self.every else start - timedelta(microseconds=1), start)
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithm that it goes by."""
@@ -132,9 +140,8 @@ class Find(Behavior):
         """Begin a search that is due, go on with one, or leave the robot to others."""
         plan = now.plan()
         if self.search is None:
-            if now.time < self.due:
+            if not self._is_due(now):
                 return None
-            self.due = self._next(now.time, self.due, now.actor.clock.start)
             self.search = Search(now.time)
             plan.note("find_begins", self.user)
         else:
@@ -145,11 +152,19 @@ class Find(Behavior):
             return self._found(now, plan, *seen[name])
         return self._look_on(now, plan)
 
+    def _is_due(self, now: Situation) -> bool:
+        """Tell whether a search is due, and not too late; in either case it isn't due any more."""
+        due, start = self.due, now.actor.clock.start
+        while self.due <= now.time:
+            due, self.due = self.due, self._next(self.due, start)
+        return due <= now.time <= due + self.late
+
     def _take_in(self, now: Situation) -> None:
         """Note that the look that the last plan made found nobody, if it came to its end."""
         search = self.search
         assert search is not None
-        whole = now.actor.plan is self.plan and self.plan.is_over(now.step)
+        plan = now.actor.plan
+        whole = plan.root is self.plan and plan.is_over(now.step)
         if search.going_to is not None and whole and not now.events:
             missed = (*search.missed, Missed(search.going_to, now.time))
             self.search = search._replace(missed=missed, route=search.route[1:], going_to=None)
@@ -170,7 +185,9 @@ class Find(Behavior):
         prior, away = self._prior(now)
         age, memory = self._ages(search, now), self.memory.total_seconds()
         left = after_empty_looks(prior, age, memory, self.sites.share)
-        if np.isfinite(age).all() and away >= self.out_at * (away + sum(left.tolist())):
+        out = away >= self.out_at * (away + sum(left.tolist()))
+        unseen = np.flatnonzero(np.isinf(age)).tolist()
+        if out and not any(self.sites.can_go(plan, site) for site in unseen):
             return self._end(plan, "not_at_home")
         route = search.route
         if self.policy == "receding" or not route:
@@ -195,7 +212,9 @@ class Find(Behavior):
         shares = shares / known if known > 0 else np.zeros(len(sizes))
         doubt = self.doubt if known > 0 else 1.0
         mixed = (1 - doubt) * shares + doubt * sizes / int(sizes.sum())
-        return mixed * (1 - belief.away), belief.away
+        said = self.source is not None and now.outputs.get(self.source) is not None
+        away = belief.away if said else self.out
+        return mixed * (1 - away), away
 
     def _ages(self, search: Search, now: Situation) -> NDArray[np.float64]:
         """Return how long ago each site was looked at in vain [s], infinite for never."""
@@ -208,13 +227,10 @@ class Find(Behavior):
         self.search = None
         return plan.note(event, self.user)
 
-    def _next(self, time: datetime, last: datetime | None, start: datetime) -> datetime:
-        """Return when the next search is due, from a moment on; not the last one again."""
+    def _next(self, after: datetime, start: datetime) -> datetime:
+        """Return when the next search is due after a moment."""
         if self.every is not None:
-            if last is None:
-                return start + self.every
-            return start + ((time - start) // self.every + 1) * self.every
-        midnight = datetime.combine(time.date(), datetime.min.time())
-        days = [midnight + i * DAY for i in range(3)]
-        times = sorted(day + at for day in days for at in self.at)
-        return next(t for t in times if t >= time and (last is None or t > last))
+            return start + ((after - start) // self.every + 1) * self.every
+        midnight = datetime.combine(after.date(), datetime.min.time())
+        times = sorted(midnight + i * DAY + at for i in range(2) for at in self.at)
+        return next(time for time in times if time > after)

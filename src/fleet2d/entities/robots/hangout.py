@@ -86,8 +86,8 @@ class Hangout(Behavior):
         """Find the places, and rate what doesn't depend on where people are."""
         there = {name for room in actor.home.rooms for name in (room.name, room.type)}
         named = [name for name in self.avoid if name in there or name not in PRIORITY]
-        avoided = frozenset(r.index for name in named for r in actor.rooms((name,)))
-        self.places = Places(actor, avoided, self.off_doors)
+        self.avoided = frozenset(r.index for name in named for r in actor.rooms((name,)))
+        self.places = Places(actor, self.avoided, self.off_doors)
         if not len(self.places.points):
             raise PlacementError(
                 f"{actor.path}: there is no place to hang out at, off doorways by"
@@ -96,7 +96,7 @@ class Hangout(Behavior):
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
         self.ways: tuple[Space, dict[tuple[int, int], NDArray[np.float64]]] = actor.space, {}
-        self.explored = [r.index for r in actor.reachable_rooms() if r.index not in avoided]
+        self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.views: tuple[int, dict[int, Views]] = actor.home.version, {}
         self.place: int | None = None
         self.decides_at = actor.clock.start
@@ -112,12 +112,12 @@ class Hangout(Behavior):
     def decide(self, now: Situation) -> Plan:
         """Stay, or go where it is better; back to its place, if it was called away."""
         plan, still = now.plan(), holds(self.quiet, now.time)
-        if still is not None:
+        if still is not None and not self._is_in_avoided_room(now):
             return plan.stay(until=still)
-        if now.time >= self.decides_at or self.place is None:
+        if self.place is None or (still is None and now.time >= self.decides_at):
             self.decides_at = now.time + self.period
             draws = now.random("hangout")
-            explores = draws.uniform() < self.explore
+            explores = still is None and draws.uniform() < self.explore
             if self.place is None or not explores:
                 self._choose(now, plan)
             if explores:
@@ -126,9 +126,15 @@ class Hangout(Behavior):
         if (plan.x, plan.y) != (x, y):
             plan.go_to_point(x, y)
             self._face_people(now, plan)
+        if still is not None:
+            return plan.stay(until=still)
         return plan.stay(until=self.decides_at).ask_by(
             self._quiet_begins(self.decides_at, now.time)
         )
+
+    def _is_in_avoided_room(self, now: Situation) -> bool:
+        """Tell whether it is where it doesn't stay, as after a visit or when the run begins."""
+        return now.room is not None and now.room.index in self.avoided
 
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until it thinks again."""
