@@ -41,7 +41,7 @@ def robot_month(number: int, days: int) -> dict[str, Any]:
     """Return the month of a robot: of even numbers on patrol, of odd ones hanging out."""
     return month(
         KINDS[number % len(KINDS)],
-        algorithms={"ltp": {"type": "long_term_presence", "estimator": ESTIMATOR}},
+        algorithms={"ltp": {"type": "long_term_presence", "estimator": ESTIMATOR, "period": "4 h"}},
         metrics={"gap": {"type": "ltp_gap", "of": "ltp", "period": "1 d"}},
         days=days,
         name=f"robot_{number}",

@@ -1,6 +1,7 @@
 """What the results share: the month that is lived, many months at once, and intervals."""
 
 import os
+import signal
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -112,12 +113,17 @@ def run_all(
     if workers <= 1:
         take(map(collect, cases))
         return found
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _leave_interrupts_to_the_parent)
     try:
         take(pool.map(collect, cases))
     finally:
         pool.shutdown(cancel_futures=True)
     return found
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    """Let Ctrl-C, which all processes of a terminal get, end the one that has begun the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def silent(what: str, done: int, of: int) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.errors import InputError
+from fleet2d.metrics.presence.rtp_score import GAPS
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
 from fleet2d.paper.months import interval
 from fleet2d.paper.result import Result
@@ -25,6 +26,7 @@ COLORS = (
     "#b5305c", "#2c6fb0", "#3f8a4f", "#c26a12", "#8153b5", "#1f8a8c", "#8a6d3b", "#5b6770",
 )  # fmt: skip
 DARK, PALE = "#2d3138", "#b9bec6"
+NEVER_SEEN = GAPS[-1]  # that has no place on an axis of time
 ROOMS = 6  # with the largest gaps that are named; the others are drawn pale
 
 
@@ -85,7 +87,7 @@ def draw_ltp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
 def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
     """Draw the share told right by gap, with intervals."""
     rows = numbers["means"]["top_1"]
-    shown = [gap for gap in rtp_gap.GAPS[:-1] if gap in rows[rtp_gap.NAIVE]]
+    shown = [gap for gap in GAPS if gap in rows[rtp_gap.NAIVE] and gap != NEVER_SEEN]
     for number, (name, by_gap) in enumerate(rows.items()):
         naive = name == rtp_gap.NAIVE
         values = np.array([by_gap[gap] for gap in shown])
@@ -105,7 +107,7 @@ def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
     axes.set_xlabel("time since the user was last seen")
     axes.set_ylabel("share told right")
     axes.set_ylim(0, 1)
-    axes.legend(frameon=False, fontsize=8, ncols=2)
+    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1))
 
 
 def draw_feedback(numbers: Mapping[str, Any], axes: Axes) -> None:

@@ -8,13 +8,13 @@ over seeds, each a month of another life with a robot on patrol, and its bootstr
 from collections.abc import Mapping
 from typing import Any
 
+from fleet2d.metrics.presence.rtp_score import ALL, GAPS
 from fleet2d.paper.months import USER, Request, Tell, interval, month, run_all
 from fleet2d.paper.result import Result, Table, counted
 
 NAME = "rtp-gap"
 TITLE = "Fig. 7 right: accuracy of real-time presence by last-seen gap"
 MODELS = ("hmm", "semi_markov", "markov", "hour_of_week", "long_term")
-GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h", "all")
 NAIVE = "naive"
 SCORES = {"top_1": "share told right", "log_loss": "log loss [nats], smaller is better"}
 PAPER = (
@@ -63,7 +63,7 @@ def means(found: list[Scores]) -> Means:
         score: {
             name: {
                 gap: interval(one[name][gap][score] for one in found if gap in one[name])
-                for gap in GAPS
+                for gap in (*GAPS, ALL)
                 if any(gap in one[name] for one in found)
             }
             for name in (*MODELS, NAIVE)
@@ -81,9 +81,9 @@ def reproduce(request: Request, tell: Tell) -> Result:
     tables = tuple(
         Table(
             f"{words}; {counted(seeds, 'seed')} of {counted(days, 'day')}",
-            ("model", *GAPS),
+            ("model", *GAPS, ALL),
             tuple(
-                (name.replace("_", " "), *(_shown(by_gap.get(gap)) for gap in GAPS))
+                (name.replace("_", " "), *(_shown(by_gap.get(gap)) for gap in (*GAPS, ALL)))
                 for name, by_gap in by_score[score].items()
             ),
             PAPER if score == "top_1" else (),
