@@ -1,6 +1,6 @@
 """Orders of looks: the exact one is never beaten on its own model."""
 
-from itertools import permutations
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,75 @@ def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> N
     for policy in HEURISTICS:
         assert best <= play(problem, policy(problem)).cost + 1e-9
     assert best <= play(problem, random_order(problem, DRAWS)).cost + 1e-9
+
+
+@given(problems(most=5))
+@settings(max_examples=60, deadline=None)
+def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: SearchProblem) -> None:
+    """Wherever the target is, and whichever looks would miss it: an account of its own."""
+    order = exact(problem)
+    mean, found = 0.0, 0.0
+    for site, missed in product(range(len(order)), (False, True)):
+        chance = problem.prior[site] * (
+            1 - problem.detect[site] if missed else problem.detect[site]
+        )
+        seconds, at = 0.0, None
+        for look in order:
+            seconds += problem.reach[look] if at is None else problem.travel[at, look]
+            seconds += problem.look[look]
+            at = look
+            if look == site and not missed:
+                mean, found = mean + chance * seconds, found + chance
+                break
+    assert play(problem, order).cost == pytest.approx(mean, abs=1e-9)
+    assert play(problem, order).success == pytest.approx(found, abs=1e-12)
+
+
+@given(problems(most=7))
+@settings(max_examples=40, deadline=None)
+def test_what_is_left_of_an_exact_order_is_exact_from_there(problem: SearchProblem) -> None:
+    """Bellman's principle: to decide anew after an empty look gives the same, if nobody moves."""
+    order = exact(problem)
+    first, rest = order[0], sorted(order[1:])
+    after = search_problem(
+        problem.prior[rest],
+        problem.travel[first, rest],
+        problem.travel[np.ix_(rest, rest)],
+        problem.look[rest],
+        problem.detect[rest],
+    )
+    went_on = [rest.index(site) for site in order[1:]]
+    assert play(after, exact(after)).cost == pytest.approx(play(after, went_on).cost, abs=1e-9)
+
+
+def test_searches_with_nothing_or_little_to_choose_from() -> None:
+    nowhere = search_problem([0, 0, 0], [3, 1, 2], np.ones((3, 3)))
+    assert 0 == play(nowhere, exact(nowhere)).cost == play(nowhere, exact(nowhere)).mean
+    assert [0, 1, 2] == exact(nowhere) == likeliest_first(nowhere)  # ties go to the lower site
+    alike = search_problem(np.full(4, 0.25), np.ones(4), np.ones((4, 4)))
+    for policy in (exact, *HEURISTICS):
+        assert [0, 1, 2, 3] == policy(alike)
+    alone = search_problem([0.4], [7], [[0]], look=2)
+    for policy in (exact, *HEURISTICS):
+        assert [0] == policy(alone)
+    assert 9.0 == play(alone, [0]).mean
+    empty = search_problem([], [], np.zeros((0, 0)))
+    for policy in (exact, *HEURISTICS):
+        assert [] == policy(empty)
+
+
+def test_a_site_without_a_way_comes_last_however_likely_it_is() -> None:
+    day = 86_400.0
+    travel = np.array([[0, 5, day], [5, 0, day], [day, day, 0]])
+    problem = search_problem([0.05, 0.05, 0.9], [5, 6, day], travel)
+    assert 2 == exact(problem)[-1] == greedy(problem)[-1] == receding(problem)[-1]
+    assert 2 == likeliest_first(problem)[0]  # which is why find drops those that it can't go to
+
+
+def test_a_site_where_nobody_is_waits_until_all_others_are_done() -> None:
+    travel = np.array([[0, 1, 9], [1, 0, 9], [9, 9, 0]])
+    problem = search_problem([0.5, 0.0, 0.5], [1, 1, 9], travel, look=3)
+    assert [0, 2, 1] == exact(problem)
 
 
 @given(problems(most=10))

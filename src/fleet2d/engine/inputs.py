@@ -9,11 +9,15 @@ from fleet2d.scenario.model import Scenario
 
 
 def input_files(scenario: Scenario) -> list[Path]:
-    """Return the floor plan's files and the modules of the user's own components, sorted."""
+    """Return the files that components read, and the modules of the user's own, sorted.
+
+    A component says by `files` what it reads; the paths among its fields are noted anyway.
+    """
     files: set[Path] = set()
     for component in _components(scenario):
         reads = getattr(component, "files", None)
         files |= set(reads()) if reads else set()
+        files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}
         if not type(component).__module__.startswith("fleet2d."):
             source = inspect.getsourcefile(type(component))
             if source:
@@ -22,8 +26,13 @@ def input_files(scenario: Scenario) -> list[Path]:
 
 
 def _components(scenario: Scenario) -> Iterator[Component]:
-    yield scenario.floorplan
+    outer: list[Component] = [scenario.floorplan, scenario.sight.method]
     for entity in (*scenario.users.values(), *scenario.robots.values()):
-        yield from entity.behaviors
-    yield from scenario.algorithms.values()
-    yield from scenario.metrics.values()
+        outer += entity.behaviors
+    outer += scenario.objects.values()
+    outer += scenario.algorithms.values()
+    outer += scenario.metrics.values()
+    while outer:  # components may have others within: an algorithm its model
+        component = outer.pop()
+        yield component
+        outer += [value for _, value in component if isinstance(value, Component)]

@@ -49,14 +49,33 @@ def test_what_can_not_be_seen_is_given_up() -> None:
     assert "explored" == names(stored)[-1]
 
 
-def test_a_real_home_is_explored_within_the_hour() -> None:
-    content = home_with(["explore"], "1 h")
-    content["floorplan"] = "bundled"
+@pytest.mark.parametrize("furnish", [False, True])
+def test_a_real_home_is_explored_in_minutes(furnish: bool) -> None:
+    content = home_with(["explore"], "10 min")
+    content["floorplan"] = {"type": "bundled", "furnish": furnish}
     content["users"] = {}
     content["robots"]["astro"].pop("start")
     stored = fleet2d.run(content)
     assert "explored" == names(stored)[-1]
     assert float(events(stored)[-1][2].split(" ")[0]) > 95
+    assert names(stored).count("explores") < 40
+
+
+def test_behind_a_shut_door_it_goes_on_once_that_is_open() -> None:
+    agenda = [
+        {"at": "07:00", "open": True},
+        {"at": "07:01", "open": False},
+        {"at": "07:20", "open": True},
+    ]
+    door = {"type": "door", "doorway": "living_room_0-kitchen_0", "schedule": agenda}
+    stay = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "5 min"}
+    content = home_with(["explore", stay], "30 min", objects={"gate": door})
+    content["robots"]["astro"]["camera"] = {"range": [0.2, 2.0], "angle_deg": 108}
+    stored = assert_same_for_every_max_span(content, 61)
+    steps = [step for step, name, _ in events(stored) if name == "explores"]
+    assert not [step for step in steps if 600 < step < 1200]
+    assert [step for step in steps if step >= 1200]
+    assert "explored" == names(stored)[-1]
 
 
 def test_a_robot_without_a_camera_is_refused() -> None:

@@ -1,5 +1,7 @@
 """Find: search for a person by what is believed, with a deadline, and a verdict."""
 
+from itertools import permutations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,10 @@ from tests.scenes import path, run
 
 import fleet2d
 from fleet2d import Algorithm
+from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import InputError
+from fleet2d.search.policies import exact, order_by
+from fleet2d.search.problem import SearchProblem, play
 
 pytestmark = needs_jit
 
@@ -84,6 +89,33 @@ def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy: str) -> No
     gap = np.hypot(poses.x - 7.0, poses.y - 6.0)
     assert gap[end : end + 60].min() < 1.6
     assert (poses.x[-1], poses.y[-1]) == pytest.approx((1.0, 3.0), abs=0.01)
+
+
+def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data: Path) -> None:
+    """Rooms, ways and looks as they are; chances by size, and drawn."""
+    for name in ("bundled", *sorted((shared_data / "houseexpo").glob("*.json"))[:2]):
+        content = home_with([search()], **told(kitchen_0=1))
+        content["floorplan"] = "bundled"
+        if name != "bundled":
+            content["floorplan"] = {"type": "houseexpo", "path": str(name)}
+        content["robots"]["astro"].pop("start")
+        content["users"]["ana"] = "meander"
+        simulation = fleet2d.Simulation(content)
+        astro = simulation.actors["astro"]
+        sites = Sites(astro, 2)
+        now = fleet2d.Situation(astro, 0)
+        prior = np.random.default_rng(4).dirichlet(np.ones(len(sites)))
+        whole = sites.problem(now, prior)
+        few = np.arange(min(len(sites), 7))
+        part = SearchProblem(
+            whole.prior[few], whole.reach[few], whole.travel[np.ix_(few, few)],
+            whole.look[few], whole.detect[few],
+        )  # fmt: skip
+        best = min(play(part, order).cost for order in permutations(few.tolist()))
+        assert play(part, exact(part)).cost == pytest.approx(best)
+        costs = {p: play(whole, order_by(p, whole, now.random("x"))).cost for p in POLICIES}
+        assert costs["exact"] == min(costs.values())
+        assert max(costs, key=lambda policy: costs[policy]) in ("random", "nearest")
 
 
 def test_it_looks_first_where_it_is_told_to() -> None:

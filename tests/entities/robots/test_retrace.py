@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow.csv import read_csv
+from pyarrow.parquet import write_table
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
 from tests.homes import needs_jit
 from tests.scenes import path, run
@@ -57,13 +59,23 @@ def test_a_map_without_a_path_and_one_of_another_home_are_refused(
         fleet2d.Simulation(content)
 
 
+def test_a_file_that_is_no_map_says_whose_it_is_and_what_reads_logs(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,x,y\n0,1.0,3.0\n")
+    with pytest.raises(InputError, match=r"robots\.astro: .*log\.csv is not JSON.*'replay'"):
+        fleet2d.Simulation(home_with([{"type": "retrace", "path": str(log)}]))
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
 @pytest.mark.parametrize("with_heading", [False, True])
-def test_a_log_with_times_is_for_replay(tmp_path: Path, with_heading: bool) -> None:
+def test_a_log_with_times_is_for_replay(tmp_path: Path, with_heading: bool, suffix: str) -> None:
     rows = [(t, 1.0 + 0.1 * t, 3.0, 1.5708) for t in range(30)]
     head = "time,x,y,heading" if with_heading else "time,x,y"
     lines = [",".join(map(str, row if with_heading else row[:3])) for row in rows]
-    file = tmp_path / "log.csv"
-    file.write_text("\n".join([head, *lines]) + "\n")
+    file = tmp_path / f"log.{suffix}"
+    file.with_suffix(".csv").write_text("\n".join([head, *lines]) + "\n")
+    if suffix == "parquet":
+        write_table(read_csv(file.with_suffix(".csv")), file)
     content = home_with([{"type": "replay", "path": str(file)}], "30 s")
     content["simulation"]["start"] = "2026-01-05T00:00"
     poses = path(run(content), "astro")

@@ -1,14 +1,18 @@
 """Errors of long-term and scores of real-time presence, against the stored rows of a run."""
 
 import math
+from datetime import datetime
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.homes import needs_jit
+from tests.reference import presence as slow
 from tests.scenes import digests, run, scenario, table
 
 import fleet2d
+from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.presence.occupancy import walking_distances
@@ -80,6 +84,8 @@ def test_ltp_error_is_the_distance_to_what_really_was(stored: Any, user: str) ->
         assert sum(gaps) / 2 == pytest.approx(rows["tv"][k])
         assert max(gaps) == pytest.approx(rows["max_gap"][k])
         assert sum(gaps) / 6 == pytest.approx(rows["mean_gap"][k])
+        order = slow.kendall([truth[room] for room in ROOMS], [found[room] for room in ROOMS])
+        assert order == pytest.approx(rows["tau"][k])
         per_room = table(stored, "gap", user=user)
         assert gaps == pytest.approx(per_room["gap"][per_room["step"] == step].tolist())
         away = lived.count("away") / len(lived)
@@ -89,6 +95,9 @@ def test_ltp_error_is_the_distance_to_what_really_was(stored: Any, user: str) ->
         whole = (sum(spread) + abs(away - found["away"])) / 2
         assert whole == pytest.approx(table(stored, "with_away", user=user)["tv"][k])
     assert stored.metrics["error"][user]["tv"] == rows["tv"][-1]
+    shares = [estimate(stored, "ltp", user, step) for step in (3599, 7199, 10799)]
+    best = [max(ROOMS, key=found.__getitem__) for found in shares]
+    assert sum(a != b for a, b in pairwise(best)) == stored.metrics["error"][user]["flips"]
     assert stored.metrics["gap"][user]["mean"] == pytest.approx(rows["mean_gap"][-1])
 
 
@@ -240,12 +249,14 @@ def test_burn_in_ends_where_the_error_stays_small() -> None:
     from fleet2d.metrics.presence.ltp_error import LtpError
 
     metric = LtpError(of="ltp")
-    metric.last, metric.within, metric.days = {}, {}, 0.0
+    metric.last, metric.within, metric.best, metric.days = {}, {}, {}, 0.0
+    home = np.array([[0.6, 0.4], [0.6, 0.4]])
+    presence = Presence(("ana",), home, np.zeros(2), datetime(2026, 1, 5))
     for tv in (0.3, 0.05, 0.2, 0.1, 0.09):
         metric.days += 1
-        metric._note("ana", {"tv": tv})
+        metric._note("ana", {"tv": tv}, presence)
     assert 4 == metric.result()["ana"]["burn_in_day"]
-    metric._note("ana", {"tv": 0.11})
+    metric._note("ana", {"tv": 0.11}, presence)
     assert "burn_in_day" not in metric.result()["ana"]
 
 

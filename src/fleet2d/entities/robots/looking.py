@@ -49,11 +49,11 @@ def views_of(actor: "Actor", room: "Room", enough: float, most: int) -> Views:
         most: How many places at most.
     """
     plan = actor.home.plan
-    stands = _spread(actor.space.cells(room.index, actor.part), STANDS_TRIED)
-    targets = _spread(np.argwhere(plan.room_of_cell == room.index), TARGETS_TRIED)
-    places = np.concatenate([[actor.middle(room)], _centres(stands)])
-    goals = _centres(targets)
-    seen = np.array([_shown(actor, place, goals) for place in places])
+    stands = spread(actor.space.cells(room.index, actor.part), STANDS_TRIED)
+    targets = spread(np.argwhere(plan.room_of_cell == room.index), TARGETS_TRIED)
+    places = np.concatenate([[actor.middle(room)], centres(stands)])
+    goals = centres(targets)
+    seen = np.array([seen_from(actor, place, goals) for place in places])
     points: list[tuple[int, int]] = []
     left = np.ones(len(goals), np.bool_)
     while len(points) < most and left.sum() > (1 - enough) * len(goals):
@@ -68,15 +68,16 @@ def views_of(actor: "Actor", room: "Room", enough: float, most: int) -> Views:
     return Views(tuple(points), 1 - float(left.sum()) / len(goals))
 
 
-def _shown(actor: "Actor", place: I64, goals: I64) -> NDArray[np.bool_]:
+def seen_from(actor: "Actor", place: I64, goals: I64) -> NDArray[np.bool_]:
     """Return which goals (n, 2) are in range and in sight of a place, whatever the heading."""
-    x, y = int(place[0]), int(place[1])
     near = ((goals - place) ** 2).sum(axis=1) <= sight_range(actor) ** 2
-    shown: NDArray[np.bool_] = near & points_in_sight(actor.home.walls, x, y, goals)
+    shown = np.zeros(len(goals), np.bool_)
+    x, y = int(place[0]), int(place[1])
+    shown[near] = points_in_sight(actor.home.walls, x, y, np.ascontiguousarray(goals[near]))
     return shown
 
 
-def _spread(cells: I64, most: int) -> I64:
+def spread(cells: I64, most: int) -> I64:
     """Return cells (n, 2) of a grid, the finest one that leaves no more than `most`."""
     pitch = 1
     kept = cells
@@ -86,6 +87,6 @@ def _spread(cells: I64, most: int) -> I64:
     return kept if len(kept) else cells[:: max(1, len(cells) // most)]
 
 
-def _centres(cells: I64) -> I64:
+def centres(cells: I64) -> I64:
     """Return the centres [lattice] of cells (row, column): int64 (n, 2)."""
     return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)

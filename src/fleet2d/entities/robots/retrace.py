@@ -9,7 +9,7 @@ from pydantic import Field
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import PlacementError
+from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.valetudo import read_valetudo_paths
 from fleet2d.logs.nearest import Nearest
 from fleet2d.paths import InputPath
@@ -53,7 +53,13 @@ class Retrace(Behavior):
         Raises:
             PlacementError: The map has no path, or none that the robot can drive here.
         """
-        pieces = read_valetudo_paths(self.path)
+        try:
+            pieces = read_valetudo_paths(self.path)
+        except FloorPlanError as error:
+            raise PlacementError(
+                f"{actor.path}: {error}; it retraces the map of a Valetudo robot, and a log of"
+                " positions with times is for the behavior 'replay'"
+            ) from error
         if not pieces:
             raise PlacementError(f"{actor.path}: {self.path} holds no path to retrace")
         lattice = actor.home.plan.lattice

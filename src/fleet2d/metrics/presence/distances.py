@@ -4,6 +4,8 @@ They use IEEE arithmetic only, no logarithm of the system's library: a stored ta
 every machine.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,70 +85,104 @@ def earth_mover(truth: F64, estimate: F64, cost: F64) -> float:
         >>> earth_mover(np.array([0.5, 0.5, 0]), np.array([0.5, 0, 0.5]), metres)
         2.5
     """
-    spare = estimate - truth
-    giving = np.flatnonzero(spare > NOTHING).tolist()
-    taking = np.flatnonzero(spare < -NOTHING).tolist()
-    left = [float(spare[i]) for i in giving]
-    need = [-float(spare[j]) for j in taking]
-    costs = [[float(cost[i, j]) for j in taking] for i in giving]
-    flow = [[0.0] * len(taking) for _ in giving]
-    while max(left, default=0.0) > NOTHING and max(need, default=0.0) > NOTHING:
-        way = _cheapest_way(costs, flow, left, need)
-        amount = min(
-            left[way[0][0]],
-            need[way[-1][1]],
-            *(flow[i][j] for k, (i, j) in enumerate(way) if k % 2),
-        )
-        for k, (i, j) in enumerate(way):
-            flow[i][j] += -amount if k % 2 else amount
-        left[way[0][0]] -= amount
-        need[way[-1][1]] -= amount
-    return sum(flow[i][j] * costs[i][j] for i in range(len(giving)) for j in range(len(taking)))
+    spare, metres = (estimate - truth).tolist(), cost.tolist()
+    giving = [i for i, mass in enumerate(spare) if mass > NOTHING]
+    taking = [j for j, mass in enumerate(spare) if mass < -NOTHING]
+    flow = _Flow([[metres[i][j] for j in taking] for i in giving], [-spare[j] for j in taking])
+    for row, i in enumerate(giving):
+        left = spare[i]
+        while left > NOTHING and max(flow.need, default=0.0) > NOTHING:
+            left -= flow.push(row, left)
+    return flow.cost
 
 
-def _cheapest_way(
-    costs: list[list[float]], flow: list[list[float]], left: list[float], need: list[float]
-) -> list[tuple[int, int]]:
-    """Return the cheapest way from who has left to who has need: legs there, back, there … .
+class _Flow:
+    """A cheapest flow from those who give to those who take, which grows by shortest ways.
 
-    Legs in even places carry more, those in odd places carry less than so far (Bellman and Ford).
+    Ways are measured by what they cost beyond what their ends are worth, never below zero, so that
+    Dijkstra's algorithm finds the shortest; ways in use cost nothing.
+
+    Attributes:
+        metres: What a way costs.
+        need: What each who takes still lacks.
+        mass: What goes each of the ways.
     """
-    far = float("inf")
-    give = [0.0 if amount > NOTHING else far for amount in left]
-    take = [far] * len(need)
-    to: list[int] = [-1] * len(need)
-    back: list[int] = [-1] * len(left)
-    changed = True
-    while changed:
-        changed = False
-        for i, row in enumerate(costs):
-            for j, metres in enumerate(row):
-                if give[i] + metres < take[j] - NOTHING:
-                    take[j], to[j], changed = give[i] + metres, i, True
-                if flow[i][j] > NOTHING and take[j] - metres < give[i] - NOTHING:
-                    give[i], back[i], changed = take[j] - metres, j, True
-    j = min((j for j, amount in enumerate(need) if amount > NOTHING), key=take.__getitem__)
-    way: list[tuple[int, int]] = []
-    while True:
-        i = to[j]
-        way.append((i, j))
-        if back[i] < 0:
-            return way[::-1]
-        j = back[i]
-        way.append((i, j))
+
+    def __init__(self, metres: list[list[float]], need: list[float]) -> None:
+        self.metres, self.need = metres, need
+        self.mass = [[0.0] * len(need) for _ in metres]
+        self._give, self._take = [0.0] * len(metres), [0.0] * len(need)  # what they are worth
+
+    @property
+    def cost(self) -> float:
+        """The sum of mass times metres."""
+        pairs = zip(self.mass, self.metres, strict=True)
+        return sum(a * b for row, ways in pairs for a, b in zip(row, ways, strict=True))
+
+    def push(self, source: int, most: float) -> float:
+        """Send mass from one who gives, shifting what others send; return how much."""
+        far, came = [float("inf")] * len(self.need), [source] * len(self.need)
+        reached, back = {source: 0.0}, dict[int, int]()
+        left = dict.fromkeys(range(len(self.need)))  # takers whose shortest way isn't known yet
+        self._reach(source, 0.0, far, came, left)
+        while True:
+            end = min(left, key=far.__getitem__)
+            if self.need[end] > NOTHING:
+                break
+            del left[end]
+            for i, row in enumerate(self.mass):
+                if row[end] > NOTHING and i not in reached:
+                    reached[i], back[i] = far[end], end
+                    self._reach(i, far[end], far, came, left)
+        for i, way in reached.items():
+            self._give[i] += far[end] - way
+        for j in range(len(self.need)):
+            if j not in left:
+                self._take[j] -= far[end] - far[j]
+        return self._shift(source, end, came, back, most)
+
+    def _reach(
+        self, i: int, way: float, far: list[float], came: list[int], left: Iterable[int]
+    ) -> None:
+        """Take in the ways on from one who gives."""
+        begin, ways = way - self._give[i], self.metres[i]
+        for j in left:
+            reduced = begin + ways[j] - self._take[j]
+            if reduced < far[j]:
+                far[j], came[j] = reduced, i
+
+    def _shift(
+        self, source: int, end: int, came: list[int], back: dict[int, int], most: float
+    ) -> float:
+        """Send mass to `end` by the way that it came; return how much."""
+        there, again = [(came[end], end)], list[tuple[int, int]]()
+        while (i := there[-1][0]) != source:
+            again.append((i, back[i]))
+            there.append((came[back[i]], back[i]))
+        amount = min(most, self.need[end], *(self.mass[i][j] for i, j in again))
+        for i, j in there:
+            self.mass[i][j] += amount
+        for i, j in again:
+            self.mass[i][j] -= amount
+        self.need[end] -= amount
+        return amount
 
 
-def rank_correlation(truth: F64, estimate: F64) -> float:
-    """Return Kendall's tau-a of the order of rooms: (concordant - discordant) / pairs, -1 to 1.
+def rank_correlation(truth: F64, estimate: F64) -> F64:
+    """Return how far the order of rooms is right: Kendall's tau, -1 to 1.
 
-    Pairs that are tied in either are neither. 1 if there is a single room.
+    (concordant - discordant) / pairs, of the pairs of rooms that differ in truth; those tied in the
+    estimate are neither (Somers' D of the estimate given the truth: with no ties at all Kendall's
+    tau). So rooms that are never used don't keep it from 1. 1 if no rooms differ in truth.
 
     Example:
-        >>> rank_correlation(np.array([0.5, 0.3, 0.2]), np.array([0.5, 0.2, 0.3]))
-        0.3333333333333333
+        >>> float(rank_correlation(np.array([0.6, 0.4, 0, 0]), np.array([0.5, 0.3, 0.2, 0])))
+        1.0
+        >>> float(rank_correlation(np.array([0.5, 0.3, 0.2]), np.array([0.5, 0.2, 0.3])).round(4))
+        0.3333
     """
-    count = len(truth)
-    if count < 2:
-        return 1.0
-    signs = np.sign(truth[:, None] - truth) * np.sign(estimate[:, None] - estimate)
-    return float(signs.sum() / (count * (count - 1)))
+    true = np.sign(truth[..., :, None] - truth[..., None, :])
+    signs = true * np.sign(estimate[..., :, None] - estimate[..., None, :])
+    pairs, right = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
+    found: F64 = np.where(pairs > 0, right / np.maximum(pairs, 1), 1.0)
+    return found

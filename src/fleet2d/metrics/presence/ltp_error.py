@@ -17,6 +17,7 @@ from fleet2d.metrics.presence.distances import (
     earth_mover,
     jensen_shannon,
     kl_divergence,
+    rank_correlation,
     room_gaps,
     total_variation,
 )
@@ -38,7 +39,7 @@ I64 = NDArray[np.int64]
 DAY_S = 86_400
 MEAN = "mean"
 SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
-COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap")
+COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
 
 
 class Realised(Metric):
@@ -89,6 +90,8 @@ class LtpError(Realised):
     - js: Jensen-Shannon divergence to base 2, 0 to 1;
     - kl: sum p ln(p / q'), q' being q smoothed by `alpha` [nats];
     - max_gap, mean_gap: greatest and mean |p - q| of a room;
+    - tau: how far the order of rooms is right, Kendall's tau of the pairs that differ in truth, -1
+      to 1 (`distances.rank_correlation`): what a robot that goes to the likeliest rooms feels;
     - earth_mover_m: least mean way on foot by which q is moved onto p [m], from middle to middle
       of rooms; only `given: home`;
     - inside: share of rooms whose p lies in the stated interval, if there is one and `given: home`.
@@ -97,12 +100,19 @@ class LtpError(Realised):
     home at each hour of the week (`hour_of_week`), where distances are means over the hours, each
     with the weight of the time that the user was at home then.
 
-    The result has the values at the end, and `burn_in_day`: the first day n, from 1, at whose end
-    tv was at most `burn_in` and stayed so. It is missing if that never came. Users who were never
-    at home are left out.
+    The result has the values at the end; `flips`, at how many updates the likeliest room at home
+    was another than at the one before; and `burn_in_day`: the first day n, from 1, at whose end tv
+    was at most `burn_in` and stayed so. It is missing if that never came. Users who were never at
+    home are left out.
     """
 
-    unit: ClassVar[str] = "per user, at the end"
+    unit: ClassVar[str] = "at the end"
+    units: ClassVar[Mapping[str, str]] = {
+        "tv": "share of time in wrong rooms",
+        "earth_mover_m": "m on foot from the truth",
+        "inside": "share of rooms in interval",
+        "burn_in_day": "day from which tv is small",
+    }
 
     given: Literal["home", "away", "hour_of_week"] = Field(
         default="home", description="which shares are compared"
@@ -116,6 +126,7 @@ class LtpError(Realised):
         self.metres = walking_distances(home)
         self.last: dict[str, dict[str, float]] = {}
         self.within: dict[str, float | None] = {}
+        self.best: dict[str, tuple[int, int]] = {}  # the likeliest room, and how often it changed
 
     def update(self, history: History, state: "Present") -> Any:
         """Compare what is believed with what was so far; return a row per user."""
@@ -130,7 +141,7 @@ class LtpError(Realised):
             mine = counts[..., row, :]
             if mine[..., :-1].any():
                 rows[user] = self._compare(presence, user, mine, steps)
-                self._note(user, rows[user])
+                self._note(user, rows[user], presence)
         if not rows:
             return None
         names = next(iter(rows.values()))
@@ -168,32 +179,42 @@ class LtpError(Realised):
             kl_divergence(truth, estimate, self.alpha),
             gaps.max(axis=-1),
             gaps.mean(axis=-1),
+            rank_correlation(truth, estimate),
         )
         return {
             name: float(value if weight is None else (value * weight).sum())
             for name, value in zip(COLUMNS, found, strict=True)
         }
 
-    def _note(self, user: str, row: dict[str, float]) -> None:
-        """Keep the newest row, and since when it has been good."""
+    def _note(self, user: str, row: dict[str, float], presence: Presence) -> None:
+        """Keep the newest row, since when it has been good, and how often the best room changed."""
         self.last[user] = row
+        best, flips = int(presence.share(user).argmax()), 0
+        if user in self.best:
+            before, flips = self.best[user]
+            flips += best != before
+        self.best[user] = best, flips
         if row["tv"] > self.burn_in:
             self.within[user] = None
         elif self.within.get(user) is None:
             self.within[user] = max(1, math.ceil(round(self.days, 9)))
 
     def result(self) -> dict[str, Any]:
-        """Return {user: {tv, js, …, burn_in_day}} at the end."""
-        return {
-            user: row | ({} if (day := self.within[user]) is None else {"burn_in_day": day})
-            for user, row in self.last.items()
-        }
+        """Return {user: {tv, js, …, flips, burn_in_day}} at the end."""
+        found = {user: {**row, "flips": self.best[user][1]} for user, row in self.last.items()}
+        for user, day in self.within.items():
+            if day is not None:
+                found[user]["burn_in_day"] = day
+        return found
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return each user's total variation, metres and day of burn-in."""
+        only = len(result) == 2  # a user, who is anyone, too
         return {
-            user: {name: row[name] for name in SHOWN if name in row} for user, row in result.items()
+            user: {name: row[name] for name in SHOWN if name in row}
+            for user, row in result.items()
+            if not (only and user == ANYONE)
         }
 
 
@@ -207,7 +228,7 @@ class LtpGap(Realised):
     were never at home are left out.
     """
 
-    unit: ClassVar[str] = "gap of share, at the end"
+    unit: ClassVar[str] = "share of time, gap at the end"
 
     def start(self, home: "Home") -> None:
         """Begin counting."""
@@ -255,6 +276,8 @@ class LtpGap(Realised):
         """Return each user's mean gap, and the greatest with its room."""
         found = {}
         for user, gaps in result.items():
+            if len(result) == 2 and user == ANYONE:
+                continue  # the same as the only user
             rooms = {room: gap for room, gap in gaps.items() if room != MEAN}
             worst = max(rooms, key=lambda room: rooms[room])
             found[user] = {MEAN: gaps[MEAN], worst: rooms[worst]}

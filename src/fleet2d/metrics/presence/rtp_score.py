@@ -101,7 +101,14 @@ class RtpScore(Metric):
     other: for intervals compare runs, or days, not minutes.
     """
 
-    unit: ClassVar[str] = "per user, all gaps"
+    unit: ClassVar[str] = "all gaps"
+    units: ClassVar[Mapping[str, str]] = {
+        "log_loss": "nats, 0 is best",
+        "top_1": "share of minutes told right",
+        "ece": "share too sure, or too unsure",
+        "skill": "1 is best, 0 the room seen last",
+        "reference_skill": "1 is best, 0 the reference",
+    }
 
     of: str = Field(description="the algorithm whose presence is scored")
     period: PositiveDuration = Field(

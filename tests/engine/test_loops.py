@@ -1,0 +1,146 @@
+"""Robots that act on what they learn: the same run however it is computed, and nobody else changed.
+
+The bundled base (long-term presence, and a robot that hangs out by it), with real-time presence and
+a search by it on top: what is learned decides where the robot goes, and that what is learned.
+"""
+
+import copy
+import json
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import digests, process, scenario, table
+
+import fleet2d
+from fleet2d.artifacts.reader import Run
+
+pytestmark = needs_jit
+
+LEARNS = (
+    "simulation.duration=1 d",
+    "artifacts.trajectories=5 min",
+    "algorithms.rtp={type: rtp, model: hmm, period: 5 min}",
+    "metrics.rtp_score={of: rtp}",
+    "robots.astro.behaviors=[{type: find, user: ana, source: rtp, every: 5 h}, {type: hangout,"
+    " source: ltp, near: view, explore: 20 %}]",
+)
+
+
+def lived(*overrides: str, **settings: Any) -> Run:
+    return fleet2d.run("bundled:base", *LEARNS, *overrides, **settings)
+
+
+@cache
+def base() -> Run:
+    return lived()
+
+
+def test_the_loop_is_closed() -> None:
+    """Without it the robot is somewhere else: what it learns moves it."""
+    events = table(base(), "events", entity="astro")["event"]
+    assert {"relocates", "explores"} <= set(events)
+    naive = lived("algorithms.ltp.estimator=sighting_share")
+    assert digests(base())["key_frames"] != digests(naive)["key_frames"]
+
+
+@pytest.mark.parametrize("span", [997, 61])
+def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
+    other = lived(max_span=span)
+    assert digests(base()) == digests(other)
+    assert base().metrics == other.metrics
+
+
+def test_every_table_is_the_same_step_by_step() -> None:
+    users = {"ana": {"type": "meander"}}
+    robots = {
+        "astro": {
+            "camera": {"range": [0.3, 4], "detection": 0.8},
+            "behaviors": [
+                {"type": "find", "user": "ana", "source": "rtp", "every": "20 min"},
+                {"type": "hangout", "source": "ltp", "period": "7 min", "explore": 0.5},
+            ],
+        }
+    }
+    algorithms = {"ltp": {"type": "ltp", "period": "5 min"}, "rtp": {"type": "rtp"}}
+    metrics = {"ltp_error": {"of": "ltp", "period": "10 min"}, "rtp_score": {"of": "rtp"}}
+    content = scenario("1 h", users=users, robots=robots, algorithms=algorithms, metrics=metrics)
+    whole, *others = (fleet2d.run(content, max_span=span) for span in (None, 60, 1))
+    for other in others:
+        assert digests(whole) == digests(other)
+        assert whole.metrics == other.metrics
+
+
+def test_metrics_change_nothing_that_is_learned_or_lived() -> None:
+    loaded = fleet2d.load_scenario("bundled:base", *LEARNS)
+    without = fleet2d.run(loaded.model_copy(update={"metrics": {}}))
+    assert {} == without.metrics
+    before, after = digests(without), digests(base())
+    for name in ("key_frames", "trajectories", "observations", "events", "ltp", "rtp"):
+        assert before[name] == after[name], name
+
+
+@pytest.mark.parametrize(
+    "behaviors",
+    ["[]", "[{type: hangout, source: ltp, explore: 60 %}]", "[{type: follow}, {type: patrol}]"],
+    ids=["nothing", "another hangout", "following"],
+)
+def test_users_live_the_same_whatever_the_robot_does(behaviors: str) -> None:
+    other = lived(f"robots.astro.behaviors={behaviors}")
+    assert digests(base())["key_frames"] != digests(other)["key_frames"]
+    for name in ("key_frames", "trajectories", "events"):
+        mine, theirs = (
+            {column: list(map(str, values)) for column, values in rows.items()}
+            for rows in (table(stored, name, entity="ana") for stored in (base(), other))
+        )
+        assert len(mine["step"]) > 20
+        assert mine == theirs
+
+
+@pytest.mark.parametrize("at", [1, 30_000])
+def test_branches_of_a_learning_run_live_the_same_future(at: int) -> None:
+    simulation = fleet2d.Simulation("bundled:base", *LEARNS)
+    simulation.advance(at)
+    twin = copy.deepcopy(simulation)
+    twin.advance(5000)
+    assert digests(base()) == digests(simulation.run()) == digests(twin.run())
+
+
+def digest_of(seed: int) -> str:
+    """The digest of a run, in a worker."""
+    stored = lived(f"simulation.seed={seed}")
+    return str(stored.digest)
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_runs_in_any_number_of_processes_are_those_of_one(workers: int) -> None:
+    expected = [digest_of(seed) for seed in (4, 5)]
+    assert base().digest == expected[0] != expected[1]
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        assert expected == list(pool.map(digest_of, (4, 5)))
+
+
+SCRIPT = """
+import json, sys, fleet2d
+print(fleet2d.run("bundled:base", *json.loads(sys.argv[1])).digest)
+"""
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "7"},
+        {"NUMBA_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4", "PYTHONHASHSEED": "8"},
+        {"NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3", "PYTHONWARNINGS": "ignore"},
+    ],
+    ids=["1 thread", "4 threads", "older processor"],
+)
+def test_another_process_learns_the_same(environment: dict[str, str], tmp_path: Path) -> None:
+    """What is learned is worked out from floats: their sums may depend on nothing but the data."""
+    done = process("-c", SCRIPT, json.dumps(LEARNS), timeout=300, cwd=tmp_path, **environment)
+    assert 0 == done.returncode, done.stderr
+    assert base().digest == done.stdout.strip()
