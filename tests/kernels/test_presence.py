@@ -1,43 +1,10 @@
-"""Chains of presence against the sum over all paths, resampled days against draws one by one."""
+"""Forecasts against powers of matrices, resampled days against draws one by one."""
 
 import numpy as np
 import pytest
-from tests.reference import presence as slow
 
-from fleet2d.kernels.presence import advance, backward, count_sightings, forward, resampled
+from fleet2d.kernels.presence import advance, count_sightings, resampled
 from fleet2d.kernels.random import random_below, random_bits
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_filter_and_smoother_are_the_sums_over_all_paths(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    transition = random.dirichlet(np.ones(3), 3)
-    start, likely = random.dirichlet(np.ones(3)), random.random((6, 3)) * 5
-    scale, pairs = np.empty(6), np.zeros((3, 3))
-    filtered = forward(transition, start, likely, scale)
-    smoothed = backward(transition, start, likely, filtered, scale, np.ones(6), pairs)
-    expected = slow.chain_posterior(transition, start, likely)
-    for found, wanted in zip((filtered, smoothed, pairs), expected, strict=True):
-        assert np.abs(found - wanted).max() < 1e-12
-
-
-def test_weights_count_expected_steps_only() -> None:
-    random = np.random.default_rng(1)
-    transition, start = random.dirichlet(np.ones(3), 3), np.full(3, 1 / 3)
-    likely, scale = random.random((5, 3)), np.empty(5)
-    filtered = forward(transition, start, likely, scale)
-    found = []
-    for weight in (np.ones(5), np.array([1.0, 1, 1, 0, 0]), np.array([0.0, 0, 0, 1, 1])):
-        pairs = np.zeros((3, 3))
-        found.append((backward(transition, start, likely, filtered, scale, weight, pairs), pairs))
-    assert np.array_equal(found[0][0], found[1][0])
-    assert np.abs(found[0][1] - found[1][1] - found[2][1]).max() < 1e-12
-
-
-def test_evidence_that_no_state_explains_tells_nothing() -> None:
-    likely = np.array([[0.0, 0.0], [1.0, 1.0]])
-    found = forward(np.full((2, 2), 0.5), np.array([1.0, 0.0]), likely, np.empty(2))
-    assert [[0.5, 0.5], [0.5, 0.5]] == found.tolist()
 
 
 def test_a_forecast_is_the_row_of_the_power() -> None:

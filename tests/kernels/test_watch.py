@@ -38,6 +38,7 @@ class Seen(NamedTuple):
     last: npt.NDArray[np.int64]
     exposure: list[int]
     binned: list[list[int]]
+    most: list[list[int]]
 
 
 def lenses_of(*cameras: Camera) -> Lenses:
@@ -74,7 +75,7 @@ def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
     shape = (FLAT.rows, FLAT.columns)
     first, last = np.full(shape, NEVER), np.full(shape, NEVER)
     rooms, exposure = rooms_of(FLAT), np.zeros(ROOMS, np.int64)
-    binned = np.zeros((8, ROOMS), np.int64)
+    binned, most = np.zeros((8, ROOMS), np.int64), np.zeros((8, ROOMS), np.int64)
     for step in range(0, len(poses.x), every):
         if poses.away[step]:
             continue
@@ -92,7 +93,8 @@ def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
         counts = every * np.bincount(rooms[seen & (rooms >= 0)], minlength=ROOMS)
         exposure += counts
         binned[step // BIN] += counts
-    return Seen(first, last, exposure.tolist(), binned.tolist())
+        most[step // BIN] = np.maximum(most[step // BIN], counts // every)
+    return Seen(first, last, exposure.tolist(), binned.tolist(), most.tolist())
 
 
 def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[int]) -> Seen:
@@ -102,19 +104,23 @@ def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[i
     record = Record(
         np.full(shape, NEVER, np.int64), np.full(shape, NEVER, np.int64), np.zeros(ROOMS, np.int64),
         np.full(shape if several else (0, 0), NEVER, np.int64), np.zeros((8, ROOMS), np.int64),
+        np.zeros((8, ROOMS), np.int64),
     )  # fmt: skip
     watched = Watched(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
-    binned = np.zeros((8, ROOMS), np.int64)
+    binned, most = np.zeros((8, ROOMS), np.int64), np.zeros((8, ROOMS), np.int64)
     glances, bench = no_glances(slots, ROOMS), bench_for(FLAT.mesh, *shape)
     begin = 0
     for end in [*ends, len(poses.x)]:
         part = Poses(*(np.ascontiguousarray(column[begin:end]) for column in poses))
         watch(watched, part, begin, glances, bench, record)
         reached = slice(begin // BIN, (end - 1) // BIN + 1)
-        binned[reached] += record.binned[: reached.stop - reached.start]
+        length = reached.stop - reached.start
+        binned[reached] += record.binned[:length]
+        most[reached] = np.maximum(most[reached], record.most[:length])
         begin = end
     settle(watched, glances, bench, record.last)
-    return Seen(record.first, record.last, record.exposure.tolist(), binned.tolist())
+    lists = (record.exposure.tolist(), binned.tolist(), most.tolist())
+    return Seen(record.first, record.last, *lists)
 
 
 ONE = [Camera(range=(0.1, 0.6), angle_deg=108)]
@@ -145,6 +151,7 @@ def test_what_was_seen_is_what_brute_force_sees(
 
     assert expected.exposure == found.exposure
     assert expected.binned == found.binned
+    assert expected.most == found.most
     assert np.array_equal(expected.first, found.first)
     assert np.array_equal(expected.last, found.last)
     assert (expected.first >= 0).sum() > 20

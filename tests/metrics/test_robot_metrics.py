@@ -125,6 +125,23 @@ def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored:
     assert found["blocks"] == pytest.approx(sum(1 for hit, _ in groupby(steps) if hit) * 14.4)
 
 
+@pytest.mark.parametrize("period", ["7 min", "1 d"])
+def test_who_steps_aside_for_a_robot_is_counted(period: str) -> None:
+    stands = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [3.0, 3.1]}]}]}
+    polite = {"type": "reactions", "manners": {"steps_aside": 1, "turns": 0}}
+    to_and_fro = {"type": "patrol", "waypoints": [[1.0, 3.1], [4.5, 3.1]], "dwell": "1 min"}
+    crossing = content(period)
+    crossing["users"] = {"ana": {"behaviors": [polite, stands]}}
+    crossing["robots"] = {"astro": {"start": [1.0, 3.1], **to_and_fro}}
+    crossing["algorithms"] = {}
+    crossing["metrics"] = {"blocking": {"period": period}}
+    stored = run(crossing)
+    aside = [row for row in events(stored, "ana") if row[2] == "steps aside for astro"]
+    assert len(aside) > 3
+    found = stored.metrics["blocking"]["astro"]["ana"]
+    assert found["asides"] == pytest.approx(len(aside) * 14.4)
+
+
 def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
     astro = poses(stored, "astro")
     rests = []

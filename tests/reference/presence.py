@@ -32,53 +32,73 @@ def exposure_ratio(
     return [x / sum(rate) for x in rate], max(0.0, 1 - sum(rate) / detection)
 
 
-def chain_posterior(transition: Any, start: Any, likelihood: Any) -> tuple[Any, Any, Any]:
-    """Filtered and smoothed probabilities, and expected steps, by summing over all paths."""
-    bins, states = np.shape(likelihood)
-    smoothed, pairs = np.zeros((bins, states)), np.zeros((states, states))
-    total = 0.0
-    for path in product(range(states), repeat=bins + 1):
-        p = start[path[0]]
-        for t in range(bins):
-            p *= transition[path[t]][path[t + 1]] * likelihood[t][path[t + 1]]
-        total += p
-        for t in range(bins):
-            smoothed[t, path[t + 1]] += p
-            pairs[path[t], path[t + 1]] += p
-    filtered = []
-    for end in range(1, bins + 1):
-        last = np.zeros(states)
-        for path in product(range(states), repeat=end + 1):
-            p = start[path[0]]
-            for t in range(end):
-                p *= transition[path[t]][path[t + 1]] * likelihood[t][path[t + 1]]
-            last[path[-1]] += p
-        filtered.append(last / last.sum())
-    return np.array(filtered), smoothed / total, pairs / total
+def stays(
+    ways: Any, bins: Sequence[int], shown: Any, seen: Any, shown_before: Sequence[int]
+) -> tuple[list[Any], list[Any]]:
+    """A person's chain written out: transitions and evidence between all states, for each stretch.
+
+    States are stage of a stay, patch, and whether in the part of the patch that is in view, in
+    that order: number (stage * patches + patch) * 2 + (1 if out of view).
+
+    Args:
+        ways: stay, follow, spread, restless, first, detection.
+        bins: Of each stretch.
+        shown: What of each patch is in view, of 255; away last.
+        seen: Of each stretch the share of sightings by patch.
+        shown_before: As shown, before the first stretch.
+    """
+    places, patches = len(ways.first) - 1, len(ways.spread)
+    stages = len(ways.stay) // places
+    room = [max(r for r in range(places) if ways.first[r] <= p) for p in range(patches)]
+    steps, weights = [], []
+    for t, n in enumerate(bins):
+        step = np.zeros((stages * patches * 2,) * 2)
+        weight = np.zeros(stages * patches * 2)
+        views = [x / 255 for x in shown[t]]
+        before = shown[t - 1] if t else shown_before
+
+        def comes(row: Any, stage: int, into: int, chance: float, views: Any = views) -> None:
+            for p in range(patches):
+                if room[p] == into:
+                    at = (stage * patches + p) * 2
+                    row[at] += chance * ways.spread[p] * views[p]
+                    row[at + 1] += chance * ways.spread[p] * (1 - views[p])
+
+        for s, p, side in product(range(stages), range(patches), range(2)):
+            row, k = step[(s * patches + p) * 2 + side], room[p] * stages + s
+            kept, calm = ways.stay[k] ** n, (1 - ways.restless[room[p]]) ** n
+            onward = (1 - kept) * ways.follow[k][places]
+            for stage, chance in ((s, kept * calm), (s + 1, onward)):
+                if chance and shown[t][p] == before[p]:
+                    row[(stage * patches + p) * 2 + side] += chance
+                elif chance:
+                    row[(stage * patches + p) * 2] += chance * views[p]
+                    row[(stage * patches + p) * 2 + 1] += chance * (1 - views[p])
+            comes(row, s, room[p], kept * (1 - calm))
+            for into in range(places):
+                comes(row, 0, into, (1 - kept) * ways.follow[k][into])
+            missed = (1 - ways.detection) ** n if side == 0 else 1.0
+            hit = seen[t][p] if (side == 0) == (shown[t][p] > 0) else 0.0
+            weight[(s * patches + p) * 2 + side] = hit + 1e-3 * missed if sum(seen[t]) else missed
+        steps.append(step)
+        weights.append(weight)
+    return steps, weights
 
 
-def missed(
-    w: Any, seen: Any, unknown: Any, bin_steps: int, d: float, m: float, views: int
-) -> list[list[float]]:
-    """Chance of not being perceived in each bin and room, for one user whom nobody knew before."""
-    table = []
-    for t, row in enumerate(w):
-        values = []
-        for r, share in enumerate(row):
-            before = seen[t - 1][r] > 0 if t else seen[0][r] > 0
-            same = t > 0 and abs(share - w[t - 1][r]) <= 0.02 * share
-            if unknown[t][r] or share == 0:
-                value = 1.0
-            elif before:
-                value = 1 - d * (1 - m * (1 - share)) if same else 1 - d * share
-            elif same:
-                out = (1 - share) / (1 - share + share * (1 - d) ** 2)
-                value = out * (1 - m * share * d) + (1 - out) * (1 - d)
-            else:
-                value = 1 - d * (1 - (1 - share) ** min(views, bin_steps))
-            values.append(value)
-        table.append(values)
-    return table
+def posteriors(steps: Any, weights: Any, start: Any, end: Any) -> tuple[Any, Any]:
+    """Filtered and smoothed probabilities of the states of a chain, by products of matrices."""
+    count = len(steps)
+    forward = [np.asarray(start)]
+    for step, weight in zip(steps, weights, strict=True):
+        now = forward[-1] @ step * weight
+        forward.append(now / now.sum())
+    backward = [np.asarray(end)]
+    for step, weight in zip(steps[::-1], weights[::-1], strict=True):
+        before = step @ (weight * backward[-1])
+        backward.append(before / before.sum())
+    backward = backward[::-1]
+    both = [forward[t + 1] * backward[t + 1] for t in range(count)]
+    return np.array(forward[1:]), np.array([b / b.sum() for b in both])
 
 
 def fremen(minutes: Sequence[int], weight: Any, state: Any, days: int, m: int, at: int) -> float:

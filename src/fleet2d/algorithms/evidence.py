@@ -1,18 +1,34 @@
 """Evidence: what robots watched and whom they perceived there, in bins of time."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.algorithms.patches import Patches
 from fleet2d.kernels.presence import count_sightings
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.plan import FloorPlan
 
 # Length of a bin; one step where a step is longer.
 BIN_US = 60_000_000
+
+
+class Parts(NamedTuple):
+    """Evidence by patches of rooms, each in view as a whole or not at all for the most part.
+
+    Attributes:
+        room: int64 (patches,), the room of each patch, in ascending order.
+        cells: int64 (patches,), how many cells each has.
+        watched: float64 (bins, patches), as in Evidence.
+        shown: float64 (bins, patches), share of each patch's cells in view at one step of the bin,
+            at most; of several robots, that of the robot that saw most of it.
+        seen: int64 (bins, users + 1, patches), as in Evidence.
+    """
+
+    room: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    watched: NDArray[np.float64]
+    shown: NDArray[np.float64]
+    seen: NDArray[np.int64]
 
 
 class Evidence(NamedTuple):
@@ -29,6 +45,7 @@ class Evidence(NamedTuple):
             of the bin; of several robots, that of the robot that saw most of the room.
         seen: int64 (bins, users + 1, rooms), steps of the bin at which each user was perceived in
             each room; the last is for anybody, known or not.
+        parts: The same by patches of rooms; None: each room is one.
 
     Example:
         >>> Evidence(0, 60, np.array([[0.5, 0.0]]), np.array([[[30, 0], [30, 0]]])).seen.shape
@@ -39,6 +56,7 @@ class Evidence(NamedTuple):
     bin_steps: int
     watched: NDArray[np.float64]
     seen: NDArray[np.int64]
+    parts: Parts | None = None
 
     def __len__(self) -> int:
         """Return the number of bins."""
@@ -53,12 +71,6 @@ def steps_of_bin(step_us: int) -> int:
         (60, 2, 1)
     """
     return max(1, BIN_US // step_us)
-
-
-def cells_of_rooms(plan: "FloorPlan") -> NDArray[np.int64]:
-    """Return the number of cells of each room: int64 (rooms,)."""
-    rooms = plan.room_of_cell
-    return np.bincount(rooms[rooms != NOWHERE], minlength=len(plan.rooms))
 
 
 class Sighted(Protocol):
@@ -82,13 +94,54 @@ class Sightings(NamedTuple):
 
     step: NDArray[np.int64]
     user: NDArray[np.int64]
-    room: NDArray[np.int16]
+    room: NDArray[np.integer[Any]]
+
+
+def gather(
+    first: int,
+    bin_steps: int,
+    patches: Patches,
+    cells: NDArray[np.int64],
+    sighted: Sightings,
+    users: int,
+) -> Evidence:
+    """Return the evidence of some bins.
+
+    Args:
+        first: Step at which the first bin begins.
+        bin_steps: Steps of a bin.
+        patches: The patches of rooms.
+        cells: int64 (bins, robots, 2, patches), cells of each patch in view of each robot, summed
+            over the steps of the bin, and at most at one.
+        sighted: Who was perceived in which patch.
+        users: How many users there are.
+    """
+    bins, first_patches, count = len(cells), patches.first, len(patches.room)
+    of_patch = np.maximum(patches.cells, 1)
+    of_room = np.maximum(np.add.reduceat(patches.cells, first_patches), 1)
+    summed, most = cells[:, :, 0], cells[:, :, 1].max(axis=1, initial=0)
+    by_room = np.add.reduceat(summed, first_patches, axis=2).max(axis=1, initial=0)
+    by_patch = summed.max(axis=1, initial=0)
+    sizes = (first, bins, bin_steps, users)
+    in_room = sighted._replace(room=patches.room[sighted.room])
+    parts = Parts(
+        patches.room,
+        patches.cells,
+        by_patch / (of_patch * bin_steps),
+        most / of_patch,
+        count_seen(sighted, *sizes, count),
+    )
+    seen = count_seen(in_room, *sizes, len(first_patches))
+    return Evidence(first, bin_steps, by_room / (of_room * bin_steps), seen, parts)
 
 
 def count_seen(
     sighted: Sighted, begin: int, bins: int, bin_steps: int, users: int, rooms: int
 ) -> NDArray[np.int64]:
-    """Return Evidence.seen: a user perceived twice at a step in a room counts once."""
+    """Return Evidence.seen: a user perceived twice at a step in a room counts once.
+
+    With patches in place of rooms it is Parts.seen.
+    """
     seen = np.zeros((bins, users + 1, rooms), np.int64)
     user, room = sighted.user.astype(np.int64), sighted.room.astype(np.int64)
     count_sightings(sighted.step - begin, user, room, bin_steps, seen)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import Activities
-from fleet2d.algorithms.evidence import Evidence, Sightings, cells_of_rooms, count_seen
+from fleet2d.algorithms.evidence import Evidence, Sightings, gather
 from fleet2d.algorithms.observations import (
     OBSERVATION,
     Looks,
@@ -17,6 +17,7 @@ from fleet2d.algorithms.observations import (
     Observations,
     perceived,
 )
+from fleet2d.algorithms.patches import Patches
 from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.entities.plan import Motion, State
 from fleet2d.errors import ComponentError
@@ -108,10 +109,11 @@ class Log:
         self._looks: dict[int, NDArray[np.int64]] = {}
         self._exposures: dict[int, NDArray[np.int64]] = {}
         self.bin_steps = 0  # of the bins of evidence; 0: nobody asks for it
-        self._bins: NDArray[np.int64] | None = None  # (bins, robots, rooms), from _first_bin on
+        self._bins: NDArray[np.int64] | None = None  # (bins, robots, 2, patches), from _first_bin
         self._first_bin = 0
-        self._cells: NDArray[np.int64] | None = None  # of each room
+        self.patches: Patches | None = None  # that bins of evidence tell apart
         self._rooms = NearestRooms(home.plan)
+        self._nearest_patches: NearestRooms | None = None
         self.activities = Activities(0, {})
         self._traced: dict[tuple[str, int, int], BodyPoses] = {}
 
@@ -224,7 +226,10 @@ class Log:
         self._exposures[step] = exposure
 
     def expose_bins(self, bins: NDArray[np.int64]) -> None:
-        """Keep how much of each room each robot has had in view: the bins (n, robots, rooms)."""
+        """Keep how much each robot has had in view: the bins (n, robots, 2, patches).
+
+        That is cells of each patch, summed over the steps of the bin, and at most at one.
+        """
         self._bins = bins if self._bins is None else np.concatenate([self._bins, bins])
 
     def evidence(self, first: int, end: int, users: int) -> Evidence:
@@ -234,6 +239,7 @@ class Log:
             ComponentError: The steps aren't whole bins.
         """
         assert self._bins is not None, "nobody needs evidence"
+        assert self.patches is not None
         if first % self.bin_steps or end % self.bin_steps:
             raise ComponentError(
                 f"evidence comes in bins of {self.bin_steps} steps, but the period from step"
@@ -241,15 +247,12 @@ class Log:
             )
         begin = first // self.bin_steps - self._first_bin
         bins = self._bins[begin : end // self.bin_steps - self._first_bin]
-        if self._cells is None:
-            self._cells = np.maximum(cells_of_rooms(self.home.plan), 1)
-        most = bins.max(axis=1, initial=0)
+        if self._nearest_patches is None:
+            self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         rows = self.seen(first, end)
-        sightings = Sightings(
-            rows[:, STEP], rows[:, IDENTITY], self._rooms.of(rows[:, X], rows[:, Y])
-        )
-        seen = count_seen(sightings, first, len(bins), self.bin_steps, users, most.shape[1])
-        return Evidence(first, self.bin_steps, most / (self._cells * self.bin_steps), seen)
+        patch = self._nearest_patches.of(rows[:, X], rows[:, Y])
+        sightings = Sightings(rows[:, STEP], rows[:, IDENTITY], patch)
+        return gather(first, self.bin_steps, self.patches, bins, sightings, users)
 
     def exposure(self, first: int, end: int) -> NDArray[np.int64]:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.

@@ -78,9 +78,16 @@ class Looks(NamedTuple):
 class NearestRooms:
     """The room of any place, also of one in a wall or outside: there it is the nearest room's."""
 
-    def __init__(self, plan: "FloorPlan") -> None:
+    def __init__(self, plan: "FloorPlan", of_cell: NDArray[np.int16] | None = None) -> None:
+        """Take the rooms of a plan, or other parts of it, as the patches of its rooms.
+
+        Args:
+            plan: The floor plan.
+            of_cell: int16 (rows, columns), the part that each cell belongs to, NOWHERE for none;
+                left out: its room.
+        """
         self._plan = plan
-        self._rooms: NDArray[np.int16] | None = None
+        self._rooms: NDArray[np.int16] | None = None if of_cell is None else beside_rooms(of_cell)
 
     def of(self, x: NDArray[np.int64], y: NDArray[np.int64]) -> NDArray[np.int16]:
         """Return the rooms of places [lattice units]; NOWHERE only in a home without rooms."""

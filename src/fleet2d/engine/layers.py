@@ -8,6 +8,7 @@ import numpy as np
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.log import Log
+from fleet2d.algorithms.patches import patches_of, whole_rooms
 from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
@@ -84,6 +85,7 @@ class LayerBook:
         self._exposes = "exposure" in needed
         self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0
         self._told_bins = 0
+        self._patches = patches_of(home.plan) if self._bin_steps else whole_rooms(home.plan)
         self.areas = self._open_areas(scenario, actors, wanted) if wanted else []
         self._lay_seen(scenario, needed)
         self.next_due(0)
@@ -96,11 +98,11 @@ class LayerBook:
     def expose(self, step: int, log: Log) -> None:
         """Tell the log how much of each room each robot has had in view before `step`."""
         if self._bin_steps:
-            log.bin_steps = self._bin_steps
+            log.bin_steps, log.patches = self._bin_steps, self._patches
             taken = [area.take_bins(step) for area in self.areas]
             count = step // self._bin_steps - self._told_bins
             self._told_bins += count
-            bins = np.zeros((count, self._robots, len(self._home.rooms)), np.int64)
+            bins = np.zeros((count, self._robots, 2, len(self._patches.room)), np.int64)
             for area, rows in zip(self.areas, taken, strict=True):
                 bins[:, area.row - self._first_robot] = rows
             log.expose_bins(bins)
@@ -135,7 +137,14 @@ class LayerBook:
         every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
         keeps_last = bool({"last_seen", "time_since_seen"} & wanted)
         return [
-            SeenArea(actor, row, every=every, keeps_last=keeps_last, bin_steps=self._bin_steps)
+            SeenArea(
+                actor,
+                row,
+                self._patches,
+                every=every,
+                keeps_last=keeps_last,
+                bin_steps=self._bin_steps,
+            )
             for row, actor in enumerate(actors)
             if isinstance(actor.entity, Robot) and actor.entity.eyes
         ]

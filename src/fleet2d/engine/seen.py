@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.patches import Patches
 from fleet2d.engine.buckets import PoseBlock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
@@ -39,6 +40,7 @@ class SeenArea:
         self,
         robot: Actor,
         row: int,
+        patches: Patches,
         *,
         every: int = 1,
         keeps_last: bool = True,
@@ -49,12 +51,13 @@ class SeenArea:
         Args:
             robot: Whose cameras.
             row: Its row in a PoseBlock.
+            patches: The parts of rooms that bins tell apart.
             every: It looks at the steps that this divides; each look stands for so many steps.
             keeps_last: Whether the last step at which each cell was in view can be asked for.
             bin_steps: Keep exposure by bins of so many steps, for `take_bins`; 0: don't.
         """
         assert isinstance(robot.entity, Robot)
-        self.robot, self.row, self.every = robot, row, every
+        self.robot, self.row, self.every, self._patches = robot, row, every, patches
         self.steps = 0
         plan = robot.home.plan
         lattice, step_us = plan.lattice, robot.clock.step_us
@@ -62,19 +65,20 @@ class SeenArea:
         scene = Scene([], [], lattice, step_us, robot.path)
         self._lenses = stack_lenses(lenses, [False] * len(lenses), scene)
         grid, none = (lattice.rows, lattice.columns), (0, 0)
+        bins = (BUFFER // bin_steps + 2 if bin_steps else 0, len(patches.room))
         self._record = Record(
             first=np.full(grid, NEVER, np.int64),
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
-            exposure=np.zeros(len(plan.rooms), np.int64),
+            exposure=np.zeros(len(patches.room), np.int64),
             counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
-            binned=np.zeros(
-                (BUFFER // bin_steps + 2 if bin_steps else 0, len(plan.rooms)), np.int64
-            ),
+            binned=np.zeros(bins, np.int64),
+            most=np.zeros(bins, np.int64),
         )
         self._bin_steps = bin_steps
-        self._bins = np.zeros((0, len(plan.rooms)), np.int64)  # from bin _first_bin on
+        # Cells in view, summed and at most, from bin _first_bin on.
+        self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
         self._first_bin = 0
-        self._glances = no_glances(SLOTS, len(plan.rooms))
+        self._glances = no_glances(SLOTS, len(patches.room))
         self._buffer, self._waiting = empty_poses(BUFFER), 0
         self._face(robot.home.walls)
 
@@ -92,7 +96,7 @@ class SeenArea:
         self._watched = Watched(
             walls,
             self._lenses,
-            plan.room_of_cell,
+            self._patches.of_cell,
             self.robot.clock.step_us,
             self.every,
             max(self._bin_steps, 1),
@@ -134,9 +138,10 @@ class SeenArea:
         """Keep the bins of the steps from `begin` to the present one."""
         first = begin // self._bin_steps - self._first_bin
         end = (self.steps - 1) // self._bin_steps + 1 - self._first_bin
-        grown = np.zeros((end, self._bins.shape[1]), np.int64)
+        grown = np.zeros((end, *self._bins.shape[1:]), np.int64)
         grown[: len(self._bins)] = self._bins
-        grown[first:] += self._record.binned[: end - first]
+        grown[first:, 0] += self._record.binned[: end - first]
+        grown[first:, 1] = np.maximum(grown[first:, 1], self._record.most[: end - first])
         self._bins = grown
 
     def _settle(self) -> None:
@@ -148,13 +153,14 @@ class SeenArea:
     def exposure(self) -> I64:
         """Cells of each room in view, summed over the steps so far: int64 (rooms,), a copy."""
         self._catch_up()
-        return self._record.exposure.copy()
+        return np.add.reduceat(self._record.exposure, self._patches.first)
 
     def take_bins(self, end: int) -> I64:
         """Hand over exposure by bins, of those that end by step `end` and weren't taken before.
 
         Returns:
-            int64 (bins, rooms), cells of each room in view, summed over the steps of each bin.
+            int64 (bins, 2, patches), cells of each patch in view, summed over the steps of each
+            bin, and at most at one.
         """
         self._catch_up()
         count = end // self._bin_steps - self._first_bin

@@ -89,6 +89,7 @@ class Actor:
         self._waiting: Waiting | None = None
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
         self.passes_until = 0  # before that step it goes round people: it minds not to touch them
+        self._stuck: object = None  # where it last looked for a way round people, and for which
         self._blocked = ("", -1)  # what was in its way, and up to which step it waits there
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
@@ -307,9 +308,11 @@ class Actor:
         self._waited, self.passes_until = (since, step + just), step
         gives_way: GivesWay = self.entity.gives_way  # type: ignore[attr-defined]
         waited, plan = (step - since) * self.clock.step_us, None
-        if waited >= micros(gives_way.patience):
+        stuck = self.state, self.plan.root, people.tobytes()
+        if waited >= micros(gives_way.patience) and stuck != self._stuck:
             plan = waits.go_round(now, people, gives_way.distance)
             self.passes_until = step + just if plan is not None else step
+            self._stuck = stuck
         if plan is None and waited >= micros(max(gives_way.patience, gives_way.gives_up)):
             plan, self._waited = waits.leave_out(now, whom), (0, -1)
         if plan is None:

@@ -26,7 +26,7 @@ class Glances(NamedTuple):
         pose: int64 (slots, 4), x, y [lattice], heading, and how far the cameras are panned.
         last: int64 (slots,), last step at which it was taken, -1 for an empty slot.
         told: int64 (slots,), the last such step that `Record.last` knows of.
-        cells: int32 (slots, rooms), cells of each room that it shows.
+        cells: int32 (slots, patches), cells of each patch that it shows.
         taken: int64 (1,), how many slots are.
     """
 
@@ -44,11 +44,12 @@ class Record(NamedTuple):
         first: int64 (rows, columns), first step at which each cell was in view, -1 for never.
         last: int64 (rows, columns), the last such step as far as `settle` was called; not kept
             where it is empty.
-        exposure: int64 (rooms,), cells of each room in view, summed over the steps.
+        exposure: int64 (patches,), cells of each patch in view, summed over the steps.
         counted: int64 (rows, columns), the last look that counted each cell, which several cameras
             may show; empty for one camera.
-        binned: int64 (bins, rooms), as `exposure`, by time: `watch` sets as many anew as its steps
-            reach; empty where nobody asks for it.
+        binned: int64 (bins, patches), as `exposure`, by time: `watch` sets as many anew as its
+            steps reach; empty where nobody asks for it.
+        most: int64 (bins, patches), the most cells of each patch in view at a step, likewise.
     """
 
     first: Int64
@@ -56,6 +57,7 @@ class Record(NamedTuple):
     exposure: Int64
     counted: Int64
     binned: Int64
+    most: Int64
 
 
 class Watched(NamedTuple):
@@ -64,7 +66,8 @@ class Watched(NamedTuple):
     Attributes:
         walls: Free space.
         lenses: The robot's cameras.
-        room_of_cell: int16 (rows, columns), -1 for none.
+        patch_of_cell: int16 (rows, columns), which of the parts that are told apart each cell
+            belongs to, a room or part of one; -1 for none.
         step_us: Length of a step.
         every: It looks at the steps that this divides; each look stands for so many steps.
         bin_steps: Steps of a bin of `Record.binned`; bins begin at step 0.
@@ -72,19 +75,19 @@ class Watched(NamedTuple):
 
     walls: Mesh
     lenses: Lenses
-    room_of_cell: NDArray[np.int16]
+    patch_of_cell: NDArray[np.int16]
     step_us: int
     every: int
     bin_steps: int
 
 
-def no_glances(slots: int, rooms: int) -> Glances:
-    """Return an empty table of a power of two slots: 48 bytes and 4 per room each."""
+def no_glances(slots: int, patches: int) -> Glances:
+    """Return an empty table of a power of two slots: 48 bytes and 4 per patch each."""
     return Glances(
         np.zeros((slots, 4), np.int64),
         np.full(slots, NEVER, np.int64),
         np.full(slots, NEVER, np.int64),
-        np.zeros((slots, rooms), np.int32),
+        np.zeros((slots, patches), np.int32),
         np.zeros(1, np.int64),
     )
 
@@ -138,8 +141,8 @@ def settle(watched: Watched, glances: Glances, bench: Bench, seen: Int64) -> Non
 def _glance(
     watched: Watched, pose: Int64, step: int, bench: Bench, record: Record, cells: Int32
 ) -> None:
-    """Look from a new pose: mark what was never seen before, and count the cells of each room."""
-    spans, rooms = bench.spans, watched.room_of_cell
+    """Look from a new pose: mark what was never seen before, and count the cells of each patch."""
+    spans, patches = bench.spans, watched.patch_of_cell
     first, last, counted = record.first, record.last, record.counted
     keeps_last = last.shape[0] > 0
     cameras = watched.lenses.near_squared.shape[0]
@@ -157,27 +160,33 @@ def _glance(
                     if counted[row, column] == step:
                         continue
                     counted[row, column] = step
-                room = rooms[row, column]
-                if room >= 0:
-                    cells[room] += 1
+                patch = patches[row, column]
+                if patch >= 0:
+                    cells[patch] += 1
 
 
 @kernel
 def _let_go(
-    last: Int64, cells: Int32, exposure: Int64, binned: Int64, held: tuple[int, int, int, int]
+    last: Int64,
+    cells: Int32,
+    exposure: Int64,
+    by_bin: tuple[Int64, Int64],
+    held: tuple[int, int, int, int],
 ) -> None:
     """Add what a pose shows: its slot, the step at which it was held last, for how many, the bin.
 
     It gets the few arrays that it needs: to hand over a tuple of many takes longer than to add.
     """
     slot, step, steps, row = held
+    binned, most = by_bin
     if slot >= 0:
         last[slot] = step
-        for room in range(exposure.shape[0]):
-            seen = steps * np.int64(cells[slot, room])
-            exposure[room] += seen
-            if binned.shape[0] > 0:
-                binned[row, room] += seen
+        for patch in range(exposure.shape[0]):
+            shown = np.int64(cells[slot, patch])
+            exposure[patch] += steps * shown
+            if binned.shape[0] > 0 and steps > 0:
+                binned[row, patch] += steps * shown
+                most[row, patch] = max(most[row, patch], shown)
 
 
 @kernel
@@ -213,10 +222,12 @@ def watch(
     xs, ys, headings, aways = poses.x, poses.y, poses.heading, poses.away
     pose, last, cells, taken = glances.pose, glances.last, glances.cells, glances.taken
     lenses, every, bin_steps = watched.lenses, watched.every, watched.bin_steps
-    exposure, binned = record.exposure, record.binned
+    exposure, binned, by_bin = record.exposure, record.binned, (record.binned, record.most)
     bins = binned.shape[0] > 0
     if bins and xs.shape[0] > 0:
-        binned[: (begin + xs.shape[0] - 1) // bin_steps - begin // bin_steps + 1] = 0
+        reached = (begin + xs.shape[0] - 1) // bin_steps - begin // bin_steps + 1
+        binned[:reached] = 0
+        record.most[:reached] = 0
     begin_bin, row = begin // bin_steps, 0
     next_bin = (begin_bin + 1) * bin_steps
     pans = lenses.pan_count.max() > 0
@@ -230,12 +241,12 @@ def watch(
         if pans:
             panned = _panned(lenses, step * watched.step_us)
         if bins and step >= next_bin:
-            _let_go(last, cells, exposure, binned, (slot, looked, looks * every, row))
+            _let_go(last, cells, exposure, by_bin, (slot, looked, looks * every, row))
             row, looks = step // bin_steps - begin_bin, 0
             next_bin = (step // bin_steps + 1) * bin_steps
         same = x == held_x and y == held_y and heading == held_heading and panned == held_panned
         if not same or slot < 0 or away:
-            _let_go(last, cells, exposure, binned, (slot, looked, looks * every, row))
+            _let_go(last, cells, exposure, by_bin, (slot, looked, looks * every, row))
             slot, looks = -1, 0
             if away:
                 continue
@@ -263,4 +274,4 @@ def watch(
             j += every
             looks += 1
         looked = begin + j - every
-    _let_go(last, cells, exposure, binned, (slot, looked, looks * every, row))
+    _let_go(last, cells, exposure, by_bin, (slot, looked, looks * every, row))

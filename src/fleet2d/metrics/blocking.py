@@ -1,5 +1,6 @@
 """How often robots are in people's way."""
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -23,11 +24,17 @@ class Blocking(Metric):
 
     A step counts when the user moves in it, and the centres are nearer than `clearance` at its
     begin or at its end: two bodies of the usual radii (0.2 and 0.15 m) would touch at 0.35 m. A
-    block is an unbroken run of such steps. People of a scenario without reactions walk as if there
-    were no robot, so this is how often they would have had to change their way or stop.
+    block is an unbroken run of such steps; `blocks` counts these, and `seconds` is the time of
+    their steps. People walk as if there were no robot, so this is how often they would have had to
+    change their way or stop. `asides`, of people who react to robots, is how often they stood and
+    stepped aside for it.
     """
 
-    units: ClassVar[Mapping[str, str]] = {"blocks": "a day", "seconds": "s a day"}
+    units: ClassVar[Mapping[str, str]] = {
+        "blocks": "a day",
+        "seconds": "s a day",
+        "asides": "a day",
+    }
 
     clearance: Length = Field(
         default=0.4, gt=0, le=3, description="distance between the centres [m]"
@@ -37,6 +44,7 @@ class Blocking(Metric):
         """Begin counting."""
         self.blocks: dict[tuple[str, str], int] = {}
         self.seconds: dict[tuple[str, str], float] = {}
+        self.asides: Counter[tuple[str, str]] = Counter()
         self.last: dict[tuple[str, str], tuple[tuple[float, float], bool, bool]] = {}
         self.days = 0.0
 
@@ -54,14 +62,18 @@ class Blocking(Metric):
             spent = int(np.count_nonzero(hit)) * history.step_s
             self.seconds[key] = self.seconds.get(key, 0.0) + spent
             self.last[key] = pair.at_user.at(-1), bool(near[-1]), bool(hit[-1])
+        steps_aside = {f"steps aside for {robot}": robot for robot in state.robots}
+        for event in history.events:
+            if event.event == "reacts" and event.detail in steps_aside:
+                self.asides[steps_aside[event.detail], event.entity] += 1
         self.days += len(history) * history.step_s / 86400
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {user: {blocks, seconds}}}, both per day."""
+        """Return {robot: {user: {blocks, seconds}}}, and asides where there were any, per day."""
         found: dict[str, Any] = {}
         for (robot, user), blocks in self.blocks.items():
-            found.setdefault(robot, {})[user] = {
-                "blocks": blocks / self.days,
-                "seconds": self.seconds[robot, user] / self.days,
-            }
+            numbers = {"blocks": blocks, "seconds": self.seconds[robot, user]}
+            if self.asides[robot, user]:
+                numbers["asides"] = self.asides[robot, user]
+            found.setdefault(robot, {})[user] = {k: v / self.days for k, v in numbers.items()}
         return found

@@ -7,7 +7,7 @@ Where the robot hangs out, it goes by the estimator of the column; elsewhere all
 the same robot.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,6 +57,7 @@ POLICIES = {
     "opportunistic, else patrol": Policy(({"type": "opportunistic"}, PATROL)),
 }
 
+Case = tuple[str, tuple[str, ...], int]
 Errors = dict[str, dict[str, list[float]]]  # by policy and estimator, of each seed
 
 
@@ -89,17 +90,28 @@ def errors(content: Mapping[str, Any]) -> dict[str, float]:
 def reproduce(request: Request, tell: Tell) -> Result:
     """Run all months; return the tables of errors and of differences to the naive estimator."""
     seeds, days = request.size(30, 30, 2, 3)
-    cases = [
+    cases = cases_of(range(seeds))
+    found = run_all(errors, [watched_month(*case, days) for case in cases], request, tell)
+    return compared(cases, found, days)
+
+
+def cases_of(seeds: Iterable[int]) -> list[Case]:
+    """Return the months, seed by seed: policy, the estimators in it, and seed."""
+    return [
         (policy, estimators, seed)
-        for seed in range(seeds)
+        for seed in seeds
         for policy, does in POLICIES.items()
         for estimators in ([(e,) for e in ESTIMATORS] if does.acts else [ESTIMATORS])
     ]
-    found = run_all(errors, [watched_month(*case, days) for case in cases], request, tell)
+
+
+def compared(cases: Sequence[Case], found: Sequence[Mapping[str, float]], days: int) -> Result:
+    """Return the tables of the errors that were found."""
     tv: Errors = {policy: {e: [] for e in ESTIMATORS} for policy in POLICIES}
     for (policy, _, _), row in zip(cases, found, strict=True):
         for estimator, error in row.items():
             tv[policy][estimator].append(error)
+    seeds = len({seed for _, _, seed in cases})
     size = f"{counted(seeds, 'paired seed')} of {counted(days, 'day')}"
     tables = (
         _table(

@@ -93,11 +93,11 @@ def search_problem(
         ([0.5, 0.3], [2.0, 2.0])
     """
     chances = np.asarray(prior, np.float64)
-    count = len(chances)
+    count, ways = len(chances), np.asarray(travel, np.float64)
     problem = SearchProblem(
         chances,
         np.asarray(reach, np.float64),
-        np.asarray(travel, np.float64).reshape(count, -1),
+        ways.reshape(count, count) if ways.size == count * count else ways,
         np.broadcast_to(np.asarray(look, np.float64), (count,)).copy(),
         np.broadcast_to(np.asarray(detect, np.float64), (count,)).copy(),
     )

@@ -155,3 +155,28 @@ def test_a_run_goes_on_from_what_another_has_learned(tmp_path: Path) -> None:
     )
     with pytest.raises(Fleet2DError, match="other users"):
         run({**content("1 h", **algorithms), "users": {"ana": USERS["ana"]}})
+
+
+def test_every_estimator_has_all_variants_for_everybody() -> None:
+    """Over all time with intervals and by hour of the week, both also with forgetting."""
+    algorithms: dict[str, Any] = {}
+    for name in ESTIMATORS:
+        for half_life in ("null", "1 d"):
+            key = f"{name}_{half_life.replace(' ', '')}"
+            fields = {"type": "ltp", "estimator": name, "period": "9 h"}
+            fields |= {} if half_life == "null" else {"half_life": half_life}
+            algorithms[f"w_{key}"] = {**fields, "by": "hour_of_week"}
+            algorithms[f"o_{key}"] = {**fields, **({} if name == "fremen" else {"interval": 0.9})}
+    found = run(content("54 h", **algorithms))
+    for name in algorithms:
+        for user in ("ana", "ben", "anyone"):
+            rows = table(found, name, user=user)
+            last = rows["step"] == rows["step"].max()
+            rooms = last & (rows["room"] != "away")
+            assert 1.0 == pytest.approx(rows["share"][rooms].sum()), name
+            assert 1 == (last & (rows["room"] == "away")).sum()
+            if "low" in rows:
+                assert (rows["low"] <= rows["share"] + 1e-12).all(), name
+                assert (rows["share"] <= rows["high"] + 1e-12).all(), name
+                assert (rows["high"] - rows["low"])[last].max() < 1
+        assert ("low" in rows) == (name.startswith("o_") and "fremen" not in name)

@@ -17,7 +17,7 @@ from tests.algorithms.presence.worlds import (
 from tests.homes import needs_jit
 
 from fleet2d.algorithms.presence.belief import Presence, Track
-from fleet2d.algorithms.presence.chain_model import Filter, MarkovDecay, SemiMarkov
+from fleet2d.algorithms.presence.chain_model import Filter, MarkovDecay, SemiMarkov, steps_of
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
 from fleet2d.algorithms.presence.model import HourOfWeek, LastSeen, LongTerm, Model
@@ -107,9 +107,9 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
 
     model = MarkovDecay()
     track = followed(model, bins_of(Evidence(0, 1, watched, seen)), 3, 1).track
-    transition = model.learner.chains[0].transition
+    steps = steps_of(model.learner.people[0].ways)
     for t in (4, 5, 20, 39):
-        power = np.linalg.matrix_power(transition, t - 4)[1]
+        power = np.linalg.matrix_power(steps, t - 4)[1]
         belief = np.append(track.home[t, 0] * (1 - track.away[t, 0]), track.away[t, 0])
         assert np.abs(belief - power).max() < 5e-3  # a false alarm is possible, too
     # Three rooms in view in vain: the filter knows that the user is out.
@@ -174,5 +174,6 @@ def test_what_was_learned_can_be_gone_on_from(cls: type[Model]) -> None:
     home, _ = other.observe(any_evidence(9).part(20, 21))
     assert np.abs(home.sum(axis=2) - 1).max() < 1e-9
     if cls in (MarkovDecay, Filter, SemiMarkov):
-        for mine, theirs in zip(one.learner.chains, other.learner.chains, strict=True):
-            assert np.array_equal(mine.transition, theirs.transition)
+        for mine, theirs in zip(one.learner.people, other.learner.people, strict=True):
+            for part, same in zip(mine.ways, theirs.ways, strict=True):
+                assert np.array_equal(part, same)

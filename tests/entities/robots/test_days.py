@@ -1,13 +1,19 @@
 """A day of each behavior in real homes, beside a person on a schedule."""
 
+import copy
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.entities.robots.robots import SHARE, events
+from tests.entities.robots.robots import (
+    SHARE,
+    assert_same_for_every_max_span,
+    events,
+    home_with,
+)
 from tests.homes import needs_jit
-from tests.scenes import path, run
+from tests.scenes import digests, path, run
 
 import fleet2d
 from fleet2d.kernels.mesh import strictly_inside
@@ -78,3 +84,59 @@ def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which:
     assert all(strictly_inside(plan.mesh, x, y) for x, y in some)
     inside = [space.part_at(x, y) >= 0 for x, y in some]
     assert np.mean(inside) > 0.8  # ways touch its corners
+
+
+def product() -> dict[str, Any]:
+    """All behaviors of robots at once, two people and a pet, a door that is shut for a while."""
+    agenda = [{"at": "07:20", "open": False}, {"at": "08:05", "open": True}]
+    content = home_with(
+        [
+            {"type": "dock", "threshold": "15 %", "until": "60 %"},
+            {"type": "scheduled", "visits": [{"at": "07:45", "place": "kitchen", "task": "sweep"}]},
+            {"type": "find", "user": "ben", "every": "25 min", "source": "rtp"},
+            {"type": "opportunistic", "users": ["ana"], "cooldown": "20 min", "again": "20 min"},
+            {"type": "follow", "user": "rex", "longest": "2 min", "cooldown": "30 min"},
+            {"type": "explore", "when": "07:00-09:00"},
+            {"type": "patrol", "dwell": "1 min", "when": "07:30-08:30"},
+            {"type": "dock", "threshold": "90 %", "when": "09:00-09:30"},
+            {"type": "hangout", "source": "ltp", "period": "5 min", "avoid": ["bedroom"]},
+        ],
+        "3 h",
+        {"type": "routine", "persona": "works_from_home"},
+        astro={
+            "gives_way": {},
+            "battery": {"driving": "1 h", "standing": "4 h", "charging": "1 h", "charger": [1, 3]},
+        },
+        algorithms={"ltp": {"type": "ltp", "period": "30 min"}, "rtp": {"type": "rtp"}},
+        objects={
+            "gate": {"type": "door", "doorway": "living_room_0-kitchen_0", "schedule": agenda}
+        },
+        metrics={"time_to_find": {}, "battery": {}, "co_presence": {}},
+    )
+    content["users"]["ben"] = {"type": "meander", "speed": 0.6}
+    content["users"]["rex"] = {"type": "pet", "radius": 0.12, "speed": 0.7}
+    return content
+
+
+def test_all_at_once_is_the_same_for_every_max_span_and_for_copies() -> None:
+    stored = assert_same_for_every_max_span(product(), 61, 7)
+    wanted = {
+        "docks", "charged", "visits", "find_begins", "found", "approaches", "interacts", "follows",
+        "explores", "explored", "gives_way", "relocates",
+    }  # fmt: skip
+    assert wanted <= {event for _, event, _ in events(stored)}
+    simulation = fleet2d.Simulation(product())
+    for steps in (1234, 3210, 3000):
+        simulation.advance(steps)
+        assert digests(stored) == digests(copy.deepcopy(simulation).run()), simulation.step
+
+
+def test_without_its_behaviors_a_robot_leaves_everybody_the_same_life() -> None:
+    with_it, without = run(product()), product()
+    without["robots"]["astro"]["behaviors"] = []
+    other, nobody = run(without), run({**without, "robots": {}, "metrics": {}, "algorithms": {}})
+    for user in ("ana", "ben", "rex"):
+        for column in ("x", "y", "heading", "away", "room"):
+            lives = [getattr(path(stored, user), column) for stored in (with_it, other, nobody)]
+            assert np.array_equal(lives[0], lives[1]), (user, column)
+            assert np.array_equal(lives[0], lives[2]), (user, column)

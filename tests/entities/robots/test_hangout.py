@@ -20,7 +20,7 @@ from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.robots.places import Places
+from fleet2d.entities.robots.places import Places, fading
 from fleet2d.errors import InputError
 
 pytestmark = needs_jit
@@ -36,6 +36,20 @@ def test_it_goes_where_people_are_believed_to_be(near: str) -> None:
     stored = assert_same_for_every_max_span(content, 61)
     assert "bathroom_0" == rooms(stored)[-1]
     assert names(stored)[-1] == "relocates"
+
+
+def test_nearness_by_path_fades_with_the_time_on_foot() -> None:
+    simulation = fleet2d.Simulation(home_with([hangout(near="path")], **told(kitchen_0=1)))
+    astro, places = simulation.actors["astro"], simulation.actors["astro"].behaviors[0].places  # type: ignore[attr-defined]
+    kitchen = simulation.home.plan.room("kitchen_0").index
+    near = places.nearness("path", 10.0)
+    cells = astro.space.cells(kitchen, astro.part)[:, ::-1] * 64 + 33
+    for place in range(0, len(places.points), 9):
+        metres = astro.space.distance_field(places.points[[place]])[tuple((cells // 64)[:, ::-1].T)]
+        seconds = metres.min() / 0.6
+        assert near[place, kitchen] == pytest.approx(np.exp(-seconds / 10), rel=1e-3)
+    x = np.linspace(0, 60, 500)
+    assert fading(x) == pytest.approx(np.exp(-x), rel=1e-4)
 
 
 def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
@@ -114,6 +128,19 @@ def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
     assert 1 == len(rooms(stored, 60))
     elsewhere = home_with([hangout(quiet="06:00-09:00")], "1 h", **told(bathroom_0=1))
     assert [] == names(run(elsewhere))
+
+
+def test_called_away_it_goes_back_to_its_place_without_thinking_anew() -> None:
+    visit = {
+        "type": "scheduled",
+        "visits": [{"at": "07:15", "place": "living_room", "dwell": "2 min"}],
+    }
+    content = home_with([visit, hangout(period="1 h")], "40 min", **told(bathroom_0=1))
+    stored = assert_same_for_every_max_span(content, 61)
+    assert ["relocates", "visits"] == names(stored)
+    poses = path(stored, "astro")
+    assert (poses.x[800], poses.y[800]) == (poses.x[-1], poses.y[-1])
+    assert (poses.x[960], poses.y[960]) != (poses.x[-1], poses.y[-1])
 
 
 def test_it_explores_all_rooms_with_equal_chances() -> None:

@@ -38,6 +38,7 @@ def content(duration: str = "3 h", **changes: Any) -> dict[str, Any]:
             "algorithms": {
                 "ltp": {"type": "ltp", "estimator": "likelihood"},
                 "rtp": {"type": "rtp"},
+                "minutely": {"type": "rtp", "period": "1 min"},
                 "last": {"type": "rtp", "model": "last_seen"},
                 "share": {"type": "ltp", "estimator": "sighting_share"},
             },
@@ -47,6 +48,7 @@ def content(duration: str = "3 h", **changes: Any) -> dict[str, Any]:
                 "with_away": {"type": "ltp_error", "of": "ltp", "given": "away", "period": "1 h"},
                 "score": {"type": "rtp_score", "of": "rtp"},
                 "naive": {"type": "rtp_score", "of": "last"},
+                "each": {"type": "rtp_score", "of": "minutely", "period": "1 min"},
                 "at_home": {"type": "rtp_score", "of": "rtp", "given_home": True},
                 "beside": {"type": "rtp_score", "of": "rtp", "reference": "last"},
             },
@@ -135,12 +137,15 @@ def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> N
     for name in ("log_loss", "brier", "top_1"):
         assert rows[name].sum() / 180 == pytest.approx(result["all"][name])
     # At the end of a period the track is what was put out.
-    total = 0.0
-    for end in range(299, 10800, 300):
-        found = estimate(stored, "rtp", user, end)
+    total, right = 0.0, 0.0
+    for end in range(59, 10800, 60):
+        found = estimate(stored, "minutely", user, end)
         p = {room: found[room] * (1 - found["away"]) for room in ROOMS} | {"away": found["away"]}
         total -= math.log(max(p[lived[end]], 1e-6))
-    assert total / 36 == pytest.approx(result["all"]["log_loss"], rel=0.25)
+        right += p[lived[end]] == max(p.values())
+    found = stored.metrics["each"][user]["all"]
+    assert total / 180 == pytest.approx(found["log_loss"])
+    assert right / 180 == pytest.approx(found["top_1"])
 
 
 def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:

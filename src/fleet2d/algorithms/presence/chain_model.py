@@ -2,28 +2,51 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.belief import Presence, Track
-from fleet2d.algorithms.presence.chain import (
-    Chain,
-    Sensor,
-    likelihood,
-    unknown_seen,
-    with_anyone,
-)
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, normalized
-from fleet2d.algorithms.presence.likelihood import Likelihood
+from fleet2d.algorithms.presence.likelihood import Likelihood, by_day
 from fleet2d.algorithms.presence.model import Model
+from fleet2d.algorithms.presence.person import Person, stretches_of
 from fleet2d.component import register
-from fleet2d.kernels.presence import advance, forward
+from fleet2d.kernels.presence import advance
+from fleet2d.kernels.stays import Ways, follow
 from fleet2d.units import Share
 
+I64 = NDArray[np.int64]
+
 FARTHEST = 10_080  # bins ahead, beyond which a forecast stays as it is
+
+
+class Stage(NamedTuple):
+    """Where somebody is now, and how that goes on.
+
+    Attributes:
+        now: float64 (nodes,), probability of each stage of each place, away last.
+        steps: float64 (nodes, nodes), from bin to bin, rows sum to one.
+        stages: Of a stay.
+    """
+
+    now: F64
+    steps: F64
+    stages: int
+
+    @property
+    def places(self) -> F64:
+        """The probability of each place: float64 (1, rooms + 1)."""
+        found: F64 = self.now.reshape(1, -1, self.stages).sum(axis=2)
+        return found
+
+    def after(self, bins: int) -> "Stage":
+        """Return where somebody is some bins later, without evidence."""
+        return self._replace(now=advance(self.now, self.steps, bins))
 
 
 class ChainPresence(Presence):
@@ -32,24 +55,23 @@ class ChainPresence(Presence):
     def __init__(
         self,
         users: Sequence[str],
-        chains: Sequence[tuple[Chain, F64]],
+        people: Sequence[Stage],
         time: datetime,
         bin_us: int,
         track: Track | None = None,
     ) -> None:
-        """Keep where the chains are.
+        """Keep where people are.
 
         Args:
-            users: Names of the users; without any there is one chain, of anyone.
-            chains: Each with the probability of its states.
+            users: Names of the users.
+            people: Each user; without any there is one person, of anyone.
             time: The local time it is of.
             bin_us: Length of a bin [us].
             track: What was believed on the way here; its end is taken for now.
         """
-        self._chains, self._bin_us = tuple(chains), bin_us
+        self._people, self._bin_us = tuple(people), bin_us
         if track is None:
-            places = [chain.places(states[np.newaxis]) for chain, states in chains]
-            home, away = split(rows(places, len(users), None))
+            home, away = split([person.places for person in people], len(users), None)
         else:
             home, away = track.home, track.away
         super().__init__(users, home[-1], away[-1], time, track=track)
@@ -59,21 +81,70 @@ class ChainPresence(Presence):
         bins = min((time - self.time) // timedelta(microseconds=self._bin_us), FARTHEST)
         if bins <= 0:
             return self
-        ahead = [(chain, advance(now, chain.transition, bins)) for chain, now in self._chains]
+        ahead = [person.after(bins) for person in self._people]
         return ChainPresence(self.users, ahead, time, self._bin_us)
 
 
-def rows(places: list[F64], users: int, bins: Bins | None) -> F64:
-    """Return everybody's places, anyone's last: float64 (bins, users + 1, rooms + 1)."""
-    if not users:
-        return places[0][:, np.newaxis]
-    unknown = np.zeros((len(places[0]), places[0].shape[1] - 1), bool)
-    return with_anyone(places, unknown if bins is None else unknown_seen(bins))
+def split(places: list[F64], users: int, bins: Bins | None) -> tuple[F64, F64]:
+    """Return everybody's places, anyone's last, as shares of rooms given at home, and of away.
 
-
-def split(everybody: F64) -> tuple[F64, F64]:
-    """Return places as shares of rooms given at home, and of away."""
+    Args:
+        places: Each person's, float64 (bins, rooms + 1).
+        users: How many users there are; without any there is one person, of anyone.
+        bins: The evidence, which tells of unknown people; None: nobody unknown was seen.
+    """
+    everybody = places[0][:, np.newaxis]
+    if users:
+        nobody = np.zeros((len(places[0]), places[0].shape[1] - 1), bool)
+        everybody = with_anyone(places, nobody if bins is None else unknown_seen(bins))
     return normalized(np.maximum(everybody[..., :-1], 0)), np.clip(everybody[..., -1], 0, 1)
+
+
+class Follower:
+    """Follows one person bin by bin.
+
+    Attributes:
+        now: float64 (2, stages, patches), the probability of each patch, in view and not.
+        shown: int64 (patches,), what part of each patch is in view.
+    """
+
+    def __init__(self, person: Person) -> None:
+        """Begin without knowing anything."""
+        anywhere = person.layout.anywhere
+        self.now = np.stack([np.zeros_like(anywhere), anywhere])
+        self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
+
+    def follow(self, person: Person, bins: Bins, user: int, *, negative: bool) -> F64:
+        """Return P(room | evidence up to each bin): float64 (bins, rooms + 1).
+
+        Args:
+            person: Who, with what was learned so far.
+            bins: The evidence.
+            user: The person's row in it.
+            negative: Whether that somebody wasn't perceived tells anything.
+        """
+        stretches = stretches_of(bins, user, 1)
+        if not negative:
+            stretches = stretches._replace(shown=np.zeros_like(stretches.shown))
+        return follow(person.ways, stretches, self.now, self.shown)
+
+    def stage(self, person: Person) -> Stage:
+        """Return where the person is, without patches."""
+        stages = person.layout.stages
+        nodes = person.layout.room[:, np.newaxis] * stages + np.arange(stages)
+        mass = np.bincount(nodes.ravel(), (self.now[0] + self.now[1]).T.ravel())
+        return Stage(mass.astype(np.float64), steps_of(person.ways), stages)
+
+
+def steps_of(ways: Ways) -> F64:
+    """Return how stages follow each other from bin to bin without evidence: (nodes, nodes)."""
+    nodes, places = len(ways.stay), ways.follow.shape[1] - 1
+    stages = nodes // places
+    steps, leave = np.diag(ways.stay), (1 - ways.stay)[:, np.newaxis] * ways.follow
+    steps[:, ::stages] += leave[:, :places]
+    passed = np.arange(nodes)[np.arange(nodes) % stages < stages - 1]
+    steps[passed, passed + 1] += leave[passed, places]
+    return steps
 
 
 @register("presence_model", "hmm")
@@ -81,47 +152,54 @@ class Filter(Model):
     """The filter of a hidden Markov model: P(room now | all evidence so far).
 
     From bin to bin what is believed goes on by the transitions, and is weighed by the evidence:
-    rooms watched in vain lose (negative information). Transitions are learned on the way as by the
-    `likelihood` estimator, whose keys these are.
+    patches of rooms that are watched in vain lose (negative information). What a person is, how
+    evidence is explained, and how it is learned after each day says the `likelihood` estimator,
+    whose keys these are.
 
     Right where stays are about geometric in length. Breaks when routines differ by time of day.
     """
 
     detection: Share = Field(
-        default=0.95, description="chance a bin that somebody in view is perceived", gt=0, lt=1
+        default=0.95, description="chance that somebody in view is perceived", gt=0, lt=1
     )
     restless: Share = Field(
-        default=0.05, description="chance a bin that somebody changes place within a room"
-    )
-    views: int = Field(
-        default=30, ge=1, description="independent views of a room in a bin in which a robot moves"
+        default=0.05,
+        description="chance a bin that who stays in a room changes patch, before it is learned",
     )
     stages: ClassVar[int] = 1
+    negative: ClassVar[bool] = True
 
     def begin(self, rooms: int, users: int, day: int) -> None:
         """Prepare for a run."""
         super().begin(rooms, users, day)
         self.day = day
         self.learner = Likelihood(
-            detection=self.detection,
-            restless=self.restless,
-            views=self.views,
-            stages=self.stages,
+            detection=self.detection, restless=self.restless, stages=self.stages
         )
         self.learner.begin(rooms, users)
+        self.followers: list[Follower] = []
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
         """Return the filtered belief after each bin."""
-        self.learner.observe(bins)
-        return split(self.learner.track)
+        found = [self._observe_day(day) for day in by_day(bins)]
+        home, away = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return home, away
+
+    def _observe_day(self, bins: Bins) -> tuple[F64, F64]:
+        self.learner.take_in(bins)
+        people = self.learner.people
+        self.followers = self.followers or [Follower(person) for person in people]
+        places = [
+            follower.follow(person, bins, user, negative=self.negative)
+            for user, (person, follower) in enumerate(zip(people, self.followers, strict=True))
+        ]
+        return split(places, self.users, bins)
 
     def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
         """Return what is believed now, and by `at` the forecast."""
-        return ChainPresence(users, self.states(), time, bin_us, track)
-
-    def states(self) -> list[tuple[Chain, F64]]:
-        """Return each chain as it is now, which doesn't change, and the probability of states."""
-        return [(chain.frozen(), chain.now) for chain in self.learner.chains]
+        pairs = zip(self.learner.people, self.followers, strict=True)
+        now = [follower.stage(person) for person, follower in pairs]
+        return ChainPresence(users, now, time, bin_us, track)
 
     def remember(self) -> dict[str, Any]:
         """Return all that was learned, as arrays in mappings."""
@@ -152,25 +230,4 @@ class MarkovDecay(Filter):
     first sighting it is what the transitions lead to from anywhere.
     """
 
-    def begin(self, rooms: int, users: int, day: int) -> None:
-        """Prepare for a run."""
-        super().begin(rooms, users, day)
-        self.now = [chain.now for chain in self.learner.chains]
-
-    def observe(self, bins: Bins) -> tuple[F64, F64]:
-        """Return the decayed belief after each bin."""
-        places = []
-        sensor = Sensor(self.detection, self.restless, self.views, negative=False)
-        for user, chain in enumerate(self.learner.chains):
-            likely = likelihood(bins, user, None, sensor)
-            found = forward(chain.transition, self.now[user], likely, np.empty(len(likely)))
-            self.now[user] = found[-1].copy() if len(found) else self.now[user]
-            places.append(found)
-        self.learner.observe(bins)
-        return split(rows(places, self.users, bins))
-
-    def states(self) -> list[tuple[Chain, F64]]:
-        """Return each chain as it is now, which doesn't change, and the probability of states."""
-        return [
-            (chain.frozen(), now) for chain, now in zip(self.learner.chains, self.now, strict=True)
-        ]
+    negative: ClassVar[bool] = False

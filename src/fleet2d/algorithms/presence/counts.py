@@ -1,12 +1,13 @@
 """Sums of evidence by day and by hour of the week, of which older days may count less."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.evidence import Evidence, Parts
 from fleet2d.algorithms.presence.belief import HOURS
 
 F64 = NDArray[np.float64]
@@ -26,6 +27,7 @@ class Bins(NamedTuple):
         bin_steps: Steps of a bin.
         watched: float64 (bins, rooms), as in Evidence.
         seen: int64 (bins, users + 1, rooms), as in Evidence.
+        by_patch: The same by patches of rooms, as in Evidence.
     """
 
     day: I64
@@ -33,6 +35,16 @@ class Bins(NamedTuple):
     bin_steps: int
     watched: F64
     seen: I64
+    by_patch: Parts | None = None
+
+    @property
+    def parts(self) -> Parts:
+        """The same by patches of rooms, or by rooms if they aren't told apart."""
+        if self.by_patch is not None:
+            return self.by_patch
+        rooms = self.watched.shape[1]
+        whole = np.arange(rooms, dtype=np.int64), np.ones(rooms, np.int64)
+        return Parts(*whole, self.watched, self.watched, self.seen)
 
     def part(self, begin: int, end: int) -> "Bins":
         """Return the bins from `begin` to `end` - 1."""
@@ -43,6 +55,7 @@ class Bins(NamedTuple):
             self.bin_steps,
             self.watched[here],
             self.seen[here],
+            _part(self.by_patch, here),
         )
 
 
@@ -64,6 +77,36 @@ def in_time(evidence: Evidence, start: datetime, step_us: int) -> Bins:
         evidence.bin_steps,
         evidence.watched,
         evidence.seen,
+        evidence.parts,
+    )
+
+
+def _part(parts: Parts | None, here: slice) -> Parts | None:
+    """Return some bins of the evidence by patches."""
+    if parts is None:
+        return None
+    return parts._replace(
+        watched=parts.watched[here], shown=parts.shown[here], seen=parts.seen[here]
+    )
+
+
+def joined(parts: Sequence[Bins]) -> Bins:
+    """Return bins that follow each other as one."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    return Bins(
+        np.concatenate([part.day for part in parts]),
+        np.concatenate([part.minute for part in parts]),
+        first.bin_steps,
+        np.concatenate([part.watched for part in parts]),
+        np.concatenate([part.seen for part in parts]),
+        first.by_patch
+        and first.by_patch._replace(
+            watched=np.concatenate([part.parts.watched for part in parts]),
+            shown=np.concatenate([part.parts.shown for part in parts]),
+            seen=np.concatenate([part.parts.seen for part in parts]),
+        ),
     )
 
 
@@ -129,13 +172,16 @@ class DayCounts:
         self.today = day
         self.hours = np.zeros((24, *self.shape))
 
-    def replace(self, hours: F64) -> None:
-        """Put other sums in place of those of the days that are over: (days, 24, *shape)."""
-        days = [*self.days, self.today]
-        self.days, self.by_day = [], np.zeros((0, *self.shape))
-        self.week, self.over = np.zeros((HOURS, *self.shape)), np.zeros(self.shape)
-        for i, part in enumerate(hours):
-            self._end(days[i], part, days[i + 1])
+    def put(self, day: int, old: F64, new: F64) -> None:
+        """Put other sums of the hours of a day in place of those it had: (24, *shape) each."""
+        change = new - old
+        if day == self.today:
+            self.hours = self.hours + change
+            return
+        weight, monday = self.faded(self.today - day), (day - 1) % 7 * 24
+        self.by_day[self.days.index(day)] += change.sum(axis=0)
+        self.over = self.over + weight * change.sum(axis=0)
+        self.week[monday : monday + 24] += weight * change
 
     def _end(self, day: int, hours: F64, following: int) -> None:
         self.days.append(day)

@@ -7,13 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import F64, normalized
-from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
+from fleet2d.algorithms.presence.estimator import F64, Estimator, normalized
+from fleet2d.algorithms.presence.exposure_ratio import counted, ratios
 from fleet2d.algorithms.presence.logarithm import natural_log
 from fleet2d.component import register
+from fleet2d.units import Share
 
 WEEK = 10_080  # minutes
 PERIODS = 100  # candidates: a week by 1, 2 … 100
@@ -30,7 +32,7 @@ def _cosines() -> F64:
 
 
 @register("presence_estimator", "fremen")
-class Fremen(ExposureRatio):
+class Fremen(Estimator):
     """Frequency map enhancement (Krajnik et al.), one model for each user and room.
 
     A bin is a sample of the room's state s with the weight w, the share of the room in view; s is
@@ -38,7 +40,7 @@ class Fremen(ExposureRatio):
     that of s by n, and candidate periods T_i = 7 d / i, i = 1 … 100, the sums of (s - p0 w)
     e^(j 2 pi t / T_i) have amplitude A_i = |sum| / n and phase phi_i; A_i counts only once the data
     span 1.5 T_i. Then p(t) = p0 + sum over the m largest of 2 A_i cos(2 pi t / T_i - phi_i),
-    clipped to 0 … 1; m = 0 is the static model, the exposure ratio. Where rooms are in view as a
+    clipped to 0 … 1; m = 0 is the static model, sightings by exposure. Where rooms are in view as a
     whole or not at all, that is the method as published.
 
     The order m, 0 to 4, is that with the least log loss of late: each day's samples are forecast
@@ -52,6 +54,23 @@ class Fremen(ExposureRatio):
     """
 
     has_interval: ClassVar[bool] = False
+
+    detection: Share = Field(
+        default=0.95, description="chance that somebody in view is perceived", gt=0
+    )
+
+    def width(self, rooms: int) -> int:
+        """Return how many numbers `sums` has: seen and watched of each room, and bins."""
+        return 2 * rooms + 1
+
+    def sums(self, bins: Bins) -> F64:
+        """Count seen and watched, in bins."""
+        return counted(bins.seen, bins.watched, np.ones(len(bins.day), bool), bins.bin_steps)
+
+    def shares(self, sums: F64) -> tuple[F64, F64]:
+        """Return what the static models say."""
+        rate, away = ratios(sums, self.detection)
+        return normalized(rate), away
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run."""

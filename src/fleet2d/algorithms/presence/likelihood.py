@@ -1,211 +1,220 @@
-"""Full likelihood: rooms as a hidden Markov chain, of which empty views are evidence, too."""
+"""Full likelihood: stays as a hidden chain, of which empty views are evidence, too."""
 
 from collections.abc import Mapping
+from itertools import pairwise
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from fleet2d.algorithms.presence.chain import (
-    Chain,
-    Sensor,
-    likelihood,
-    unknown_seen,
-    with_anyone,
-)
-from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import F64, Estimator, normalized
+from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
+from fleet2d.algorithms.presence.counts import Bins, joined
+from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
+from fleet2d.algorithms.presence.person import Habits, Layout, Person, stretches_of
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.units import Share
 
-# Days over after which all of them are gone through again.
-REFITS = (1, 2, 4, 8, 16, 32, 64)
-ROUNDS = 4  # of expectation and maximization in each
+# Earlier days that are gone through again when a day is over, in turn; and how many are kept.
+REVISITS = 2
+KEPT = 64
 
 
 @register("presence_estimator", "likelihood", aliases=("hmm",))
 class Likelihood(Estimator):
-    """Expected share of time per room given all that was and wasn't seen, in a hidden Markov model.
+    """Expected share of time per room given all that was and wasn't seen, in a hidden chain.
 
-    Each user is a chain that is in one room, or away, in each bin, and goes on by transition
-    probabilities that are learned. A bin's evidence is explained by a room the better, the more
-    the user was seen there, and the worse, the more of it was watched in vain
-    (`fleet2d.algorithms.presence.chain`). Shares are the means of P(room | all evidence), by
-    smoothing; transitions maximize the posterior by expectation and maximization (Baum and Welch),
-    with one stay's worth of a prior.
+    Each user is in one patch of one room, or away (`fleet2d.algorithms.patches`). A stay in a room
+    lasts a number of bins that is geometric, or with several `stages` a sum of such (a Coxian
+    distribution: a hidden semi-Markov model), and is followed by one in another room; who stays
+    changes patch at times. Who comes to a patch is in its part that is in view with the chance of
+    `shown`, the largest share of it in view at once in the bin, and is so until moving, or until
+    what is in view changes: who sits behind a corner stays there, however long the robot looks.
+    Evidence is explained
 
-    Within a day, each update smooths its own bins; at midnight the day is smoothed as a whole and
-    its expected steps are added (incremental EM after Neal and Hinton). After 1, 2, 4, 8 … 64 days
-    all days are gone through again, four times.
+    - if the user was perceived: by a patch with the share of sightings in it; by anything else,
+      as somebody else was taken for the user, with 0.001 of what follows;
+    - if not: by who is in view with 1 - detection, by who isn't with 1. A patch in which somebody
+      unknown was perceived, who may be the user, isn't in view.
+
+    Consecutive bins of an hour in which the same was in view and perceived are taken `together`;
+    what happens within them is taken to happen as they begin, once. With 1 it is exact, and takes
+    as much longer.
+
+    Shares are the means of P(room | all evidence), by smoothing. Lengths of stay, what follows
+    what, who comes to which patch and changes it how often are learned by expectation and
+    maximization with one event each beforehand (`fleet2d.algorithms.presence.person`). When a day
+    is over it is smoothed as a whole, and so are two of the last 64 days, in turn, with messages
+    from and to the days beside them (incremental, after Neal and Hinton 1998); the day under way
+    is only filtered.
 
     Right when the robot acts on what it has perceived only (then where it looks can be ignored:
-    missing at random, Rubin 1976) and sometimes looks everywhere. Breaks when the model is wrong:
-    stays that differ much by time of day, people who follow each other, rooms never watched (there
-    the prior speaks), users who are hardly ever recognized.
+    missing at random, Rubin 1976) and looks at every patch at times. Breaks when the model is
+    wrong: stays that differ much by time of day, people who follow each other, patches never
+    looked at (there the prior speaks: such time is mostly taken for away), users who are hardly
+    ever recognized.
 
     Anyone is taken from all users, apart from each other, and unknown people where seen; without
     users it is one person's chain.
     """
 
     detection: Share = Field(
-        default=0.95, description="chance a bin that somebody in view is perceived", gt=0, lt=1
+        default=0.95, description="chance that somebody in view is perceived", gt=0, lt=1
     )
     restless: Share = Field(
-        default=0.05, description="chance a bin that somebody changes place within a room"
-    )
-    views: int = Field(
-        default=30, ge=1, description="independent views of a room in a bin in which a robot moves"
+        default=0.05,
+        description="chance a bin that who stays in a room changes patch, before it is learned",
     )
     stages: int = Field(
         default=1, ge=1, le=4, description="of a stay; above 1 its length isn't geometric"
+    )
+    together: int = Field(
+        default=5,
+        ge=1,
+        le=60,
+        description="most bins, alike in what was in view and seen, that are taken together",
     )
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run."""
         super().begin(rooms, users, half_life)
-        self.sensor = Sensor(self.detection, self.restless, self.views)
-        self.chains = [Chain(rooms, self.stages) for _ in range(max(users, 1))]
-        self.before: tuple[F64, NDArray[np.int64]] | None = None
-        self.dawn: tuple[F64, NDArray[np.int64]] | None = None
+        self.people: list[Person] = []
+        self.learned: Mapping[str, Any] = {}
         self.parts: list[Bins] = []  # of the day under way
-        self.memory: list[Bins] | None = []  # the days that are over, until the last refit
-        self.track = np.zeros((0, users + 1, rooms + 1))
+        self.days: list[Bins] = []  # those that are gone through again, without their views
+        self.hours: list[F64] = []  # their sums by hour
+        self.turn = 0  # of the day gone through last
 
     def width(self, rooms: int) -> int:
-        """Return how many numbers `sums` has: bins in each room, away, and all."""
-        return rooms + 2
+        """Return how many numbers `sums` has: of rooms and away bins and their doubt, and all."""
+        return 2 * (rooms + 1) + 1
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return expected bins per room by all at home, and those away by all."""
-        bins = sums[..., -1]
-        away = np.where(bins > 0, sums[..., -2] / np.where(bins > 0, bins, 1), 0.0)
-        return normalized(np.maximum(sums[..., :-2], 0)), np.clip(away, 0, 1)
+        rooms, bins = (sums.shape[-1] - 3) // 2, sums[..., -1]
+        away = np.where(bins > 0, sums[..., rooms] / np.where(bins > 0, bins, 1), 0.0)
+        return normalized(np.maximum(sums[..., :rooms], 0)), np.clip(away, 0, 1)
+
+    def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
+        """Return the ends of intervals for the shares of time in each room of the time so far.
+
+        What is in doubt is the time in which nobody saw the user: with p = P(room | all evidence)
+        of each bin, the number of bins in a room has the variance 2 l sum p (1 - p), where l is how
+        long a stay there lasts on average, because bins of a stay depend on each other. That is
+        doubled, for what isn't known of the stays themselves, and the ends are those of a normal
+        distribution; below the share of one bin, the lower end is 0. Of fewer than two whole days
+        little is known: 0 and 1.
+
+        Args:
+            key: Of the stream of draws, which it has no need of.
+            level: How often the interval should hold the truth, as 0.9.
+
+        Returns:
+            Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
+        """
+        shape = (self.users + 1, self.rooms + 1)
+        if len(self.counts.days) < FEWEST_DAYS:
+            return np.zeros(shape), np.ones(shape)
+        total, lengths = self.counts.total, [person.length_of_stay for person in self.people]
+        anyone = [np.max(lengths, axis=0)] if self.users else []
+        doubt = np.maximum(total[:, self.rooms + 1 : -1], 0) * np.array(lengths + anyone)
+        at_home = np.maximum(total[:, : self.rooms].sum(axis=1, keepdims=True), 1)
+        of = np.concatenate([np.repeat(at_home, self.rooms, axis=1), total[:, -1:]], axis=1)
+        home, away = self.shares(total)
+        share = np.concatenate([home, away[:, None]], axis=1)
+        # Rounded to where no library disagrees.
+        quantile = round(NormalDist().inv_cdf((1 + level) / 2), 6)
+        half = quantile * np.sqrt(4 * doubt) / of
+        low = np.where(share - half < 1 / of, 0.0, share - half)
+        return low, np.minimum(share + half, 1)
 
     def observe(self, bins: Bins) -> None:
-        """Take in evidence that follows on that before.
+        """Take in evidence that follows on that before."""
+        for day in by_day(bins):
+            self.take_in(day)
+            places = [
+                person.follow(stretches_of(day, user, self.together))
+                for user, person in enumerate(self.people)
+            ]
+            self.counts.add(day.day, day.minute, self._values(places, day))
 
-        `track` is then what was believed after each of its bins: float64 (bins, users + 1,
-        rooms + 1), away last.
-        """
-        track = [np.zeros((0, self.users + 1, self.rooms + 1))]
-        ends = [*(np.flatnonzero(np.diff(bins.day)) + 1).tolist(), len(bins.day)]
-        begin = 0
-        for end in ends:
-            if begin < end:
-                track.append(self._observe_day(bins.part(begin, end)))
-            begin = end
-        self.track = np.concatenate(track)
-
-    def _observe_day(self, bins: Bins) -> F64:
+    def take_in(self, bins: Bins) -> None:
+        """Take in evidence of one day, from which is learned when the next has begun."""
+        if not self.people:
+            self._meet(bins)
         day = int(bins.day[0])
         if day != self.counts.today:
             if self.parts:
                 self._end_day(day)
             self.counts.begin_day(day)
-            self.dawn = self.before
-            for chain in self.chains:
-                chain.dawn = chain.now
-        weight = np.ones(len(bins.day))
-        smoothed, filtered = [], []
-        for user, chain in enumerate(self.chains):
-            likely = likelihood(bins, user, self.before, self.sensor)
-            # Expected steps are counted when the day is over.
-            places, states = chain.smooth(likely, chain.now, weight, np.zeros_like(chain.prior))
-            chain.now = states[-1].copy()
-            smoothed.append(places)
-            filtered.append(chain.places(states))
-        self.counts.add(bins.day, bins.minute, self._values(smoothed, bins))
-        self.before = bins.watched[-1], bins.seen[-1]
         self.parts.append(bins)
-        return self._rows(filtered, bins)
 
-    def _rows(self, chains: list[F64], bins: Bins) -> F64:
-        return with_anyone(chains, unknown_seen(bins)) if self.users else chains[0][:, None]
+    def _meet(self, bins: Bins) -> None:
+        layout, habits = Layout.of(bins, self.stages), Habits(self.detection, self.restless)
+        self.people = [Person(layout, habits) for _ in range(max(self.users, 1))]
+        for i, person in enumerate(self.people):
+            if self.learned and not person.recall(self.learned.get(str(i), {})):
+                raise ComponentError(
+                    f"what was learned doesn't tell of stays of {self.stages} stages in"
+                    f" {len(layout.room) - 1} patches of {self.rooms} rooms: it is from another"
+                    " home, other users, another estimator, or one with other stages"
+                )
 
-    def _values(self, chains: list[F64], bins: Bins) -> F64:
-        rows = self._rows(chains, bins)
-        return np.concatenate([rows, np.ones((*rows.shape[:2], 1))], axis=2)
+    def _values(self, places: list[F64], bins: Bins) -> F64:
+        """Return what adds up: places p, p (1 - p), and 1: float64 (bins, users + 1, width)."""
+        rows = with_anyone(places, unknown_seen(bins)) if self.users else places[0][:, None]
+        return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
 
     def _end_day(self, following: int) -> None:
-        """Smooth the day under way as a whole, learn from it, and at times from all days."""
-        day, self.parts = joined(self.parts), []
-        smoothed = []
-        for user, chain in enumerate(self.chains):
-            pairs = np.zeros_like(chain.prior)
-            likely = likelihood(day, user, self.dawn, self.sensor)
-            smoothed.append(chain.smooth(likely, chain.dawn, np.ones(len(likely)), pairs)[0])
-            chain.pairs = (chain.pairs + pairs) * self.counts.faded(following - self.counts.today)
-            chain.learn()
-        self.counts.hours = by_hour(day, self._values(smoothed, day))[0]
-        if self.memory is None:
-            return
-        self.memory.append(day)
-        if len(self.memory) in REFITS:
-            self._refit(self.memory)
-        if len(self.memory) == REFITS[-1]:
-            self.memory = None
+        """Smooth the day under way as a whole, learn from it, and go through earlier ones again."""
+        bins, self.parts = joined(self.parts), []
+        places = [
+            person.end_day(stretches_of(bins, user, self.together))
+            for user, person in enumerate(self.people)
+        ]
+        self.counts.hours = by_hour(bins, self._values(places, bins))
+        self.hours.append(self.counts.hours)
+        self.days.append(bins._replace(by_patch=None))
+        for _ in range(REVISITS):
+            self.turn = (self.turn - 1) % len(self.days)
+            self._revisit(self.turn)
+        fade = self.counts.faded(following - self.counts.today)
+        for person in self.people:
+            person.fade(fade)
+            person.forget(KEPT)
+        del self.days[:-KEPT], self.hours[:-KEPT]
 
-    def _refit(self, memory: list[Bins]) -> None:
-        """Go through all days again, until transitions hardly change."""
-        bins, today = joined(memory), self.counts.today
-        days, index = np.unique(bins.day, return_inverse=True)
-        weight = np.array([self.counts.faded(today - day) for day in days.tolist()])[index]
-        smoothed = []
-        for user, chain in enumerate(self.chains):
-            likely = likelihood(bins, user, None, self.sensor)
-            start = np.full(len(chain.prior), 1 / len(chain.prior))
-            for _ in range(ROUNDS):
-                pairs = np.zeros_like(chain.prior)
-                places, states = chain.smooth(likely, start, weight, pairs)
-                chain.pairs = pairs
-                chain.learn()
-            smoothed.append(places)
-            chain.now = states[-1].copy()
-        hours = by_hour(bins, self._values(smoothed, bins))
-        self.counts.hours = hours[-1]
-        self.counts.replace(hours[:-1])
+    def _revisit(self, number: int) -> None:
+        """Go through a day again, and put what it says now in place of what it said."""
+        bins, today = self.days[number], self.counts.today
+        weight = self.counts.faded(today - int(bins.day[0]))
+        places = [person.revisit(number, weight) for person in self.people]
+        hours = by_hour(bins, self._values(places, bins))
+        self.counts.put(int(bins.day[0]), self.hours[number], hours)
+        self.hours[number] = hours
 
     def remember(self) -> dict[str, Any]:
         """Return all that was learned, as arrays in mappings."""
-        chains = {
-            str(i): {"transition": chain.transition, "pairs": chain.pairs}
-            for i, chain in enumerate(self.chains)
-        }
-        return {**super().remember(), "chains": chains}
+        stays = {str(i): person.remember() for i, person in enumerate(self.people)}
+        return {**super().remember(), "stays": stays or self.learned}
 
     def recall(self, learned: Mapping[str, Any], today: int) -> None:
         """Go on from what `remember` returned; called after `begin`."""
         super().recall(learned, today)
-        for i, chain in enumerate(self.chains):
-            found = learned.get("chains", {}).get(str(i), {})
-            if np.shape(found.get("transition")) != chain.prior.shape:
-                raise ComponentError(
-                    f"what was learned has no transitions between {len(chain.prior)} states: it is"
-                    " from another estimator, or one with other stages"
-                )
-            chain.transition = np.array(found["transition"], np.float64)
-            chain.pairs = np.array(found["pairs"], np.float64)
-        self.memory = None
+        self.learned = learned.get("stays", {})
 
 
-def joined(parts: list[Bins]) -> Bins:
-    """Return bins that follow each other as one."""
-    return Bins(
-        np.concatenate([part.day for part in parts]),
-        np.concatenate([part.minute for part in parts]),
-        parts[0].bin_steps,
-        np.concatenate([part.watched for part in parts]),
-        np.concatenate([part.seen for part in parts]),
-    )
+def by_day(bins: Bins) -> list[Bins]:
+    """Return evidence as that of its days."""
+    ends = [*(np.flatnonzero(np.diff(bins.day)) + 1).tolist(), len(bins.day)]
+    return [bins.part(a, b) for a, b in pairwise([0, *ends]) if a < b]
 
 
 def by_hour(bins: Bins, values: F64) -> F64:
-    """Sum the values of bins by day and hour: float64 (days, 24, *)."""
-    days = np.unique(bins.day)
-    slot = np.searchsorted(days, bins.day) * 24 + bins.minute // 60
-    first = np.concatenate([[0], np.flatnonzero(np.diff(slot)) + 1])
-    sums = np.zeros((len(days) * 24, *values.shape[1:]))
-    sums[slot[first]] = np.add.reduceat(values, first, axis=0)
-    return sums.reshape(len(days), 24, *values.shape[1:])
+    """Sum the values of the bins of a day by hour: float64 (24, *)."""
+    hour = bins.minute // 60
+    first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
+    sums = np.zeros((24, *values.shape[1:]))
+    sums[hour[first]] = np.add.reduceat(values, first, axis=0)
+    return sums

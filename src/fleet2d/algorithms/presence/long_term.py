@@ -93,14 +93,17 @@ class LongTermPresence(Algorithm):
         self.begun, self.until = True, -1
 
     def _with_interval(self, presence: Presence, state: Present) -> Presence:
-        """Add the interval, which changes when a day is over."""
+        """Add the interval, which changes when a day is over, and always holds the estimate."""
         assert self.interval is not None
         if self.until != self.estimator.counts.today:
             self.until = self.estimator.counts.today
             key = stream_key(state.seed, state.path, f"days until {self.until}")
             self.ends = self.estimator.interval(np.uint64(key), self.interval)
+        assert self.ends is not None
         home, away = presence.arrays
-        return Presence(presence.users, home, away, presence.time, self.ends)
+        share = np.concatenate([home, away[:, np.newaxis]], axis=1)
+        ends = np.minimum(self.ends[0], share), np.maximum(self.ends[1], share)
+        return Presence(presence.users, home, away, presence.time, ends)
 
     def remember(self) -> dict[str, Any]:
         """Return what was learned, to start another run from."""

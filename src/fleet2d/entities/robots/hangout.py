@@ -62,7 +62,8 @@ class Hangout(Behavior):
         description="what counts as near: the same room; a view of its seats; or time on foot",
     )
     tau: PositiveDuration = Field(
-        default=timedelta(seconds=10), description="time on foot at which nearness is one half"
+        default=timedelta(seconds=10),
+        description="time on foot at which nearness by `path` has fallen to 1/e",
     )
     blocking: float = Field(default=1.0, ge=0, description="weight of ways that it stands in")
     personal_space: float = Field(default=0.5, ge=0, description="weight of seats that it is near")

@@ -56,7 +56,7 @@ class Places:
         """Return how near each place is to who is in each room: float64 (n, rooms), 0 to 1.
 
         `room`: 1 in the same room. `view`: the share of the room's seats in range and in sight.
-        `path`: tau / (tau + t), with t the seconds on foot to the nearest point of the room.
+        `path`: exp(-t / tau), with t the seconds on foot to the nearest point of the room.
         """
         rooms = self._actor.home.rooms
         if by == "path":
@@ -120,8 +120,7 @@ class Places:
         field = actor.space.distance_field(cells[:, ::-1] * SUB + CELL_CENTRE)
         metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
         seconds = metres * lattice.units_per_m / actor.speed
-        near: F64 = np.where(np.isfinite(seconds), tau / (tau + seconds), 0.0)
-        return near
+        return fading(seconds / tau)
 
     def _blocking(self) -> F64:
         """Return the share of the ways of people from room to room that a robot stands in."""
@@ -150,3 +149,21 @@ class Places:
         metres = np.sqrt(gaps.astype(np.float64)) / plan.lattice.units_per_m
         inside: F64 = np.maximum(0.0, 1 - metres / PERSONAL)
         return inside
+
+
+def fading(x: F64) -> F64:
+    """Return exp(-x) for x >= 0, the same on every machine: by nothing but sums and products.
+
+    It is (1 + y + y**2/2 + y**3/6 + y**4/24)**-1024 with y = x / 1024: right to a part in 10**5 up
+    to x = 60, beyond which it is nought for all that it is for.
+
+    Example:
+        >>> fading(np.array([0.0, 1.0, np.inf])).round(6).tolist()
+        [1.0, 0.367879, 0.0]
+    """
+    y = np.minimum(x, 600.0) / 1024
+    grown = 1 + y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4)))
+    for _ in range(10):
+        grown = grown * grown
+    faded: F64 = np.where(np.isfinite(x), 1 / grown, 0.0)
+    return faded

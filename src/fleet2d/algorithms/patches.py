@@ -1,0 +1,86 @@
+"""Patches: rooms cut into parts, each mostly in view as a whole or not at all."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.observations import NOWHERE
+
+if TYPE_CHECKING:
+    from fleet2d.floorplan.plan import FloorPlan
+
+# Patches are about so long and wide [m], and a room has about so many at most: larger ones then.
+SIDE = 1.0
+MOST = 12
+
+
+class Patches(NamedTuple):
+    """The rooms of a floor plan, cut into patches.
+
+    Attributes:
+        of_cell: int16 (rows, columns), the patch of each cell, NOWHERE where there is no room.
+        room: int64 (patches,), the room of each, in ascending order; each room has one at least.
+        cells: int64 (patches,), how many cells each has.
+    """
+
+    of_cell: NDArray[np.int16]
+    room: NDArray[np.int64]
+    cells: NDArray[np.int64]
+
+    @property
+    def first(self) -> NDArray[np.int64]:
+        """The first patch of each room: int64 (rooms,)."""
+        return np.flatnonzero(np.diff(self.room, prepend=-1))
+
+
+def whole_rooms(plan: "FloorPlan") -> Patches:
+    """Return the rooms as they are, each a patch."""
+    rooms, count = plan.room_of_cell, len(plan.rooms)
+    cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
+    return Patches(rooms, np.arange(count), cells)
+
+
+def patches_of(plan: "FloorPlan") -> Patches:
+    """Cut each room into boxes of cells: its own box by equal parts along both sides.
+
+    Example:
+        >>> import fleet2d
+        >>> plan = fleet2d.load_floorplan()
+        >>> patches = patches_of(plan)
+        >>> len(plan.rooms), len(patches.room), round(float(plan.rooms[2].area_m2))
+        (14, 119, 40)
+        >>> (patches.room == 2).sum(), patches.cells[patches.room == 2].sum() == plan.rooms[2].cells
+        (12, True)
+    """
+    rooms, count = plan.room_of_cell, len(plan.rooms)
+    row, column = np.nonzero(rooms != NOWHERE)
+    room = rooms[row, column].astype(np.int64)
+    total = np.bincount(room, minlength=count)
+    side = np.maximum(SIDE / plan.lattice.cell, np.sqrt(np.ceil(total / MOST)))
+    along, parts_along = _cut(row, room, side, count)
+    across, parts_across = _cut(column, room, side, count)
+    boxes = parts_along * parts_across
+    first = np.cumsum(boxes) - boxes
+    box = first[room] + along * parts_across[room] + across
+    cells = np.bincount(box, minlength=int(boxes.sum()))
+    kept = cells > 0
+    kept[first[total == 0]] = True
+    number = np.cumsum(kept) - 1
+    of_cell = np.full(rooms.shape, NOWHERE, np.int16)
+    of_cell[row, column] = number[box]
+    of_cell.setflags(write=False)  # as the rooms of a plan: kernels are compiled for that
+    return Patches(of_cell, np.repeat(np.arange(count), boxes)[kept], cells[kept])
+
+
+def _cut(
+    place: NDArray[np.int64], room: NDArray[np.int64], side: NDArray[np.float64], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which part of its room's extent each cell is in, and into how many that is cut."""
+    low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
+    np.minimum.at(low, room, place)
+    np.maximum.at(high, room, place)
+    extent = np.maximum(high - low + 1, 1)
+    parts = np.maximum(1, np.rint(extent / side)).astype(np.int64)
+    found: NDArray[np.int64] = (place - low[room]) * parts[room] // extent[room]
+    return found, parts

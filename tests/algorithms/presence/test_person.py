@@ -1,0 +1,157 @@
+"""What is learned of a person: expected counts against those of all paths, and from them the ways."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.algorithms.presence.worlds import MONDAY
+from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
+
+from fleet2d.algorithms.evidence import Evidence, Parts
+from fleet2d.algorithms.presence.counts import Bins, in_time
+from fleet2d.algorithms.presence.person import STAY, Habits, Layout, Person, stretches_of, ways_of
+from fleet2d.kernels.stays import Moments, smooth, take_together
+
+HABITS = Habits(0.9, 0.05)
+
+
+def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
+    """Return a case of bins one by one, what is expected of it, and probabilities of steps."""
+    of = case(seed, stages, 6, longest=1)
+    of.shown[:] = -1
+    dawn, dusk = of.now.sum(axis=0), np.random.default_rng(seed).random((stages, PATCHES))
+    moments = Layout(ROOM, np.ones(PATCHES), PLACES - 1, stages).no_moments()
+    smooth(of.ways, of.stretches, dawn, dusk, moments)
+    steps, weights = twin(of)
+    ahead = [by_state(np.stack([dusk, dusk]))]
+    for step, weight in zip(steps[::-1], weights[::-1], strict=True):
+        ahead.insert(0, step @ (weight * ahead[0]))
+    now, pairs = by_state(np.stack([np.zeros_like(dawn), dawn])), []
+    for step, weight, later in zip(steps, weights, ahead[1:], strict=True):
+        both = now[:, None] * step * (weight * later)[None]
+        pairs.append(both / both.sum())
+        now = (now @ step) * weight
+    node = ROOM[None] * stages + np.arange(stages)[:, None]
+    return node.repeat(2), moments, np.sum(pairs, axis=0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("stages", [1, 2])
+def test_expected_exits_and_time_are_those_of_pairs_of_states(seed: int, stages: int) -> None:
+    node, moments, pairs = expected(seed, stages)
+    by_node = np.zeros((PLACES * stages,) * 2)
+    np.add.at(by_node, (node[:, None], node[None]), pairs)
+    assert np.abs(by_node.sum(axis=1) - moments.time).max() < 1e-9
+    for k in range(PLACES * stages):
+        room, stage = divmod(k, stages)
+        for other in set(range(PLACES)) - {room}:
+            found = by_node[k, other * stages : (other + 1) * stages].sum()
+            assert found == pytest.approx(moments.exits[k, other], abs=1e-9)
+        onward = by_node[k, k + 1] if stage + 1 < stages else 0.0
+        assert onward == pytest.approx(moments.exits[k, PLACES], abs=1e-9)
+    assert moments.arrivals.sum() == pytest.approx(
+        moments.exits[:, :PLACES].sum() + moments.moves.sum()
+    )
+    rests = np.diagonal(by_node).reshape(PLACES, stages).sum(axis=1)
+    assert np.abs(rests - moments.moves - moments.rests).max() < 1e-9
+
+
+def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
+    layout = Layout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
+    ways = ways_of(layout.no_moments(), layout, HABITS)
+    assert [1 - 1 / STAY] * 4 == pytest.approx(ways.stay.tolist())
+    assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(ways.follow[0].tolist())
+    assert layout.spread.tolist() == pytest.approx(ways.spread.tolist())
+    assert [0.05, 0.05, 0.05, 0] == pytest.approx(ways.restless.tolist())
+
+
+def test_ways_are_counts_by_time_with_one_event_beforehand() -> None:
+    layout = Layout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
+    moments = layout.no_moments()
+    moments.time[0], moments.exits[0, 1], moments.exits[0, 3] = 880.0, 6.0, 3.0
+    moments.arrivals[:2], moments.moves[0], moments.rests[0] = (3.0, 7.0), 9.0, 971.0
+    ways = ways_of(moments, layout, HABITS)
+    assert 1 - 10 / 1000 == pytest.approx(ways.stay[0])
+    entered = np.array([0.25, 6.25, 0.25, 3.25])  # to each room overall, and a quarter each
+    wanted = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
+    assert wanted.tolist() == pytest.approx(ways.follow[0, :4].tolist())
+    assert [3.5 / 11, 7.5 / 11] == pytest.approx(ways.spread[:2].tolist())
+    assert 10 / 1000 == pytest.approx(ways.restless[0])
+
+
+def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
+    """One user's evidence of two rooms, the first of two patches; bins of a minute of 10 steps."""
+    shown, seen = np.array(shown, float), np.repeat(np.array(seen)[:, None], 2, axis=1)
+    room = np.array([0, 0, 1])
+    by_room = np.stack([shown[:, :2].mean(axis=1), shown[:, 2]], axis=1)
+    parts = Parts(room, np.array([4, 4, 8]), shown, shown, seen)
+    in_rooms = np.stack([seen[..., :2].sum(axis=-1), seen[..., 2]], axis=-1)
+    return in_time(Evidence(start * 10, 10, by_room, in_rooms, parts), MONDAY, 6_000_000)
+
+
+def test_bins_that_are_alike_are_taken_together_within_the_hour() -> None:
+    shown = [[0, 1, 0]] * 6 + [[0, 1, 0.5]] * 2
+    seen = [[0, 0, 0]] * 2 + [[0, 7, 0]] * 2 + [[0, 3, 3]] * 2 + [[0, 0, 0]] * 2
+    found = stretches_of(bins_of(shown, seen, start=57), 0, longest=5)
+    assert [2, 1, 1, 1, 1, 2] == found.bins.tolist()  # the hour ends after three
+    assert [0, 0, 1, 1, 1, 1] == found.hour.tolist()
+    assert [0, 0, 1, 2, 4, 6, 6] == found.begin.tolist()
+    assert [1, 1, 1, 2, 1, 2] == found.patch.tolist()
+    assert [1, 1, 0.5, 0.5, 0.5, 0.5] == found.share.tolist()
+    assert [0, 255, 128, 0] == found.shown[-1].tolist()
+    assert [1] * 8 == stretches_of(bins_of(shown, seen), 0, longest=1).bins.tolist()
+
+
+def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
+    bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
+    assert bins.by_patch is not None
+    bins.by_patch.seen[0, 1, 2] = 4  # anybody, but not the user
+    assert [255, 255, 0, 0] == stretches_of(bins, 0, longest=1).shown[0].tolist()
+
+
+def test_who_was_never_in_the_patch_looked_at_may_always_be_in_the_other() -> None:
+    """However long a robot looks at one patch of a room, the other may have somebody in it."""
+    habits, seen = Habits(0.9, 1e-6), [[0, 0, 0]] * 600
+    bins = bins_of([[1, 0, 1]] * 600, seen)
+    person = Person(Layout.of(bins, 1), habits)
+    places = person.end_day(stretches_of(bins, 0, longest=5))
+    assert places[300, 0] > 0.1
+    assert places[300, 1] < 0.01
+    hidden = bins_of([[0.5, 0, 1]] * 600, seen)
+    person = Person(Layout.of(hidden, 1), habits)
+    assert places[300, 0] + 0.02 < person.end_day(stretches_of(hidden, 0, longest=5))[300, 0]
+
+
+def test_days_gone_through_again_count_once() -> None:
+    random = np.random.default_rng(3)
+    looks = random.integers(0, 3, 3 * 1440)
+    shown = np.eye(3)[looks]
+    seen = (np.eye(3)[looks] * (random.random((3 * 1440, 1)) < 0.3) * 5).astype(int)
+    bins = bins_of(shown, seen)
+    person = Person(Layout.of(bins, 2), HABITS)
+    for day in range(3):
+        person.end_day(stretches_of(bins.part(day * 1440, (day + 1) * 1440), 0, longest=1))
+    for _ in range(20):
+        for day in (2, 1, 0):
+            person.revisit(day, 1.0)
+    for found, parts in zip(
+        person.total, zip(*(day.moments for day in person.days), strict=True), strict=True
+    ):
+        assert np.abs(found - np.sum(parts, axis=0)).max() < 1e-6
+    assert 3 * 1440 == pytest.approx(person.total.time.sum(), rel=1e-9)
+
+
+def test_taking_together_leaves_nothing_out() -> None:
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        shown = random.choice([0, 255], (90, 3), p=[0.9, 0.1]).astype(np.uint8)
+        seen = random.choice([0, 3], (90, 3), p=[0.95, 0.05]).astype(np.int64)
+        found = take_together(np.arange(90), shown, seen, 4)
+        assert 90 == found.bins.sum()
+        assert found.bins.max() <= 4
+        at = np.repeat(np.arange(len(found.bins)), found.bins)
+        assert np.array_equal(found.shown[at, :3], shown)
+        rebuilt = np.zeros((len(found.bins), 3))
+        stretch = np.repeat(np.arange(len(found.bins)), np.diff(found.begin))
+        rebuilt[stretch, found.patch] = found.share
+        assert np.allclose(rebuilt[at], seen / np.maximum(seen.sum(axis=1, keepdims=True), 1))

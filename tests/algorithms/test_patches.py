@@ -1,0 +1,85 @@
+"""Patches: rooms cut into boxes, and evidence by them, in bundled and synthetic homes."""
+
+from collections.abc import Mapping, Set
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from tests.homes import needs_jit
+from tests.scenes import TESTS, everything, run
+
+import fleet2d
+from fleet2d import Algorithm, History, Present
+from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.algorithms.patches import MOST, SIDE, patches_of, whole_rooms
+
+HERE = f"{TESTS.as_posix()}/algorithms/test_patches"
+
+
+def plans(shared_data: Path) -> list[fleet2d.FloorPlan]:
+    expo = shared_data / "houseexpo" / "7e80c5f4c9905bc273560854d8abe916.json"
+    return [fleet2d.load_floorplan(of) for of in ("family_home", "synthetic:7", expo)]
+
+
+def test_patches_divide_the_floor_of_each_room(shared_data: Path) -> None:
+    for plan in plans(shared_data):
+        patches, rooms = patches_of(plan), plan.room_of_cell
+        assert np.array_equal(patches.of_cell == NOWHERE, rooms == NOWHERE)
+        inside = rooms != NOWHERE
+        assert np.array_equal(patches.room[patches.of_cell[inside]], rooms[inside])
+        counts = np.bincount(patches.of_cell[inside], minlength=len(patches.room))
+        assert counts.tolist() == patches.cells.tolist()
+        assert (np.diff(patches.room) >= 0).all()
+        assert list(range(len(plan.rooms))) == patches.room[patches.first].tolist()
+
+
+def test_patches_are_boxes_of_about_a_metre_or_a_dozenth_of_the_room(shared_data: Path) -> None:
+    for plan in plans(shared_data):
+        patches = patches_of(plan)
+        for patch, room in enumerate(patches.room.tolist()):
+            side = max(SIDE / plan.lattice.cell, (plan.rooms[room].cells / MOST) ** 0.5)
+            extent = np.ptp(np.argwhere(patches.of_cell == patch), axis=0) + 1
+            assert (extent <= 1.5 * side + 2).all()
+
+
+def test_whole_rooms_are_patches_by_themselves(shared_data: Path) -> None:
+    for plan in plans(shared_data):
+        patches = whole_rooms(plan)
+        assert patches.of_cell is plan.room_of_cell
+        assert [room.cells for room in plan.rooms] == patches.cells.tolist()
+
+
+class Tell(Algorithm):
+    """Puts out by how much evidence by patches differs from that by rooms."""
+
+    needs: ClassVar[Set[str]] = {"evidence"}
+
+    def update(self, history: History, state: Present) -> Mapping[str, Any]:
+        evidence, parts = history.evidence, history.evidence.parts
+        assert parts is not None
+        first = np.flatnonzero(np.diff(parts.room, prepend=-1))
+        cells = np.add.reduceat(parts.cells, first)
+        watched = np.add.reduceat(parts.watched * parts.cells, first, axis=1) / cells
+        seen = np.add.reduceat(parts.seen, first, axis=2)
+        return {
+            "watched": float(np.abs(watched - evidence.watched).max()),
+            "seen": int((seen - evidence.seen).min()),
+            "less": float((parts.shown - parts.watched).min()),
+            "most": float(parts.shown.max()),
+            "sightings": int(parts.seen.sum()),
+        }
+
+
+@needs_jit
+@pytest.mark.parametrize("max_span", [7, None])
+def test_evidence_by_patches_sums_up_to_that_by_rooms(max_span: int | None) -> None:
+    content = everything("1 h")
+    content["robots"] = {"astro": content["robots"]["astro"]}
+    content["algorithms"] = {"tell": {"type": f"{HERE}:Tell", "period": "10 min"}}
+    rows = run(content, max_span=max_span).tables["tell"].to_pandas()
+    assert rows["watched"].max() < 1e-12
+    assert 0 == rows["seen"].min()  # who is taken to be in two patches at once counts in both
+    assert rows["less"].min() > -1e-12  # at one step at most as much as on average, or more
+    assert 0.5 < rows["most"].max() <= 1
+    assert rows["sightings"].sum() > 0

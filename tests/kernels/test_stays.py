@@ -1,0 +1,146 @@
+"""Filtered and smoothed stays against products of whole matrices, and in pieces as at once."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.reference import presence as slow
+
+from fleet2d.algorithms.presence.chain_model import steps_of
+from fleet2d.kernels.presence import advance
+from fleet2d.kernels.stays import Moments, Stretches, Ways, follow, smooth
+
+FIRST = np.array([0, 2, 3, 6, 7], np.uint64)  # three rooms of 2, 1 and 3 patches, and away
+ROOM = np.array([0, 0, 1, 2, 2, 2, 3])
+PATCHES, PLACES = 7, 4
+
+
+class Case(NamedTuple):
+    """A person, some evidence, and what was known before."""
+
+    ways: Ways
+    stretches: Stretches
+    now: Any
+    shown: Any
+    seen: Any
+
+
+def case(seed: int, stages: int, count: int, longest: int) -> Case:
+    random = np.random.default_rng(seed)
+    nodes = PLACES * stages
+    chances = random.dirichlet(np.ones(PLACES + 1), nodes)
+    chances[np.arange(nodes), np.arange(nodes) // stages] = 0.0
+    chances[stages - 1 :: stages, PLACES] = 0.0
+    chances /= chances.sum(axis=1, keepdims=True)
+    spread = np.concatenate([random.dirichlet(np.ones(n)) for n in (2, 1, 3, 1)])
+    ways = Ways(
+        random.uniform(0.3, 0.99, nodes), chances, spread,
+        np.append(random.uniform(0, 0.3, PLACES - 1), 0.0), FIRST, float(random.uniform(0.3, 0.95)),
+    )  # fmt: skip
+    shown = random.choice([0, 0, 60, 60, 255], (count, PATCHES)).astype(np.uint8)
+    shown[:, -1] = 0
+    kept = random.random(count) < 0.5  # the view often stays as it was
+    for t in np.flatnonzero(kept[1:]) + 1:
+        shown[t] = shown[t - 1]
+    seen = np.zeros((count, PATCHES))
+    for t in np.flatnonzero(random.random(count) < 0.4):
+        patch = random.choice(PATCHES - 1, random.integers(1, 3), replace=False)
+        seen[t, patch] = random.dirichlet(np.ones(len(patch)))
+    begin = np.append(0, (seen > 0).sum(axis=1).cumsum())
+    stretches = Stretches(
+        random.integers(1, longest + 1, count), np.zeros(count, np.int64), shown, begin,
+        np.nonzero(seen)[1], seen[seen > 0],
+    )  # fmt: skip
+    now = random.random((2, stages, PATCHES))
+    before = random.choice([-1, 0, 60], PATCHES)
+    return Case(ways, stretches, now / now.sum(), before.astype(np.int64), seen)
+
+
+def by_state(now: Any) -> Any:
+    """The order of the twin: stage, patch, in view or not."""
+    return np.moveaxis(now, 0, -1).ravel()
+
+
+def by_place(states: Any, stages: int) -> Any:
+    """Sums of the twin's states by room."""
+    by_patch = states.reshape(len(states), stages, PATCHES, 2).sum(axis=(1, 3))
+    return np.array([np.bincount(ROOM, row, PLACES) for row in by_patch])
+
+
+def twin(of: Case) -> Any:
+    ways, stretches = of.ways, of.stretches
+    return slow.stays(
+        ways, stretches.bins.tolist(), stretches.shown.tolist(), of.seen.tolist(), of.shown
+    )
+
+
+@settings(deadline=None)  # the first compiles
+@given(st.integers(0, 10_000), st.integers(1, 3), st.integers(1, 7), st.integers(1, 4))
+def test_following_is_the_product_of_matrices(
+    seed: int, stages: int, count: int, longest: int
+) -> None:
+    of = case(seed, stages, count, longest)
+    steps, weights = twin(of)
+    for step in steps:
+        assert np.abs(step.sum(axis=1) - 1).max() < 1e-9
+    filtered, _ = slow.posteriors(steps, weights, by_state(of.now), np.ones(len(steps[0])))
+    now, shown = of.now.copy(), of.shown.copy()
+    found = follow(of.ways, of.stretches, now, shown)
+    assert np.abs(by_place(filtered, stages) - found).max() < 1e-9
+    assert np.abs(filtered[-1] - by_state(now)).max() < 1e-9
+    assert of.stretches.shown[-1].tolist() == shown.tolist()
+
+
+@settings(deadline=None)  # the first compiles
+@given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 6))
+def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int) -> None:
+    of = case(seed, stages, count, longest=3)
+    of.shown[:] = -1  # nothing is known of the view before
+    dawn = of.now.sum(axis=0)
+    dusk = np.random.default_rng(seed).random((stages, PATCHES))
+    steps, weights = twin(of)
+    start = by_state(np.stack([np.zeros_like(dawn), dawn]))
+    _, smoothed = slow.posteriors(steps, weights, start, by_state(np.stack([dusk, dusk])))
+    nothing = Moments(
+        np.zeros(PLACES * stages), np.zeros((PLACES * stages, PLACES + 1)), np.zeros(PATCHES),
+        np.zeros(PLACES), np.zeros(PLACES),
+    )  # fmt: skip
+    places, _, _ = smooth(of.ways, of.stretches, dawn, dusk, nothing)
+    assert np.abs(by_place(smoothed, stages) - places).max() < 1e-9
+
+
+@pytest.mark.parametrize("cut", [1, 3, 6])
+def test_evidence_in_pieces_is_followed_as_at_once(cut: int) -> None:
+    of = case(5, 2, 7, 1)
+    whole_now, whole_shown = of.now.copy(), of.shown.copy()
+    whole = follow(of.ways, of.stretches, whole_now, whole_shown)
+    now, shown, found = of.now.copy(), of.shown.copy(), []
+    for a, b in ((0, cut), (cut, 7)):
+        bins, hour, view, begin, patch, share = of.stretches
+        here = slice(begin[a], begin[b])
+        part = Stretches(
+            bins[a:b], hour[a:b], view[a:b], begin[a : b + 1] - begin[a], patch[here], share[here]
+        )
+        found.append(follow(of.ways, part, now, shown))
+    assert np.abs(whole - np.concatenate(found)).max() < 1e-14
+    assert np.abs(whole_now - now).max() < 1e-14
+    assert np.array_equal(whole_shown, shown)
+
+
+@pytest.mark.parametrize("stages", [1, 2, 3])
+def test_without_evidence_stages_follow_each_other_by_their_steps(stages: int) -> None:
+    of = case(9, stages, 6, 1)
+    blind = of.stretches._replace(
+        shown=np.zeros_like(of.stretches.shown), begin=np.zeros(7, np.int64)
+    )
+    steps = steps_of(of.ways)
+    assert np.abs(steps.sum(axis=1) - 1).max() < 1e-12
+    mass = np.zeros(PLACES * stages)
+    for s in range(stages):
+        mass[s::stages] += np.bincount(ROOM, of.now.sum(axis=0)[s], PLACES)
+    found = follow(of.ways, blind, of.now.copy(), np.full(PATCHES, -1))
+    for t in range(6):
+        later = advance(mass, steps, t + 1).reshape(PLACES, stages).sum(axis=1)
+        assert np.abs(later - found[t]).max() < 1e-12
