@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import Activities
+from fleet2d.algorithms.blocks import Blocks
 from fleet2d.algorithms.evidence import Evidence, Sightings, gather
 from fleet2d.algorithms.observations import (
     OBSERVATION,
@@ -99,7 +100,7 @@ class Log:
         self.index = {actor.name: i for i, actor in enumerate(actors)}
         self.paths = [actor.path for actor in actors]
         self.pieces: list[list[Piece]] = [[] for _ in actors]
-        self.observations: list[NDArray[np.int64]] = []  # (n, OBSERVATION) each
+        self._observations = Blocks()  # (n, OBSERVATION), by step
         self._actors = actors
         # Of plans that were replaced, with the step at which they were: no later than the event.
         self._events: list[tuple[int, Event]] = []
@@ -109,8 +110,8 @@ class Log:
         self._looks: dict[int, NDArray[np.int64]] = {}
         self._exposures: dict[int, NDArray[np.int64]] = {}
         self.bin_steps = 0  # of the bins of evidence; 0: nobody asks for it
-        self._bins: NDArray[np.int64] | None = None  # (bins, robots, 2, patches), from _first_bin
-        self._first_bin = 0
+        self._bins = Blocks()  # (n, robots, 2, patches), by bin
+        self._next_bin = 0
         self.patches: Patches | None = None  # that bins of evidence tell apart
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
@@ -123,15 +124,14 @@ class Log:
         for pieces in self.pieces:
             keep = max((i for i, piece in enumerate(pieces) if piece.first <= before), default=0)
             del pieces[:keep]
-        self.observations = [o for o in self.observations if o[-1, STEP] >= before]
+        self._observations.forget(before)
         self.readings = [row for row in self.readings if row.step >= before]
         self._events = [(at, event) for at, event in self._events if event.step >= before]
         self.sights = [sights for sights in self.sights if sights.end > before]
         self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
         self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
-        if self._bins is not None:
-            past = max(0, before // self.bin_steps - self._first_bin)
-            self._bins, self._first_bin = self._bins[past:], self._first_bin + past
+        if self.bin_steps:
+            self._bins.forget(before // self.bin_steps)
 
     def tell(self, actor: "Actor", step: int) -> None:
         """Keep what the plan of a body said happens up to `step`, at which it is replaced."""
@@ -192,12 +192,16 @@ class Log:
                 paste_poses(out, here.start, part, slice(begin - piece.first, None))
         return out
 
+    def observe(self, rows: NDArray[np.int64]) -> None:
+        """Keep what was perceived in a span: its observations (n, OBSERVATION), in order."""
+        if len(rows):
+            self._observations.append(int(rows[0, STEP]), int(rows[-1, STEP]) + 1, rows)
+
     def seen(self, first: int, end: int) -> NDArray[np.int64]:
         """Return the rows of the observations of the steps from `first` to `end` - 1."""
-        blocks = [o for o in self.observations if o[-1, STEP] >= first and o[0, STEP] < end]
-        if not blocks:
+        _, rows = self._observations.touching(first, end)
+        if rows is None:
             return np.empty((0, OBSERVATION), np.int64)
-        rows = np.concatenate(blocks)
         return rows[slice(*np.searchsorted(rows[:, STEP], (first, end)).tolist())]
 
     def perceived(self, first: int, end: int) -> Observations:
@@ -230,7 +234,8 @@ class Log:
 
         That is cells of each patch, summed over the steps of the bin, and at most at one.
         """
-        self._bins = bins if self._bins is None else np.concatenate([self._bins, bins])
+        begin, self._next_bin = self._next_bin, self._next_bin + len(bins)
+        self._bins.append(begin, self._next_bin, bins)
 
     def evidence(self, first: int, end: int, users: int) -> Evidence:
         """Return what was watched and perceived in the steps from `first` to `end` - 1.
@@ -238,15 +243,16 @@ class Log:
         Raises:
             ComponentError: The steps aren't whole bins.
         """
-        assert self._bins is not None, "nobody needs evidence"
-        assert self.patches is not None
+        assert self.patches is not None, "nobody needs evidence"
         if first % self.bin_steps or end % self.bin_steps:
             raise ComponentError(
                 f"evidence comes in bins of {self.bin_steps} steps, but the period from step"
                 f" {first} to {end} isn't made of whole ones: choose a period of whole minutes"
             )
-        begin = first // self.bin_steps - self._first_bin
-        bins = self._bins[begin : end // self.bin_steps - self._first_bin]
+        begin, last = first // self.bin_steps, end // self.bin_steps
+        since, bins = self._bins.touching(begin, last)
+        assert bins is not None, "a history is not empty"
+        bins = bins[begin - since : last - since]
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         rows = self.seen(first, end)

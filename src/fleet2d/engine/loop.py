@@ -61,8 +61,8 @@ class Loop:
             user.ask_at = first + count
         self.step = first + count
         if world.log:
-            if observations is not None and len(observations):
-                world.log.observations.append(observations)
+            if observations is not None:
+                world.log.observe(observations)
             world.log.sights += [
                 eye.sights(self.step) for eye in [*world.eyes, *world.gazes] if eye.happened
             ]
