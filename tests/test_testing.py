@@ -26,6 +26,25 @@ class Sound(Algorithm):
         return RoomDistribution(self.counts)
 
 
+class OnSight(Algorithm):
+    """Counts who comes into view, when somebody does, and marks where."""
+
+    on: tuple[str, ...] = ("user_seen",)
+
+    def start(self, home: Any) -> None:
+        self.seen = 0
+        self.marks = home.layers.add("marks", "int32")
+
+    def update(self, history: Any, state: Any) -> Any:
+        self.seen += sum(event.event == "user_seen" for event in history.events)
+        x, y = history.observations.x[-1], history.observations.y[-1]
+        self.marks.set_at(x, y, self.marks.at(x, y) + 1)
+        return {"seen": self.seen}
+
+    def remember(self) -> Any:
+        return {"seen": self.seen}
+
+
 class Dice(Algorithm):
     """Draws from the global generator."""
 
@@ -74,8 +93,9 @@ class Meddler(Algorithm):
         state.outputs["x"] = 1
 
 
-def test_a_sound_algorithm_passes() -> None:
+def test_sound_algorithms_pass() -> None:
     check_algorithm(Sound, period="30 min")
+    check_algorithm(OnSight)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from tests.entities.robots.robots import (
     names,
     rooms,
 )
+from tests.entities.robots.test_find import told
 from tests.homes import needs_jit
 from tests.scenes import digests, each_step, everything, path, run
 
@@ -154,7 +155,20 @@ def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_
     assert "bedroom_0" in rooms(stored)  # the stop behind the one that it leaves out
     steps = [step for step, name, _ in events(stored) if name in ("gives_way", "gives_up")]
     if gives_up:
-        assert 120 <= steps[1] - steps[0] <= 122
+        assert 120 <= steps[1] - steps[0] <= 133  # it looks ever more seldom
+
+
+def test_a_place_that_is_taken_is_left_alone_until_it_thinks_again() -> None:
+    hangout = {"type": "hangout", "source": "rtp", "explore": 0, "period": "30 min"}
+    content = polite(OUT, [hangout], "2 h", gives_up="1 min")
+    content |= told(bathroom_0=1)
+    free = run(content)
+    x, y = path(free, "astro").x[-1], path(free, "astro").y[-1]
+    content["users"]["ana"] = {"type": "schedule", **stands(float(x), float(y))}
+    stored = assert_same_for_every_max_span(content, 61)
+    steps = [step for step, name, _ in events(stored) if name == "gives_up"]
+    assert 3 <= len(steps) <= 4  # once in half an hour
+    assert gap(stored).min() > 0.4
 
 
 def test_a_look_that_was_held_up_counts_as_one() -> None:

@@ -118,7 +118,6 @@ def gather(
     """
     bins, first_patches, count = len(cells), patches.first, len(patches.room)
     of_patch = np.maximum(patches.cells, 1)
-    of_room = np.maximum(np.add.reduceat(patches.cells, first_patches), 1)
     summed, most = cells[:, :, 0], cells[:, :, 1].max(axis=1, initial=0)
     by_room = np.add.reduceat(summed, first_patches, axis=2).max(axis=1, initial=0)
     by_patch = summed.max(axis=1, initial=0)
@@ -132,7 +131,7 @@ def gather(
         count_seen(sighted, *sizes, count),
     )
     seen = count_seen(in_room, *sizes, len(first_patches))
-    return Evidence(first, bin_steps, by_room / (of_room * bin_steps), seen, parts)
+    return Evidence(first, bin_steps, by_room / (patches.room_cells * bin_steps), seen, parts)
 
 
 def count_seen(

@@ -22,7 +22,7 @@ from fleet2d.kernels.look import (
     X,
     Y,
 )
-from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.measure import rooms_at
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
@@ -87,20 +87,26 @@ class NearestRooms:
                 left out: its room.
         """
         self._plan = plan
-        self._rooms: NDArray[np.int16] | None = None if of_cell is None else beside_rooms(of_cell)
+        self._rooms = None if of_cell is None else _shared(beside_rooms(of_cell))
 
     def of(self, x: NDArray[np.int64], y: NDArray[np.int64]) -> NDArray[np.int16]:
         """Return the rooms of places [lattice units]; NOWHERE only in a home without rooms."""
         if self._rooms is None:
             self._rooms = self._plan.room_of_place
-        rows, columns = self._rooms.shape
-        row, column = np.clip(y // SUB, 0, rows - 1), np.clip(x // SUB, 0, columns - 1)
-        found = self._rooms[row, column]
-        while (found == NOWHERE).any() and self._plan.rooms:
+        x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
+        found: NDArray[np.int16] = rooms_at(self._rooms, x, y)
+        while len(found) and found.min() == NOWHERE and self._plan.rooms:
             padded = np.pad(self._rooms, 1, constant_values=NOWHERE)
-            self._rooms = beside_rooms(padded)[1:-1, 1:-1]
-            found = self._rooms[row, column]
+            self._rooms = _shared(beside_rooms(padded)[1:-1, 1:-1])
+            found = rooms_at(self._rooms, x, y)
         return found
+
+
+def _shared(rooms: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return a map of rooms as the plan's own are: in one piece, and not to be changed."""
+    rooms = np.ascontiguousarray(rooms)
+    rooms.setflags(write=False)
+    return rooms
 
 
 def perceived(

@@ -1,6 +1,8 @@
 """Patches: rooms cut into parts, each mostly in view as a whole or not at all."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,8 @@ SIDE = 1.0
 MOST = 12
 
 
-class Patches(NamedTuple):
+@dataclass(frozen=True)
+class Patches:
     """The rooms of a floor plan, cut into patches.
 
     Attributes:
@@ -28,10 +31,16 @@ class Patches(NamedTuple):
     room: NDArray[np.int64]
     cells: NDArray[np.int64]
 
-    @property
+    @cached_property
     def first(self) -> NDArray[np.int64]:
         """The first patch of each room: int64 (rooms,)."""
         return np.flatnonzero(np.diff(self.room, prepend=-1))
+
+    @cached_property
+    def room_cells(self) -> NDArray[np.int64]:
+        """How many cells each room has, 1 at least: int64 (rooms,)."""
+        cells: NDArray[np.int64] = np.maximum(np.add.reduceat(self.cells, self.first), 1)
+        return cells
 
 
 def whole_rooms(plan: "FloorPlan") -> Patches:

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.measure import count_rooms, sum_moves
-from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.measure import count_rooms, rooms_at, sum_moves
 from fleet2d.kernels.motion import Poses
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class BodyPoses:
     @cached_property
     def room(self) -> NDArray[np.int16]:
         """Index of the room, NOWHERE while it is away."""
-        room = self._home.plan.room_of_place[self._poses.y // SUB, self._poses.x // SUB]
+        room = rooms_at(self._home.plan.room_of_place, self._poses.x, self._poses.y)
         return _shared(np.where(self.away, np.int16(NOWHERE), room))
 
     @cached_property

@@ -315,6 +315,9 @@ class Actor:
             self._stuck = stuck
         if plan is None and waited >= micros(max(gives_way.patience, gives_way.gives_up)):
             plan, self._waited = waits.leave_out(now, whom), (0, -1)
+            if plan is None:
+                plan = waits.give_up(now, whom)
+                self.arbiter.give_up(now)
         if plan is None:
             plan, self._waiting = waits.wait(now, whom), waits
         if self.plan.began[0] == step:  # it has begun, and is over at once

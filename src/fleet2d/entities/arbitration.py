@@ -77,6 +77,11 @@ class Arbiter:
         self._take(None, now, plan)
         return None
 
+    def give_up(self, now: Situation) -> None:
+        """Tell the active behavior that its plan can't be gone on with."""
+        if self.active is not None:
+            self.behaviors[self.active].give_up(now)
+
     def watch(self, now: Situation, plan: Plan, *, fresh: bool) -> None:
         """Let those who may break in say when and at what.
 

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.behavior import Situation
 
-# It looks so often whether the way is clear again.
-LOOKS_EVERY = timedelta(seconds=1)
+# It looks so often whether the way is clear again: at first, then whenever it has waited a tenth
+# longer, and at the least.
+LOOKS_EVERY = timedelta(seconds=1), timedelta(seconds=10)
 # So soon after it waited it goes on counting; going round, it minds for so long not to touch.
 JUST_WAITED = timedelta(seconds=15)
 # Beside who doesn't go on it passes with so much between the bodies, where there is no more room,
@@ -60,11 +61,12 @@ class Waiting:
         self.interrupts = interrupts
 
     def wait(self, now: "Situation", whom: str) -> Plan:
-        """Stand still a moment."""
-        plan = now.plan()
+        """Stand still a moment, the longer the longer it has waited."""
+        plan, waited = now.plan(), (now.step - self.since) * now.actor.clock.step_us
         if now.step == self.since:
             plan.note("gives_way", whom)
-        plan.stay(LOOKS_EVERY)
+        often, seldom = LOOKS_EVERY
+        plan.stay(min(max(often, timedelta(microseconds=waited // 10)), seldom))
         plan.interrupts = self.interrupts
         return plan
 
@@ -88,11 +90,14 @@ class Waiting:
             plan = plan or resumed(actor, begun, self.broken, self.step, detour)
         return self._heard(plan)
 
-    def leave_out(self, now: "Situation", whom: str) -> Plan:
-        """Return the plan without the stop that it can't get to; standing, if that was the last."""
+    def leave_out(self, now: "Situation", whom: str) -> Plan | None:
+        """Return the plan without the stop that it can't get to; None if that was the last."""
         plan = self._looking_again(now).note("gives_up", whom)
-        found = without_next_stop(now.actor, plan, self.broken, self.step)
-        return self._heard(found) or self._looking_again(now).note("gives_up", whom)
+        return self._heard(without_next_stop(now.actor, plan, self.broken, self.step))
+
+    def give_up(self, now: "Situation", whom: str) -> Plan:
+        """Stand for a step, after which the behaviors are asked anew."""
+        return self._looking_again(now).note("gives_up", whom)
 
     def _looking_again(self, now: "Situation") -> Plan:
         """Return a plan that begins with a step of standing: whoever is in the way is seen."""

@@ -1,4 +1,4 @@
-"""Sums over poses: how long in which room, and how far."""
+"""Poses and places measured: in which room, how long in each, and how far."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +6,19 @@ from numpy.typing import NDArray
 from fleet2d.kernels._jit import kernel
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses
+
+
+@kernel
+def rooms_at(
+    room_of_place: NDArray[np.int16], x: NDArray[np.int64], y: NDArray[np.int64]
+) -> NDArray[np.int16]:
+    """Return the room of each place, int16 (n,); outside of the map that at its nearest border."""
+    rows, columns = room_of_place.shape
+    found = np.empty(x.shape[0], np.int16)
+    for j in range(x.shape[0]):
+        row, column = y[j] // SUB, x[j] // SUB
+        found[j] = room_of_place[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)]
+    return found
 
 
 @kernel

@@ -15,7 +15,7 @@ from fleet2d.errors import Fleet2DError
 pytestmark = needs_jit
 
 ESTIMATORS = ["sighting_share", "exposure_ratio", "audit_only", "likelihood", "hmm", "fremen"]
-MODELS = ["last_seen", "long_term", "hour_of_week", "markov", "hmm", "semi_markov"]
+MODELS = ["last_seen", "long_term", "hour_of_week", "markov", "hmm", "semi_markov", "routine"]
 USERS = {
     "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},
     "ben": {"type": "meander"},

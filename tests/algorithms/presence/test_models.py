@@ -17,13 +17,20 @@ from tests.algorithms.presence.worlds import (
 from tests.homes import needs_jit
 
 from fleet2d.algorithms.presence.belief import Presence, Track
-from fleet2d.algorithms.presence.chain_model import Filter, MarkovDecay, SemiMarkov, steps_of
+from fleet2d.algorithms.presence.chain_model import (
+    Filter,
+    MarkovDecay,
+    Routine,
+    SemiMarkov,
+    steps_of,
+)
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
 from fleet2d.algorithms.presence.model import HourOfWeek, LastSeen, LongTerm, Model
 from fleet2d.metrics.presence.scores import log_loss
 
-ALL = [LastSeen, LongTerm, HourOfWeek, MarkovDecay, Filter, SemiMarkov]
+CHAINS = [MarkovDecay, Filter, SemiMarkov, Routine]
+ALL = [LastSeen, LongTerm, HourOfWeek, *CHAINS]
 MINUTE = 60_000_000
 
 
@@ -58,7 +65,7 @@ def test_the_future_changes_nothing(cls: type[Model]) -> None:
     )  # fmt: skip
     one, two = (followed(cls(), b, 3, 2).track for b in (bins, mixed))
     assert np.array_equal(one.home[:60], two.home[:60])
-    if cls in (Filter, SemiMarkov, LastSeen, MarkovDecay):  # bin by bin, too
+    if cls in (LastSeen, *CHAINS):  # bin by bin, too
         one, two = (followed(cls(), b, 3, 2, length=120).track for b in (bins, mixed))
         late = bins.day == bins.day[0]  # what is learned at midnight isn't known before
         late &= np.arange(120) < 60
@@ -117,7 +124,7 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
     assert filtered.away[39, 0] > 0.9 > 0.4 > track.away[39, 0]
 
 
-@pytest.mark.parametrize("cls", [MarkovDecay, Filter, SemiMarkov])
+@pytest.mark.parametrize("cls", CHAINS)
 def test_a_forecast_goes_on_as_bins_without_evidence_do(cls: type[Model]) -> None:
     bins = any_evidence(6, bins=60, users=1)
     after = bins.part(30, 60)
@@ -173,7 +180,42 @@ def test_what_was_learned_can_be_gone_on_from(cls: type[Model]) -> None:
     other.recall(one.remember())
     home, _ = other.observe(any_evidence(9).part(20, 21))
     assert np.abs(home.sum(axis=2) - 1).max() < 1e-9
-    if cls in (MarkovDecay, Filter, SemiMarkov):
+    if cls in CHAINS:
         for mine, theirs in zip(one.learner.people, other.learner.people, strict=True):
             for part, same in zip(mine.ways, theirs.ways, strict=True):
                 assert np.array_equal(part, same)
+
+
+def sleeper(days: int, seed: int) -> np.ndarray:
+    """Somebody in room 0 at night and in rooms 1 and 2 by day, for an hour or so at a time."""
+    random = np.random.default_rng(seed)
+    where, now = np.empty(days * DAY, np.int64), 0
+    for t in range(days * DAY):
+        night = not 7 * 60 <= t % DAY < 23 * 60
+        if random.random() < 1 / 60 or (now == 0) != night:
+            now = 0 if night else int(random.integers(1, 3))
+        where[t] = now
+    return where
+
+
+@needs_jit
+def test_who_goes_by_the_hour_is_better_of_those_who_do() -> None:
+    """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
+    scores = {cls: [] for cls in (SemiMarkov, Routine)}
+    for seed in range(2):
+        where = sleeper(20, seed)
+        bins = bins_of(evidence(where, 3, patrol, seed))
+        for cls, values in scores.items():
+            track = followed(cls(), bins, 3, 1).track
+            home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
+            belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
+            values.append(log_loss(belief, where[10 * DAY :]).mean())
+    assert np.mean(scores[Routine]) < 0.9 * np.mean(scores[SemiMarkov])
+
+
+def test_a_forecast_of_the_routine_goes_by_the_hours_on_the_way() -> None:
+    where = sleeper(8, 3)
+    now = followed(Routine(), bins_of(evidence(where, 3, patrol, 3)), 3, 1)
+    night = now.at(MONDAY + timedelta(hours=3)).with_away("u0")
+    noon = now.at(MONDAY + timedelta(hours=13)).with_away("u0")
+    assert night[0] > 0.6 > 0.4 > noon[0]

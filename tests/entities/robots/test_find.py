@@ -164,6 +164,19 @@ def test_a_search_that_can_not_begin_in_time_is_left_out() -> None:
     assert 1 == names(stored).count("find_begins")  # the last of those that were due
 
 
+def test_who_else_comes_into_view_does_not_make_it_look_anew() -> None:
+    find = search("exact", source=None, at=[], every="10 min", out=0.9)
+    content = home_with([find, STAY], "2 h", OUT, metrics={"time_to_find": {}})
+    alone = run(content).metrics["time_to_find"]["astro"]
+    content["users"] |= {name: {"type": "meander"} for name in ("ben", "cleo", "dan")}
+    stored = assert_same_for_every_max_span(content, 61)
+    among = stored.metrics["time_to_find"]["astro"]
+    assert 1.0 == alone["out_told"] == among["out_told"]
+    seen = [name for _, name, _ in events(stored)].count("user_seen")
+    assert seen > 3 * among["searches"]
+    assert among["out_mean"] < 1.1 * alone["out_mean"]
+
+
 def test_who_is_in_view_is_found_at_once() -> None:
     content = home_with(
         [search(), STAY], "30 min", astro={"start": [5.5, 6.0]}, **told(kitchen_0=1)

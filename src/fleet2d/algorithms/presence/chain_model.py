@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
+from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -12,12 +13,13 @@ from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.belief import Presence, Track
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, normalized
+from fleet2d.algorithms.presence.habits import Habits
 from fleet2d.algorithms.presence.likelihood import Likelihood, by_day
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.person import Person, stretches_of
 from fleet2d.component import register
 from fleet2d.kernels.presence import advance
-from fleet2d.kernels.stays import Ways, follow
+from fleet2d.kernels.stays import Stretches, Ways, follow
 from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
@@ -25,28 +27,38 @@ I64 = NDArray[np.int64]
 FARTHEST = 10_080  # bins ahead, beyond which a forecast stays as it is
 
 
-class Stage(NamedTuple):
+class Going(NamedTuple):
     """Where somebody is now, and how that goes on.
 
     Attributes:
         now: float64 (nodes,), probability of each stage of each place, away last.
-        steps: float64 (nodes, nodes), from bin to bin, rows sum to one.
-        stages: Of a stay.
+        ways: How the person goes on.
+        habits: What differs by the hour; None: nothing.
     """
 
     now: F64
-    steps: F64
-    stages: int
+    ways: Ways
+    habits: Habits | None = None
 
     @property
     def places(self) -> F64:
         """The probability of each place: float64 (1, rooms + 1)."""
-        found: F64 = self.now.reshape(1, -1, self.stages).sum(axis=2)
+        found: F64 = self.now.reshape(1, len(self.ways.first) - 1, -1).sum(axis=2)
         return found
 
-    def after(self, bins: int) -> "Stage":
-        """Return where somebody is some bins later, without evidence."""
-        return self._replace(now=advance(self.now, self.steps, bins))
+    def after(self, bins: int, time: datetime, bin_us: int) -> "Going":
+        """Return where somebody is some bins later than `time`, without evidence."""
+        if self.habits is None:
+            return self._replace(now=advance(self.now, steps_of(self.ways), bins))
+        now = self.now
+        while bins > 0:
+            since = timedelta(minutes=time.minute, seconds=time.second)
+            hour = -((since - timedelta(hours=1)) // timedelta(microseconds=bin_us))
+            part = min(bins, max(hour, 1))
+            ways = self.habits.at(self.ways, time.weekday(), time.hour)
+            now = advance(now, steps_of(ways), part)
+            bins, time = bins - part, time + timedelta(microseconds=part * bin_us)
+        return self._replace(now=now)
 
 
 class ChainPresence(Presence):
@@ -55,7 +67,7 @@ class ChainPresence(Presence):
     def __init__(
         self,
         users: Sequence[str],
-        people: Sequence[Stage],
+        people: Sequence[Going],
         time: datetime,
         bin_us: int,
         track: Track | None = None,
@@ -81,7 +93,7 @@ class ChainPresence(Presence):
         bins = min((time - self.time) // timedelta(microseconds=self._bin_us), FARTHEST)
         if bins <= 0:
             return self
-        ahead = [person.after(bins) for person in self._people]
+        ahead = [person.after(bins, self.time, self._bin_us) for person in self._people]
         return ChainPresence(self.users, ahead, time, self._bin_us)
 
 
@@ -114,26 +126,21 @@ class Follower:
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
 
-    def follow(self, person: Person, bins: Bins, user: int, *, negative: bool) -> F64:
+    def follow(self, ways: Ways, stretches: Stretches) -> F64:
         """Return P(room | evidence up to each bin): float64 (bins, rooms + 1).
 
         Args:
-            person: Who, with what was learned so far.
-            bins: The evidence.
-            user: The person's row in it.
-            negative: Whether that somebody wasn't perceived tells anything.
+            ways: How the person goes on, as far as that was learned.
+            stretches: The evidence, of one bin each.
         """
-        stretches = stretches_of(bins, user, 1)
-        if not negative:
-            stretches = stretches._replace(shown=np.zeros_like(stretches.shown))
-        return follow(person.ways, stretches, self.now, self.shown)
+        return follow(ways, stretches, self.now, self.shown)
 
-    def stage(self, person: Person) -> Stage:
+    def going(self, person: Person, habits: Habits | None) -> Going:
         """Return where the person is, without patches."""
         stages = person.layout.stages
         nodes = person.layout.room[:, np.newaxis] * stages + np.arange(stages)
         mass = np.bincount(nodes.ravel(), (self.now[0] + self.now[1]).T.ravel())
-        return Stage(mass.astype(np.float64), steps_of(person.ways), stages)
+        return Going(mass.astype(np.float64), person.ways, habits)
 
 
 def steps_of(ways: Ways) -> F64:
@@ -189,16 +196,23 @@ class Filter(Model):
         self.learner.take_in(bins)
         people = self.learner.people
         self.followers = self.followers or [Follower(person) for person in people]
-        places = [
-            follower.follow(person, bins, user, negative=self.negative)
-            for user, (person, follower) in enumerate(zip(people, self.followers, strict=True))
-        ]
+        places = [self._follow(user, bins) for user in range(len(people))]
         return split(places, self.users, bins)
+
+    def _follow(self, user: int, bins: Bins) -> F64:
+        stretches = stretches_of(bins, user, 1)
+        if not self.negative:
+            stretches = stretches._replace(shown=np.zeros_like(stretches.shown))
+        return self.followers[user].follow(self.learner.people[user].ways, stretches)
+
+    def habits(self, user: int) -> Habits | None:
+        """Return what differs by the hour."""
+        return None
 
     def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
         """Return what is believed now, and by `at` the forecast."""
-        pairs = zip(self.learner.people, self.followers, strict=True)
-        now = [follower.stage(person) for person, follower in pairs]
+        pairs = enumerate(zip(self.learner.people, self.followers, strict=True))
+        now = [follower.going(person, self.habits(user)) for user, (person, follower) in pairs]
         return ChainPresence(users, now, time, bin_us, track)
 
     def remember(self) -> dict[str, Any]:
@@ -220,6 +234,37 @@ class SemiMarkov(Filter):
     """
 
     stages: ClassVar[int] = 2
+
+
+@register("presence_model", "routine")
+class Routine(SemiMarkov):
+    """The semi-Markov filter by the hour: people are drawn to where they usually are then.
+
+    Rooms follow each other more or less often by the hour of working days and of weekends, as far
+    as shares of time differ then (`fleet2d.algorithms.presence.habits`), from the second day on.
+
+    Right where days are alike. Breaks when they aren't: it is surer of the usual.
+    """
+
+    smoothing: float = Field(
+        default=60, gt=0, description="bins of average evidence each hour is given beforehand"
+    )
+
+    def _follow(self, user: int, bins: Bins) -> F64:
+        habits, ways = self.habits(user), self.learner.people[user].ways
+        hours = bins.day * 24 + bins.minute // 60
+        ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
+        found = []
+        for part in (bins.part(a, b) for a, b in pairwise(ends)):
+            now = habits.at(ways, int(part.day[0] - 1) % 7, int(part.minute[0]) // 60)
+            found.append(self.followers[user].follow(now, stretches_of(part, user, 1)))
+        return np.concatenate(found)
+
+    def habits(self, user: int) -> Habits:
+        """Return what differs by the hour, as far as it was learned."""
+        counts, columns = self.learner.counts, [*range(self.rooms + 1), -1]  # places, and all bins
+        week, total = counts.by_hour_of_week[:, user], counts.total[user]
+        return Habits(week[:, columns], total[columns], self.smoothing)
 
 
 @register("presence_model", "markov")

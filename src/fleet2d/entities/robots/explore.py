@@ -62,12 +62,18 @@ class Explore(Behavior):
         self.tried: Bool = np.zeros(len(self.targets), np.bool_)  # looked at, whether seen or not
         self.shown: tuple[int, dict[int, Bool]] = actor.home.version, {}  # targets, by stand
         self.stand: int | None = None
+        self.left_out: set[int] = set()  # places that somebody didn't let it get to
         self.plan: Plan | None = None  # the look round that it planned last
         self.looked = self.done = self.shut_out = False
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when it tries again to get to what isn't seen yet."""
         return now.time + TRIES_AGAIN if self.shut_out else None
+
+    def give_up(self, now: Situation) -> None:
+        """Leave out the place that it was going to."""
+        if self.stand is not None:
+            self.left_out.add(self.stand)
 
     def decide(self, now: Situation) -> Plan | None:
         """Drive to a frontier and look round; None when there is nothing left to see."""
@@ -118,6 +124,7 @@ class Explore(Behavior):
         away = squared_distance(np.pad(~frontier, 1, constant_values=True))[1:-1, 1:-1]
         cells = self.reach / now.home.plan.lattice.cell
         near: Bool = away[self.stands[:, 0], self.stands[:, 1]] <= cells * cells
+        near[sorted(self.left_out)] = False
         return near if frontier.any() else np.zeros(len(self.stands), np.bool_)
 
     def _shown(self, actor: "Actor", stand: int) -> Bool:

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
+from fleet2d.entities.resume import resumed
 from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_camera, face
 from fleet2d.entities.robots.belief import ANYONE, room_belief
 from fleet2d.entities.robots.sites import Sites
@@ -37,6 +38,7 @@ class Search(NamedTuple):
     missed: tuple[Missed, ...] = ()
     route: tuple[int, ...] = ()  # sites to go to yet, of a policy that decides beforehand
     going_to: int | None = None
+    left_out: frozenset[int] = frozenset()  # sites that somebody didn't let it get to
 
 
 @register("behavior", "find")
@@ -136,6 +138,13 @@ class Find(Behavior):
         """Tell whether it searches."""
         return self.search is not None
 
+    def give_up(self, now: Situation) -> None:
+        """Leave out the site that it was going to, for this search."""
+        search = self.search
+        if search is not None and search.going_to is not None:
+            left_out = search.left_out | {search.going_to}
+            self.search = search._replace(left_out=left_out, route=search.route[1:], going_to=None)
+
     def decide(self, now: Situation) -> Plan | None:
         """Begin a search that is due, go on with one, or leave the robot to others."""
         plan = now.plan()
@@ -150,7 +159,15 @@ class Find(Behavior):
         name = self.user if self.user != ANYONE else next(iter(sorted(seen)), ANYONE)
         if name in seen:
             return self._found(now, plan, *seen[name])
-        return self._look_on(now, plan)
+        return self._go_on(now) or self._look_on(now, plan)
+
+    def _go_on(self, now: Situation) -> Plan | None:
+        """Return what is left of a look in which somebody else came into view."""
+        last = now.actor.plan
+        if not now.events or last.root is not self.plan or last.is_over(now.step):
+            return None
+        plan = resumed(now.actor, now.plan(), last, now.step)
+        return None if plan is None else plan.interrupt_on("user_seen")
 
     def _is_due(self, now: Situation) -> bool:
         """Tell whether a search is due, and not too late; in either case it isn't due any more."""
@@ -193,7 +210,7 @@ class Find(Behavior):
         if self.policy == "receding" or not route:
             problem = self.sites.problem(now, after_empty_looks(prior, age, memory))
             route = tuple(order_by(self.policy, problem, now.random("order")))
-        while route and not self.sites.can_go(plan, route[0]):
+        while route and (route[0] in search.left_out or not self.sites.can_go(plan, route[0])):
             route = route[1:]
         self.search = search._replace(route=route, going_to=route[0] if route else None)
         if route:

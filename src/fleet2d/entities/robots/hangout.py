@@ -46,6 +46,8 @@ class Hangout(Behavior):
     `explore` it goes to a room drawn with equal chances instead, looks all of it over, and comes
     back, so that what it believes doesn't feed on itself.
 
+    Where somebody is in its way who doesn't go away, it stays where it is until it thinks again.
+
     Events: `relocates`, with the room it goes to, and `explores`, with the room it looks over.
     """
 
@@ -101,6 +103,7 @@ class Hangout(Behavior):
         self.views: tuple[int, dict[int, Views]] = actor.home.version, {}
         self.place: int | None = None
         self.decides_at = actor.clock.start
+        self.kept_off = False  # somebody is on its place, or in front of it
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithm that it goes by."""
@@ -116,6 +119,7 @@ class Hangout(Behavior):
         if still is not None and not self._is_in_avoided_room(now):
             return plan.stay(until=still)
         if self.place is None or (still is None and now.time >= self.decides_at):
+            self.kept_off = False
             self.decides_at = now.time + self.period
             draws = now.random("hangout")
             explores = still is None and draws.uniform() < self.explore
@@ -124,7 +128,7 @@ class Hangout(Behavior):
             if explores:
                 self._look_over(now, plan, draws.choice(self.explored))
         x, y = self.places.points[self.place].tolist()
-        if (plan.x, plan.y) != (x, y):
+        if (plan.x, plan.y) != (x, y) and not self.kept_off:
             plan.go_to_point(x, y)
             self._face_people(now, plan)
         if still is not None:
@@ -132,6 +136,10 @@ class Hangout(Behavior):
         return plan.stay(until=self.decides_at).ask_by(
             self._quiet_begins(self.decides_at, now.time)
         )
+
+    def give_up(self, now: Situation) -> None:
+        """Stay where it is until it thinks again."""
+        self.kept_off = True
 
     def _is_in_avoided_room(self, now: Situation) -> bool:
         """Tell whether it is where it doesn't stay, as after a visit or when the run begins."""
