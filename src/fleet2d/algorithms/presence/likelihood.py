@@ -11,7 +11,7 @@ from pydantic import Field
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.counts import Bins, joined
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import Habits, Layout, Person, stretches_of
+from fleet2d.algorithms.presence.person import Habits, Layout, Person, stretches_of, watched_patches
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.units import Share
@@ -133,8 +133,9 @@ class Likelihood(Estimator):
         """Take in evidence that follows on that before."""
         for day in by_day(bins):
             self.take_in(day)
+            watched = watched_patches(day)
             places = [
-                person.follow(stretches_of(day, user, self.together))
+                person.follow(stretches_of(day, user, self.together, watched))
                 for user, person in enumerate(self.people)
             ]
             self.counts.add(day.day, day.minute, self._values(places, day))
@@ -169,8 +170,9 @@ class Likelihood(Estimator):
     def _end_day(self, following: int) -> None:
         """Smooth the day under way as a whole, learn from it, and go through earlier ones again."""
         bins, self.parts = joined(self.parts), []
+        watched = watched_patches(bins)
         places = [
-            person.end_day(stretches_of(bins, user, self.together))
+            person.end_day(stretches_of(bins, user, self.together, watched))
             for user, person in enumerate(self.people)
         ]
         self.counts.hours = by_hour(bins, self._values(places, bins))

@@ -219,18 +219,30 @@ class Person:
         return True
 
 
-def stretches_of(bins: Bins, user: int, longest: int) -> Stretches:
-    """Return the evidence of one user, bins that are alike taken together.
+def watched_patches(bins: Bins) -> NDArray[np.uint8]:
+    """Return how much of each patch was watched, up to WHOLE: uint8 (bins, patches).
 
-    A patch in which somebody unknown was perceived, who may be the user, doesn't count as watched.
+    One in which somebody unknown was perceived, who may be any user, doesn't count as watched.
+    """
+    seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
+    shown: NDArray[np.uint8] = np.rint(np.minimum(bins.parts.shown, 1) * WHOLE).astype(np.uint8)
+    if users:
+        shown[seen[:, -1] > seen[:, :-1].sum(axis=1)] = 0
+    return shown
+
+
+def stretches_of(
+    bins: Bins, user: int, longest: int, watched: NDArray[np.uint8] | None = None
+) -> Stretches:
+    """Return the evidence of one user, bins that are alike taken together.
 
     Args:
         bins: The evidence.
         user: Row of the user; the last is anybody.
         longest: Most bins of a stretch.
+        watched: `watched_patches` of these bins, where it is known already: for all users it is
+            the same.
     """
-    seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
-    shown = np.rint(np.minimum(bins.parts.shown, 1) * WHOLE).astype(np.uint8)
-    if users:
-        shown[seen[:, -1] > seen[:, :-1].sum(axis=1)] = 0
-    return take_together(bins.minute, shown, np.ascontiguousarray(seen[:, user]), longest)
+    watched = watched_patches(bins) if watched is None else watched
+    seen = np.ascontiguousarray(bins.parts.seen[:, user])
+    return take_together(bins.minute, watched, seen, longest)

@@ -40,7 +40,7 @@ class Hangout(Behavior):
 
     where p(room) is the probability that the user is at home and in that room, from `source`; b is
     the share of the shortest ways between two rooms that lead through the robot's body there, for a
-    person of radius 0.25 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
+    person of radius 0.2 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
     it; and m = t / (t + tau), with t the seconds on foot from where it is. It moves only to a place
     that beats the present one by `hysteresis`, and never in quiet hours. With probability
     `explore` it goes to a room drawn with equal chances instead, looks all of it over, and comes

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import Room
 
 # What people's ways are taken for: of bodies of this radius [m].
-PERSON = 0.25
+PERSON = 0.2
 # Personal space ends at 1.2 m (Hall): nearer to a seat a place is the worse, the nearer it is.
 PERSONAL = 1.2
 # Of each room so many cells are looked at as seats, where it has no furniture to sit or lie on.
