@@ -90,23 +90,30 @@ class Clearance:
         """Return the first column, from `begin` to the last but one, and at whom it drives."""
         assert isinstance(robot.entity, Robot)
         assert robot.entity.gives_way is not None
+        x, y = poses.x, poses.y
+        moves = np.flatnonzero((x[1:] != x[:-1]) | (y[1:] != y[:-1]))
+        moves = moves[moves >= begin]
+        if not len(moves):  # mostly it stands
+            return None
         units = robot.home.plan.lattice.units_per_m
         best: tuple[int, int] | None = None
-        x, y = poses.x, poses.y
-        passes = np.arange(first, first + len(x) - 1) < robot.passes_until
-        gap = np.where(passes, TOUCHING, robot.entity.gives_way.distance)
+        here_x, here_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
+        gap = np.where(
+            first + moves < robot.passes_until, TOUCHING, robot.entity.gives_way.distance
+        )
         for number, user in enumerate(self._users):
             keeps = user.entity.radius + robot.entity.radius + gap
-            dx, dy = x[:-1] - xs[number, :-1], y[:-1] - ys[number, :-1]
-            next_x, next_y = x[1:] - xs[number, :-1], y[1:] - ys[number, :-1]
-            ahead = next_x * next_x + next_y * next_y
-            close = (ahead <= (keeps * units) ** 2) & (ahead < dx * dx + dy * dy)
-            close &= (away[number, :-1] == 0) & (poses.away[:-1] == 0)
-            for column in np.flatnonzero(close).tolist():
+            user_x, user_y = xs[number, moves], ys[number, moves]
+            now = (here_x - user_x) ** 2 + (here_y - user_y) ** 2
+            ahead = (next_x - user_x) ** 2 + (next_y - user_y) ** 2
+            close = (ahead <= (keeps * units) ** 2) & (ahead < now)
+            close &= (away[number, moves] == 0) & (poses.away[moves] == 0)
+            for move in np.flatnonzero(close).tolist():
+                column = int(moves[move])
                 if best is not None and column >= best[0]:
                     break
-                there = int(xs[number, column]), int(ys[number, column])
-                if column >= begin and _sees(robot, int(x[column]), int(y[column]), there):
+                there = int(user_x[move]), int(user_y[move])
+                if _sees(robot, int(here_x[move]), int(here_y[move]), there):
                     best = column, number
                     break
         return best

@@ -56,20 +56,13 @@ class ExposureRatio(Estimator):
         """Take in evidence that follows on that before; the first says what patches there are."""
         room = bins.parts.room
         if not np.array_equal(room, self.room):
+            if self.recalled:
+                raise _foreign(len(self.room), int(self.room.max()) + 1)
             self._divide(room)
         super().observe(bins)
 
     def _divide(self, room: NDArray[np.int64]) -> None:
-        """Take the rooms to be divided into patches.
-
-        Raises:
-            ComponentError: What was recalled is of others.
-        """
-        if self.recalled or room.max(initial=-1) + 1 != self.rooms:
-            raise ComponentError(
-                f"what was learned is of {len(self.room)} patches of {self.room.max() + 1} rooms,"
-                f" not of {len(room)} of {self.rooms} as here: it is from another home"
-            )
+        """Begin with the rooms divided into patches."""
         self.room = room
         super().begin(self.rooms, self.users, self.half_life)
 
@@ -79,7 +72,10 @@ class ExposureRatio(Estimator):
 
     def recall(self, learned: Mapping[str, Any], today: int) -> None:
         """Go on from what `remember` returned; called after `begin`."""
-        self._divide(np.asarray(learned.get("room", self.room)))
+        room = np.asarray(learned.get("room", self.room))
+        if room.max(initial=-1) + 1 != self.rooms:
+            raise _foreign(len(room), int(room.max(initial=-1)) + 1)
+        self._divide(room)
         super().recall(learned, today)
         self.recalled = True
 
@@ -96,6 +92,13 @@ class ExposureRatio(Estimator):
         rate, away = ratios(sums, self.detection)
         first = np.flatnonzero(np.diff(self.room, prepend=-1))
         return normalized(np.add.reduceat(rate, first, axis=-1)), away
+
+
+def _foreign(patches: int, rooms: int) -> ComponentError:
+    return ComponentError(
+        f"what was learned is of {patches} patches of {rooms} rooms, which aren't those here: it is"
+        " from another home"
+    )
 
 
 def ratios(sums: F64, detection: float) -> tuple[F64, F64]:
