@@ -10,7 +10,8 @@ from tests.reference import presence as slow
 
 from fleet2d.algorithms.presence.chain_model import steps_of
 from fleet2d.kernels.presence import advance
-from fleet2d.kernels.stays import Moments, Stretches, Ways, follow, smooth
+from fleet2d.kernels.smoothing import smooth
+from fleet2d.kernels.stays import Moments, Stretches, Ways, follow
 
 FIRST = np.array([0, 2, 3, 6, 7], np.uint64)  # three rooms of 2, 1 and 3 patches, and away
 ROOM = np.array([0, 0, 1, 2, 2, 2, 3])

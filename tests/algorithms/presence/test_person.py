@@ -10,7 +10,8 @@ from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 from fleet2d.algorithms.evidence import Evidence, Parts
 from fleet2d.algorithms.presence.counts import Bins, in_time
 from fleet2d.algorithms.presence.person import STAY, Habits, Layout, Person, stretches_of, ways_of
-from fleet2d.kernels.stays import Moments, smooth, take_together
+from fleet2d.kernels.smoothing import smooth
+from fleet2d.kernels.stays import Moments, take_together
 
 HABITS = Habits(0.9, 0.05)
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.kernels.stays import WHOLE, Moments, Stretches, Ways, follow, smooth, take_together
+from fleet2d.kernels.smoothing import smooth
+from fleet2d.kernels.stays import WHOLE, Moments, Stretches, Ways, follow, take_together
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
