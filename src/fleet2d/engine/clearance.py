@@ -62,6 +62,8 @@ class Clearance:
             return None
         poses = empty_poses(2)
         robot.motion.trace(step, robot.state, poses)
+        if poses.x[0] == poses.x[1] and poses.y[0] == poses.y[1]:
+            return None
         where = np.array([user.state for user in self._users], np.int64)
         twice = np.repeat(where[:, None, :], 2, axis=1)
         met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], step, begin=0)

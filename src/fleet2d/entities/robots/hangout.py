@@ -101,6 +101,8 @@ class Hangout(Behavior):
         self.ways: tuple[Space, dict[tuple[int, int], NDArray[np.float64]]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.views: tuple[int, dict[int, Views]] = actor.home.version, {}
+        self.believed: NDArray[np.float64] | None = None  # by which places were rated last
+        self.worth = -self.penalty
         self.place: int | None = None
         self.decides_at = actor.clock.start
         self.kept_off = False  # somebody is on its place, or in front of it
@@ -168,11 +170,12 @@ class Hangout(Behavior):
 
     def _scores(self, now: Situation, joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the rating of each place: float64 (n,); products are summed room by room."""
-        actor, points = now.actor, self.places.points
-        gain = np.zeros(len(points))
-        for room, chance in enumerate(joint.tolist()):  # in a fixed order, unlike a matrix product
-            gain += chance * self.nearness[:, room]
-        return gain - self.penalty - self._ways(actor)
+        if self.believed is None or not np.array_equal(joint, self.believed):
+            gain = np.zeros(len(self.places.points))
+            for room, chance in enumerate(joint.tolist()):  # in a fixed order, unlike a product
+                gain += chance * self.nearness[:, room]
+            self.believed, self.worth = joint, gain - self.penalty
+        return self.worth - self._ways(now.actor)
 
     def _ways(self, actor: "Actor") -> NDArray[np.float64]:
         """Return what the way to each place counts: float64 (n,), infinite where none leads.
