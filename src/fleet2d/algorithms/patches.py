@@ -58,7 +58,7 @@ def patches_of(plan: "FloorPlan") -> Patches:
         >>> plan = fleet2d.load_floorplan()
         >>> patches = patches_of(plan)
         >>> len(plan.rooms), len(patches.room), round(float(plan.rooms[2].area_m2))
-        (14, 119, 40)
+        (14, 122, 40)
         >>> (patches.room == 2).sum(), patches.cells[patches.room == 2].sum() == plan.rooms[2].cells
         (12, True)
     """

@@ -20,6 +20,9 @@ from fleet2d.errors import ArtifactError
 PARTIAL = ".partial"
 """What the name of a file ends in until the file is whole."""
 
+# Bytes of text in one array: Arrow counts them by 32 bits.
+MOST_TEXT = 2**31 - 1
+
 _TYPES = {
     "step": pa.int64(),
     "time": pa.timestamp("us"),
@@ -102,10 +105,14 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
     if chunk.lengths is not None:
         ends = np.zeros(len(chunk.lengths) + 1, np.int64)
         np.cumsum(chunk.lengths, out=ends[1:])
-        buffers = [pa.py_buffer(ends), pa.py_buffer(np.ascontiguousarray(chunk.values))]
+        if ends[-1] > MOST_TEXT:
+            raise ArtifactError(
+                f"{column.name} is more than 2 GiB of text at once: put out less at a time"
+            )
+        # A cast of large strings would do, but it imports pyarrow.compute: a tenth of a second.
+        text = pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(np.ascontiguousarray(chunk.values))
         bitmap = None if missing is None else _bits(~missing)
-        strings = pa.LargeStringArray.from_buffers(len(chunk.lengths), *buffers, bitmap)
-        return strings.cast(pa.string())
+        return pa.StringArray.from_buffers(len(chunk.lengths), *text, bitmap)
     if dictionary is not None:
         codes = _wrapped(chunk.values, pa.int32(), missing)
         return pa.DictionaryArray.from_arrays(codes, dictionary)

@@ -1,5 +1,6 @@
 """Commands that run, and what they say: run, reproduce, export."""
 
+import gc
 import json
 import sys
 import time
@@ -126,6 +127,7 @@ def announce_compilation() -> None:
 
 
 def _run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
+    gc.freeze()  # what is loaded lives to the end: the collector need not go through it every time
     if not show:
         return simulation.run()
     from rich.console import Console
