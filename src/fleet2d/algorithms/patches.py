@@ -59,7 +59,8 @@ def patches_of(plan: "FloorPlan") -> Patches:
         >>> patches = patches_of(plan)
         >>> len(plan.rooms), len(patches.room), round(float(plan.rooms[2].area_m2))
         (14, 122, 40)
-        >>> (patches.room == 2).sum(), patches.cells[patches.room == 2].sum() == plan.rooms[2].cells
+        >>> living = patches.room == 2
+        >>> int(living.sum()), bool(patches.cells[living].sum() == plan.rooms[2].cells)
         (12, True)
     """
     rooms, count = plan.room_of_cell, len(plan.rooms)
