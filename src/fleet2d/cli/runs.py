@@ -121,7 +121,7 @@ def announce_compilation() -> None:
 
     if not cache_directory().exists():
         text = (
-            "compiling the kernels, once on this machine: about half a minute of this first run …"
+            "compiling the kernels, once on this machine: up to a minute of this first run …"
         )
         typer.echo(text, err=True)
 

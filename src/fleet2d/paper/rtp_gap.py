@@ -14,7 +14,7 @@ from fleet2d.paper.result import Result, Table, counted
 
 NAME = "rtp-gap"
 TITLE = "Fig. 7 right: accuracy of real-time presence by last-seen gap"
-MODELS = ("hmm", "semi_markov", "markov", "hour_of_week", "long_term")
+MODELS = ("routine", "hmm", "semi_markov", "markov", "hour_of_week", "long_term")
 NAIVE = "naive"
 SCORES = {"top_1": "share told right", "log_loss": "log loss [nats], smaller is better"}
 PAPER = (
