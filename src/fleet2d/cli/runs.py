@@ -120,9 +120,7 @@ def announce_compilation() -> None:
     from fleet2d.kernels._jit import cache_directory
 
     if not cache_directory().exists():
-        text = (
-            "compiling the kernels, once on this machine: up to a minute of this first run …"
-        )
+        text = "compiling the kernels, once on this machine: up to a minute of this first run …"
         typer.echo(text, err=True)
 
 
