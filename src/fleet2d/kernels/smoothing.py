@@ -48,6 +48,7 @@ def smooth(
     ahead[0] = ahead[1] = dusk / total
     likely = np.empty((3, stages, patches))
     for t in range(count - 1, -1, -1):
+        total = 0.0  # not by `sum`, which adds in another order where it isn't compiled
         for k in range(len(ways.stay)):
             s, part = k % stages, 0.0
             now_in, now_out = found.inside[t + 1, s], found.outside[t + 1, s]
@@ -55,7 +56,8 @@ def smooth(
             for p in range(first[k // stages], first[k // stages + 1]):
                 part += now_in[p] * if_in[p] + now_out[p] * if_out[p]
             places[t, k // stages] += part
-        places[t] /= places[t].sum()
+            total += part
+        places[t] /= total
         _weigh(stretches, t, found, ahead, likely)
         _step_back(ways, stretches.bins[t], t, found, likely, ahead, moments)
     return places, end, ahead[1] / ahead[1].max()
