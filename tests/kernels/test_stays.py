@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.homes import JIT_IS_OFF
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.presence.chain_model import steps_of
@@ -13,7 +14,7 @@ from fleet2d.kernels.presence import advance
 from fleet2d.kernels.smoothing import smooth
 from fleet2d.kernels.stays import Moments, Stretches, Ways, follow
 
-FIRST = np.array([0, 2, 3, 6, 7], np.uint64)  # three rooms of 2, 1 and 3 patches, and away
+SIZES = (2, 1, 3, 1)  # three rooms of so many patches, and away
 ROOM = np.array([0, 0, 1, 2, 2, 2, 3])
 PATCHES, PLACES = 7, 4
 
@@ -28,35 +29,43 @@ class Case(NamedTuple):
     seen: Any
 
 
-def case(seed: int, stages: int, count: int, longest: int) -> Case:
+def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...] = SIZES) -> Case:
     random = np.random.default_rng(seed)
-    nodes = PLACES * stages
-    chances = random.dirichlet(np.ones(PLACES + 1), nodes)
+    places, patches = len(sizes), sum(sizes)
+    nodes = places * stages
+    chances = random.dirichlet(np.ones(places + 1), nodes)
     chances[np.arange(nodes), np.arange(nodes) // stages] = 0.0
-    chances[stages - 1 :: stages, PLACES] = 0.0
+    chances[stages - 1 :: stages, places] = 0.0
     chances /= chances.sum(axis=1, keepdims=True)
-    spread = np.concatenate([random.dirichlet(np.ones(n)) for n in (2, 1, 3, 1)])
+    spread = np.concatenate([random.dirichlet(np.ones(n)) for n in sizes])
+    first = np.append(0, np.cumsum(sizes)).astype(np.uint64)
     ways = Ways(
         random.uniform(0.3, 0.99, nodes), chances, spread,
-        np.append(random.uniform(0, 0.3, PLACES - 1), 0.0), FIRST, float(random.uniform(0.3, 0.95)),
+        np.append(random.uniform(0, 0.3, places - 1), 0.0), first, float(random.uniform(0.3, 0.95)),
     )  # fmt: skip
-    shown = random.choice([0, 0, 60, 60, 255], (count, PATCHES)).astype(np.uint8)
+    shown = random.choice([0, 0, 60, 60, 255], (count, patches)).astype(np.uint8)
     shown[:, -1] = 0
     kept = random.random(count) < 0.5  # the view often stays as it was
     for t in np.flatnonzero(kept[1:]) + 1:
         shown[t] = shown[t - 1]
-    seen = np.zeros((count, PATCHES))
+    seen = np.zeros((count, patches))
     for t in np.flatnonzero(random.random(count) < 0.4):
-        patch = random.choice(PATCHES - 1, random.integers(1, 3), replace=False)
+        patch = random.choice(patches - 1, random.integers(1, 3), replace=False)
         seen[t, patch] = random.dirichlet(np.ones(len(patch)))
     begin = np.append(0, (seen > 0).sum(axis=1).cumsum())
     stretches = Stretches(
         random.integers(1, longest + 1, count), np.zeros(count, np.int64), shown, begin,
         np.nonzero(seen)[1], seen[seen > 0],
     )  # fmt: skip
-    now = random.random((2, stages, PATCHES))
-    before = random.choice([-1, 0, 60], PATCHES)
+    now = random.random((2, stages, patches))
+    before = random.choice([-1, 0, 60], patches)
     return Case(ways, stretches, now / now.sum(), before.astype(np.int64), seen)
+
+
+def no_moments(ways: Ways) -> Moments:
+    (nodes, columns), patches = ways.follow.shape, len(ways.spread)
+    rooms = np.zeros(columns - 1), np.zeros(columns - 1)
+    return Moments(np.zeros(nodes), np.zeros((nodes, columns)), np.zeros(patches), *rooms)
 
 
 def by_state(now: Any) -> Any:
@@ -104,12 +113,27 @@ def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int
     steps, weights = twin(of)
     start = by_state(np.stack([np.zeros_like(dawn), dawn]))
     _, smoothed = slow.posteriors(steps, weights, start, by_state(np.stack([dusk, dusk])))
-    nothing = Moments(
-        np.zeros(PLACES * stages), np.zeros((PLACES * stages, PLACES + 1)), np.zeros(PATCHES),
-        np.zeros(PLACES), np.zeros(PLACES),
-    )  # fmt: skip
-    places, _, _ = smooth(of.ways, of.stretches, dawn, dusk, nothing)
+    places, _, _ = smooth(of.ways, of.stretches, dawn, dusk, no_moments(of.ways))
     assert np.abs(by_place(smoothed, stages) - places).max() < 1e-9
+
+
+@pytest.mark.skipif(JIT_IS_OFF, reason="there is nothing to compare with")
+@pytest.mark.parametrize("stages", [1, 2])
+def test_compiled_or_not_it_is_the_same_to_the_last_bit(stages: int) -> None:
+    """A sum over more than eight rooms by `sum` was added up in another order uncompiled."""
+    of = case(3, stages, 12, 3, sizes=(2, 1, 3, 1, 4, 2, 1, 5, 2, 3, 1, 2, 1))
+    dawn, found = of.now.sum(axis=0), []
+    for smoothed in (smooth, smooth.py_func):
+        moments = no_moments(of.ways)
+        found.append(
+            (*smoothed(of.ways, of.stretches, dawn, np.ones_like(dawn), moments), *moments)
+        )
+    for followed in (follow, follow.py_func):
+        now = of.now.copy()
+        found.append((followed(of.ways, of.stretches, now, of.shown.copy()), now))
+    for compiled, plain in (found[:2], found[2:]):
+        for one, other in zip(compiled, plain, strict=True):
+            assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("cut", [1, 3, 6])
