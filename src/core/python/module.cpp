@@ -1,0 +1,31 @@
+// The module fleet2d._core.
+#define FLEET2D_IMPORTS_NUMPY
+#include "arrays.hpp"
+#include "subjects.hpp"
+
+NB_MODULE(_core, m) {
+    using namespace fleet2d;
+    if (_import_array() < 0) throw nb::python_error();
+    m.doc() = "The compiled core of Fleet2D: arrays and integers in, arrays and integers out.";
+    bind_mesh(m);
+    bind_headings(m);
+    bind_random(m);
+    bind_lens(m);
+    bind_sight(m);
+    bind_chambers(m);
+    bind_masks(m);
+    bind_fields(m);
+    bind_taut(m);
+    bind_region(m);
+    bind_seen(m);
+    bind_watch(m);
+    bind_motion(m);
+    bind_measure(m);
+    bind_points(m);
+    bind_perception(m);
+    bind_look(m);
+    bind_routes(m);
+    bind_presence(m);
+    bind_stays(m);
+    bind_smoothing(m);
+}

@@ -1,0 +1,8 @@
+#include "arrays.hpp"
+#include "subjects.hpp"
+
+namespace fleet2d {
+
+void bind_seen(nb::module_&) {}
+
+}  // namespace fleet2d

@@ -1,0 +1,30 @@
+// One function for each subject of the core that adds it to the module.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace fleet2d {
+
+void bind_mesh(nanobind::module_& m);
+void bind_headings(nanobind::module_& m);
+void bind_random(nanobind::module_& m);
+void bind_lens(nanobind::module_& m);
+void bind_sight(nanobind::module_& m);
+void bind_chambers(nanobind::module_& m);
+void bind_masks(nanobind::module_& m);
+void bind_fields(nanobind::module_& m);
+void bind_taut(nanobind::module_& m);
+void bind_region(nanobind::module_& m);
+void bind_seen(nanobind::module_& m);
+void bind_watch(nanobind::module_& m);
+void bind_motion(nanobind::module_& m);
+void bind_measure(nanobind::module_& m);
+void bind_points(nanobind::module_& m);
+void bind_perception(nanobind::module_& m);
+void bind_look(nanobind::module_& m);
+void bind_routes(nanobind::module_& m);
+void bind_presence(nanobind::module_& m);
+void bind_stays(nanobind::module_& m);
+void bind_smoothing(nanobind::module_& m);
+
+}  // namespace fleet2d
