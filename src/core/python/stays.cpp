@@ -15,7 +15,8 @@ void bind_stays(nb::module_& m) {
               return std::tuple(std::move(made.bins), std::move(made.hour), std::move(made.shown),
                                 std::move(made.begin), std::move(made.patch), std::move(made.share));
           },
-          "minute"_a, "shown"_a, "seen"_a, "longest"_a, Unlocked());
+          "minute"_a, "shown"_a, "seen"_a, "longest"_a, Unlocked(),
+          "Take together bins that are alike; see `fleet2d.kernels.stays`.");
     m.def("follow",
           [](const Ways& ways, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {
               check_stays(ways, stretches);
@@ -24,7 +25,22 @@ void bind_stays(nb::module_& m) {
                       "now must be (2, stages, patches), shown (patches,)");
               return follow(ways, stretches, now, shown);
           },
-          "ways"_a, "stretches"_a, "now"_a, "shown"_a, Unlocked());
+          "ways"_a, "stretches"_a, "now"_a, "shown"_a, Unlocked(),
+          R"(Return where a person was, given the evidence up to each stretch; see `smooth`.
+
+Args:
+    ways: How the person goes on.
+    stretches: The evidence, of one stretch at least.
+    now: float64 (2, stages, patches), probability before the first stretch, of states in view and
+        of hidden ones; becomes that after the last.
+    shown: int64 (patches,), what part of each patch was in view before, in 1/255, -1 if that isn't
+        known; becomes that of the last.
+
+Returns:
+    P(room), away last, in each stretch: float64 (stretches, rooms + 1).
+
+Raises:
+    ValueError: Arrays aren't of one person, or hold numbers of patches or sightings that aren't.)");
 }
 
 }  // namespace fleet2d
