@@ -14,7 +14,7 @@ HOME = ""
 class EventKind(StrEnum):
     """Every kind of event that Fleet2D itself records.
 
-    A behavior that records others declares them by `notes` in its class.
+    A behavior that records others declares them by `records` in its class.
     """
 
     # Of cameras.
@@ -60,6 +60,7 @@ class EventKind(StrEnum):
     UNLOCKED = "unlocked"
 
 
+KINDS = frozenset(kind.value for kind in EventKind)
 SIGHTS = frozenset(
     {EventKind.USER_LOST, EventKind.USER_SEEN, EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN}
 )

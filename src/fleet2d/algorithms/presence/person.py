@@ -226,7 +226,8 @@ def watched_patches(bins: Bins) -> NDArray[np.uint8]:
     One in which somebody unknown was perceived, who may be any user, doesn't count as watched.
     """
     seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
-    shown: NDArray[np.uint8] = np.rint(np.minimum(bins.parts.shown, 1) * WHOLE_PATCH).astype(np.uint8)
+    whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
+    shown: NDArray[np.uint8] = np.rint(whole).astype(np.uint8)
     if users:
         shown[seen[:, -1] > seen[:, :-1].sum(axis=1)] = 0
     return shown
