@@ -40,7 +40,7 @@ from fleet2d.engine.state import State
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ArtifactError, InputError, ScenarioError
-from fleet2d.events import Event, EventKind
+from fleet2d.events import Event, EventKind, Listener
 from fleet2d.floorplan.change import HomeChange
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import TURN, in_radians
@@ -377,6 +377,10 @@ class Simulation:
         """
         self._state.settle(self.step)
         return self._state.events.since(since)
+
+    def listen(self, function: Callable[[Sequence[Event]], None]) -> None:
+        """Call a function with what happens, as it becomes known: not always in order of step."""
+        self._state.events.sinks.append(Listener(function))
 
     # Interventions: each is kept in the manifest, and done again by `reproduce`.
 
