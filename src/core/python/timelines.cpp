@@ -351,7 +351,7 @@ Args:
             "__setstate__",
             [](OwnedTimelines& self, nb::tuple state) {
                 require(state.size() == 3, NO_STATE);
-                OwnedTimelines made(Part<i64>(state[0]).value(), Part<i64>(state[1]).value());
+                OwnedTimelines made(Part<i64>{state[0]}.value(), Part<i64>{state[1]}.value());
                 made.restore(state[2]);
                 new (&self) OwnedTimelines(std::move(made));
             },
