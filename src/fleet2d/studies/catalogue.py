@@ -161,9 +161,7 @@ def label_array(labels: list[Label]) -> "pa.Array":
     return pa.array([None if label is None else str(label) for label in labels], pa.string())
 
 
-def write_catalogue(
-    directory: StudyDirectory, plan: Plan, scenarios: Callable[[], bytes]
-) -> None:
+def write_catalogue(directory: StudyDirectory, plan: Plan, scenarios: Callable[[], bytes]) -> None:
     """Write the plan and the scenarios of a study."""
     directory.storage.write(SCENARIOS, scenarios())
     directory.write_table(PLAN, plan_table(plan))

@@ -1,6 +1,5 @@
 """The variants of a study: which there are, and the scenario of each."""
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -79,6 +78,16 @@ class Design:
     def columns(self) -> tuple[str, ...]:
         """The columns of all axes, and the seed."""
         return (*(column for axis in self.axes for column in axis.columns), SEED)
+
+    @property
+    def labels(self) -> dict[str, list[Label]]:
+        """The labels of each column, in order."""
+        found: dict[str, list[Label]] = {}
+        for axis in self.axes:
+            for column in axis.columns:
+                labels = (choice.labels[column] for choice in axis.choices)
+                found[column] = list(dict.fromkeys(labels))
+        return {**found, SEED: list(self.seeds)}
 
     def __len__(self) -> int:
         """Return the number of variants."""
@@ -179,7 +188,6 @@ def build_design(specification: Specification) -> Design:
         RulePlan(rule.when, _change(rule.set.items(), _place(specification, "rules", i)))
         for i, rule in enumerate(file.rules)
     )
-    _check_conditions(specification, axes)
     count = 1
     for axis in axes:
         count *= len(axis.choices)
@@ -191,6 +199,7 @@ def build_design(specification: Specification) -> Design:
     base = merge(specification.base, _artifacts(file.keep.tables))
     seeds = file.replicates or (_base_seed(specification.base),)
     design = Design(base, specification.folder, axes, rules, file.exclude, seeds)
+    _check_conditions(specification, design)
     if not design.combinations:
         raise ScenarioError(f"{specification.name} has no variants: all are excluded")
     return design
@@ -228,15 +237,11 @@ def _place(specification: Specification, *location: str | int) -> str:
     return f"{words}, {place}" if place else words
 
 
-def _check_conditions(specification: Specification, axes: Sequence[AxisPlan]) -> None:
+def _check_conditions(specification: Specification, design: Design) -> None:
     """Refuse conditions on values that no axis has: they would silently never hold."""
     file = specification.file
-    known: dict[str, list[Label]] = {}
-    for axis in axes:
-        for choice, column in itertools.product(axis.choices, axis.columns):
-            known.setdefault(column, []).append(choice.labels[column])
     conditions: list[tuple[tuple[str | int, ...], Mapping[str, Any]]] = [
-        *(((("axes", axis.name, "when")), axis.when) for axis in axes),
+        *(((("axes", axis.name, "when")), axis.when) for axis in design.axes),
         *((("rules", i, "when"), rule.when) for i, rule in enumerate(file.rules)),
         *((("exclude", i), condition) for i, condition in enumerate(file.exclude)),
         *((("compare", i, "against"), one.against) for i, one in enumerate(file.compare)),
@@ -246,7 +251,7 @@ def _check_conditions(specification: Specification, axes: Sequence[AxisPlan]) ->
     for location, condition in conditions:
         for column, wanted in condition.items():
             values = wanted if isinstance(wanted, list | tuple) else [wanted]
-            labels = list(dict.fromkeys(known.get(column, file.replicates)))
+            labels = design.labels[column]
             for value in values:
                 if not any(same_label(label, value) for label in labels):
                     place = specification.places.place((*location, column))

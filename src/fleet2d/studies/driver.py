@@ -1,5 +1,6 @@
 """Running a study: what is missing is run, each result is kept at once, and at the end all is one
-data set."""
+data set.
+"""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -257,5 +258,3 @@ def _describe(found: Reconciled, directory: StudyDirectory, observer: Observer) 
         observer.note(f"{found.new} variants are new in {directory.location}")
     if found.set_aside:
         observer.note(f"{found.set_aside} results no longer belong to the study: set aside")
-
-

@@ -9,6 +9,7 @@ import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fleet2d.engine.simulation import Simulation
@@ -59,13 +60,17 @@ def check_setup(scenario: Scenario) -> None:
     Simulation(scenario)
 
 
-def run_scenario(scenario: Scenario) -> "Run":
-    """Run a scenario in memory.
+def run_scenario(
+    scenario: Scenario | Mapping[str, Any] | str | Path | None,
+    out: str | Path | None = None,
+    **settings: Any,
+) -> "Run":
+    """Run a scenario, in memory or stored.
 
     Raises:
         Fleet2DError: It is wrong, or a component failed.
     """
-    return Simulation(scenario).run()
+    return Simulation(scenario, out=out, **settings).run()
 
 
 def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> Outcome:
@@ -128,3 +133,44 @@ def peak_rss_mb() -> float:
         return 0.0
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a scenario runs here.
+
+    Attributes:
+        setup_s: Wall time of its set-up [s].
+        speedup: Simulated time by wall time after that.
+    """
+
+    setup_s: float
+    speedup: float
+
+    def seconds(self, simulated_s: float) -> float:
+        """Return the wall time of a run [s]."""
+        return self.setup_s + simulated_s / self.speedup
+
+
+def measure(scenario: Scenario, simulated_s: float = 86_400.0, most_s: float = 2.0) -> Pace:
+    """Run the beginning of a scenario to see how fast it goes.
+
+    Args:
+        scenario: The scenario.
+        simulated_s: How much of it, if it lasts that long [s].
+        most_s: Wall time after which it is enough [s].
+
+    Raises:
+        Fleet2DError: It is wrong, or a component failed.
+    """
+    began = time.perf_counter()
+    simulation = Simulation(scenario)
+    ready = time.perf_counter()
+    hour = max(1, int(3600e6 / simulation.clock.step_us))
+    while not simulation.done and time.perf_counter() - ready < most_s:
+        simulation.advance(hour)
+        if simulation.step * simulation.clock.step_us / 1e6 >= simulated_s:
+            break
+    wall_s = max(time.perf_counter() - ready, 1e-6)
+    done_s = simulation.step * simulation.clock.step_us / 1e6
+    return Pace(ready - began, done_s / wall_s)

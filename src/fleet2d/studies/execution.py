@@ -1,7 +1,7 @@
 """What every executor offers: tasks in, and what becomes of each out."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -38,7 +38,7 @@ class Executor(Protocol):
 
     workers: int
 
-    def run(self, job: Job, tasks: Schedule) -> Iterator[Event]:
+    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
         """Yield what becomes of each task as it is known; closing the iterator ends all work."""
         ...
 

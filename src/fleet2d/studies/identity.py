@@ -55,7 +55,9 @@ class FileHashes:
             if key not in self._known:
                 self._known[key] = hashlib.sha256(path.read_bytes()).hexdigest()
         except OSError as error:
-            raise InputError(f"{path} can't be read: {error.strerror}; a variant needs it") from error
+            raise InputError(
+                f"{path} can't be read: {error.strerror}; a variant needs it"
+            ) from error
         return self._known[key]
 
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -73,7 +73,7 @@ class LocalExecutor:
         """The ids of the worker processes."""
         return [worker.process.pid for worker in self._crew]
 
-    def run(self, job: Job, tasks: Schedule) -> Iterator[Event]:
+    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
         """Yield what becomes of each task as it is known; closing the iterator ends all work.
 
         Raises:

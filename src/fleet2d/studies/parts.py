@@ -17,7 +17,6 @@ from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     from fleet2d.studies.journal import Journal
 

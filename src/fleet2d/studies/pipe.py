@@ -2,7 +2,7 @@
 
 import pickle
 import struct
-from typing import Any, IO
+from typing import IO, Any
 
 _LENGTH = struct.Struct("<Q")
 

@@ -8,7 +8,7 @@ from fleet2d.artifacts.directory import is_disk_full
 from fleet2d.errors import ArtifactError, RunDirectoryError
 
 if TYPE_CHECKING:
-    import pyarrow.fs as pafs
+    pass
 
 COPY_BYTES = 1 << 22
 
@@ -141,7 +141,10 @@ class Storage:
                     os.fsync(file.fileno())
                 local.replace(target)
                 return
-            with local.open("rb") as file, self.filesystem.open_output_stream(self.path(name)) as out:
+            with (
+                local.open("rb") as file,
+                self.filesystem.open_output_stream(self.path(name)) as out,
+            ):
                 while block := file.read(COPY_BYTES):
                     out.write(block)
             local.unlink()

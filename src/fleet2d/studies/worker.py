@@ -8,7 +8,7 @@ import queue
 import sys
 import threading
 import traceback
-from typing import Any, IO
+from typing import IO, Any
 
 from fleet2d.studies.pipe import receive, send
 
