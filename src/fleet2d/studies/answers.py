@@ -140,7 +140,7 @@ def verdict(found: Estimate, reference: str) -> str:
     units = found.spread.units
     if math.isnan(found.low):
         return "one pair only: nothing can be told; run it with more seeds and homes"
-    few = [f"{n} of {level}" for level, n in units.items() if n < FEW_UNITS]
+    few = [f"{n} values of {level}" for level, n in units.items() if n < FEW_UNITS]
     caution = f"; few replicates: {', '.join(few)}" if few else ""
     if found.low == found.high == 0:
         return f"the same as {reference} in every pair"
@@ -148,11 +148,12 @@ def verdict(found: Estimate, reference: str) -> str:
         way = "above" if found.mean > 0 else "below"
         return f"{way} {reference}{caution}"
     needed = found.needed()
-    ways = [f"{n} of {level} instead of {units[level]}" for level, n in needed.items()]
-    if ways:
-        return f"too few replicates to tell: a difference of this size wants {' or '.join(ways)}"
-    several = " and ".join(units)
-    return f"too few replicates to tell: a difference of this size wants many more of {several}"
+    ways = [f"{n} values of {level} (now {units[level]})" for level, n in needed.items()]
+    if not ways:
+        ways = ["many more of " + " and of ".join(units)]
+    return (
+        f"too few replicates to tell: a difference of this size would show with {' or '.join(ways)}"
+    )
 
 
 def summary(
@@ -241,5 +242,5 @@ def _between(frame: "pl.DataFrame", columns: Sequence[str], metric: str) -> floa
     import polars as pl
 
     cells = frame.group_by(list(columns)).agg(pl.col(metric).mean(), pl.len().alias(VARIANT))
-    grand = float(frame[metric].mean())  # type: ignore[arg-type]
+    grand = float(frame[metric].mean())
     return float((cells[VARIANT] * (cells[metric] - grand) ** 2).sum())

@@ -128,7 +128,7 @@ def make_executor(executor: ExecutorName | Executor, workers: int | None = None)
         from fleet2d.studies.ray_executor import RayExecutor
 
         return RayExecutor(workers)
-    raise InputError(f"there is no executor {executor!r}: local or ray")
+    raise InputError(f"there is no executor {executor!r}: give local or ray")
 
 
 def default_location(name: str) -> str:

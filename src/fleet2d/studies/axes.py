@@ -1,6 +1,5 @@
 """The kinds of axes of a study; each turns its keys into choices."""
 
-import glob
 import itertools
 import math
 from collections.abc import Iterator, Mapping
@@ -187,7 +186,7 @@ class FloorplansAxis(Axis):
         files: list[Path] = []
         for pattern in self.floorplans:
             path = folder_of(pattern) / Path(pattern).expanduser()
-            found = sorted(path.iterdir()) if path.is_dir() else map(Path, glob.glob(str(path)))
+            found = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
             plans = sorted(p for p in found if p.suffix.lower() in FLOORPLAN_SUFFIXES)
             if not plans:
                 raise ScenarioError(

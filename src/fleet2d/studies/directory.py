@@ -64,7 +64,7 @@ class Meta:
                 " update Fleet2D"
             )
         lists = ("columns", "populations", "tables", "compare")
-        values = {key: content[key] for key in cls.__dataclass_fields__}
+        values: dict[str, Any] = {key: content[key] for key in cls.__dataclass_fields__}
         return cls(**{k: tuple(v) if k in lists else v for k, v in values.items()})
 
 

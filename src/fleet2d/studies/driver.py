@@ -1,11 +1,9 @@
-"""Running a study: what is missing is run, each result is kept at once, and at the end all is one
-data set.
-"""
+"""Running a study: what is missing is run, and each result is kept at once."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -116,7 +114,7 @@ class RunOptions:
 
     fail_fast: bool = False
     changed: Changed | None = None
-    observer: Observer = SilentObserver()
+    observer: Observer = field(default_factory=SilentObserver)
 
 
 def run_study(
@@ -167,7 +165,7 @@ def run_study(
     return Counts(len(states), states.count("complete"), states.count("failed"))
 
 
-def _events(executor: Executor, job: StudyJob, tasks: list[Task]) -> Iterator[Event]:
+def _events(executor: Executor, job: StudyJob, tasks: list[Task]) -> Generator[Event]:
     if tasks:
         yield from executor.run(job, Schedule(tasks))
 

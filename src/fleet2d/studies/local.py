@@ -92,7 +92,8 @@ class LocalExecutor:
                 elif message[0] == READY:
                     worker.is_ready, self._failed_starts = True, 0
                 else:
-                    yield self._finished(worker, *message[1], attempts)
+                    task, payload, rss_mb = message[1]
+                    yield self._finished(worker, task, payload, rss_mb, attempts)
                 self._hand_out(worker, tasks)
         finally:
             self._stop()

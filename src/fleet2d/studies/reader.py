@@ -331,7 +331,7 @@ def open_study(location: str | Path) -> Study:
 
 def _polars() -> Any:
     try:
-        import polars
+        import polars as pl
     except ImportError:
         raise InputError('this needs polars: pip install "fleet2d[study]"') from None
-    return polars
+    return pl
