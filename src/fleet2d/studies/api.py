@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.studies.catalogue import Changed
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution import Executor, Lost, cores
+from fleet2d.studies.execution import Executor, Lost, SerialExecutor, cores
 from fleet2d.studies.jobs import FunctionJob
 from fleet2d.studies.local import LocalExecutor
 from fleet2d.studies.progress import observing
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fleet2d.scenario.model import Scenario
 
 Result = TypeVar("Result")
-ExecutorName = Literal["local", "ray"]
+ExecutorName = Literal["local", "ray", "serial"]
 
 
 def study(
@@ -41,7 +41,7 @@ def study(
         source: A study file, or the same as a mapping.
         out: A folder, or a location like s3://bucket/study; None: studies/NAME.
         workers: Processes at a time; None: one per core.
-        executor: Where they run: `local`, `ray`, or an executor of your own.
+        executor: Where they run: `local`, `ray`, `serial` (in this process), or one of your own.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None
             refuses to mix them.
@@ -124,11 +124,13 @@ def make_executor(executor: ExecutorName | Executor, workers: int | None = None)
         return executor
     if executor == "local":
         return LocalExecutor(workers or cores())
+    if executor == "serial":
+        return SerialExecutor()
     if executor == "ray":
         from fleet2d.studies.ray_executor import RayExecutor
 
         return RayExecutor(workers)
-    raise InputError(f"there is no executor {executor!r}: give local or ray")
+    raise InputError(f"there is no executor {executor!r}: give local, ray or serial")
 
 
 def default_location(name: str) -> str:

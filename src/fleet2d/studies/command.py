@@ -35,7 +35,8 @@ def run(
     ] = None,
     workers: Workers = None,
     executor: Annotated[
-        Literal["local", "ray"], typer.Option(help="Where the workers are.")
+        Literal["local", "ray", "serial"],
+        typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
     ] = "local",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check all, and print the variants and their time.")

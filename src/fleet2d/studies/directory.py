@@ -65,7 +65,8 @@ class Meta:
             )
         lists = ("columns", "populations", "tables", "compare")
         values: dict[str, Any] = {key: content[key] for key in cls.__dataclass_fields__}
-        return cls(**{k: tuple(v) if k in lists else v for k, v in values.items()})
+        values |= {key: tuple(values[key]) for key in lists}
+        return cls(**values)
 
 
 class StudyDirectory:

@@ -36,11 +36,25 @@ Event = Finished | Lost
 class Executor(Protocol):
     """Runs tasks somewhere."""
 
-    workers: int
+    @property
+    def workers(self) -> int:
+        """How many tasks run at a time."""
+        ...
 
     def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
         """Yield what becomes of each task as it is known; closing the iterator ends all work."""
         ...
+
+
+class SerialExecutor:
+    """Runs tasks in this process, one after the other: for debuggers and profilers."""
+
+    workers = 1
+
+    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+        """Yield what becomes of each task."""
+        while (task := tasks.take(self)) is not None:
+            yield Finished(task, job(task), 1)
 
 
 def lose(task: Task, attempts: dict[int, int], tasks: Schedule, reason: str) -> Lost | None:

@@ -58,7 +58,7 @@ class RayExecutor:
         self._ray = _ray()
         self._was_joined = self._ray.is_initialized()
         if not self._was_joined:
-            _join(self._ray, address, workers)
+            _join(self._ray, address)
         self._most = workers
         self._crew: list[_Actor] = []
         self._failed_starts = 0
@@ -157,7 +157,7 @@ def _worker_class(ray: Any) -> Any:
     return ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Worker)
 
 
-def _join(ray: Any, address: str | None, workers: int | None) -> None:
+def _join(ray: Any, address: str | None) -> None:
     # Workers on this machine find what this process finds.
     paths = os.pathsep.join(filter(None, sys.path))
     options: dict[str, Any] = {

@@ -79,7 +79,7 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np
     Raises:
         InputError: scipy is missing, which draws Latin hypercubes.
     """
-    generator = np.random.Generator(np.random.Philox(key=seed))
+    generator = np.random.Generator(np.random.Philox(seed))
     if method == "random":
         return generator.random((count, dimensions))
     try:

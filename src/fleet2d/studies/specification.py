@@ -12,11 +12,11 @@ from fleet2d.component import Settings
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at
-from fleet2d.scenario.compose import changed, compose
+from fleet2d.scenario.compose import compose
 from fleet2d.scenario.document import Document, read_document
 from fleet2d.scenario.explain import explain
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.axes import AnyAxis, Axis
+from fleet2d.studies.axes import AnyAxis
 from fleet2d.studies.tune_settings import TuneSettings
 
 SEED = "seed"
@@ -241,13 +241,8 @@ def _inline_base(base: Mapping[str, Any], document: Document) -> Document:
         str(p) if str(p).startswith("bundled:") else str(folder_of(p) / Path(str(p)).expanduser())
         for p in parents
     ]
-    below = compose({"extends": paths})
     own = {key: value for key, value in base.items() if key != "extends"}
+    composed = compose({"extends": paths, **own})
     places = {keys[1:]: where for keys, where in document.places.items() if keys[:1] == ("base",)}
-    places = {keys: where for keys, where in places.items() if keys[:1] != ("extends",)}
-    return changed(below, [Document(own, places)]) if own else below
-
-
-def axis_of_column(file: StudyFile, column: str) -> tuple[str, Axis]:
-    """Return the axis that fills a column, and its name."""
-    return next((n, axis) for n, axis in file.axes.items() if column in axis.columns(n))
+    composed.places.update((k, where) for k, where in places.items() if k[:1] != ("extends",))
+    return composed
