@@ -105,7 +105,7 @@ def test_an_interrupted_study_can_be_read(tmp_path: Path) -> None:
         run(small(**ROWS), tmp_path / "study", CountingExecutor(2))
     study = driver_open(tmp_path / "study")
     assert ["complete"] * 2 + ["missing"] * 4 == study.variants["status"].to_list()
-    assert 2 == study.arrow("room_share").to_table().column("variant").unique().length()
+    assert 2 == len(study.arrow("room_share").to_table().column("variant").unique())
 
 
 def driver_open(folder: Path) -> Any:

@@ -274,7 +274,7 @@ def _refuse_unknown_deletions(below: Document, above: Document) -> None:
 def _refuse_unknown_entries(below: Document, change: Document, changes: Sequence[Document]) -> None:
     """Refuse to reach inside an entry that isn't there, unless the change says what it is."""
     reached = {keys[:2]: single for single in changes for keys in single.places if len(keys) > 2}
-    whole = {max(single.places, key=len) for single in changes}
+    whole = {max(single.places, key=len) for single in changes if single.places}
     for (section, name), single in reached.items():
         if section not in ENTRIES or (section, name) in whole or (section,) in whole:
             continue

@@ -1,5 +1,6 @@
 """The commands `fleet2d study run`, `status`, `rerun`, `report`, and `fleet2d tune`."""
 
+import gc
 import json
 import signal
 import sys
@@ -61,6 +62,7 @@ def run(
         _print_plan(checked, workers)
         return
     location = out or default_location(checked.specification.name)
+    gc.freeze()  # what is loaded lives to the end, which comes at once then
     with _terminated_as_interrupted():
         try:
             with observing(show=sys.stderr.isatty() and not quiet) as observer:
@@ -213,3 +215,48 @@ def _terminated_as_interrupted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def tune(
+    source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="A study that tunes.")],
+    out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
+    workers: Workers = None,
+    executor: Annotated[
+        Literal["local", "ray", "serial"], typer.Option(help="Where the workers are.")
+    ] = "local",
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Search parameters on training homes, and judge what is found on homes not seen."""
+    from fleet2d.studies.api import default_location, make_executor
+    from fleet2d.studies.progress import observing_trials
+    from fleet2d.studies.specification import read_specification
+    from fleet2d.studies.tune import tune as search
+
+    specification = read_specification(source)
+    folder = out or Path(default_location(f"{specification.name}-tune"))
+    with _terminated_as_interrupted():
+        try:
+            with observing_trials(show=sys.stderr.isatty() and not quiet) as observer:
+                found = search(specification, folder, make_executor(executor, workers), observer)
+        except KeyboardInterrupt:
+            typer.echo(f"interrupted; {folder} has what is finished: the same command goes on",
+                       err=True)  # fmt: skip
+            raise typer.Exit(130) from None
+    if quiet:
+        return
+    counts = ", ".join(f"{n} {state}" for state, n in found.trials.items())
+    typer.echo(f"trials: {counts}; in {folder}")
+    for name, settings in found.settings.items():
+        values = ", ".join(f"{value:.4g}" for value in found.values[name])
+        typer.echo(f"{name}: {values} on the training homes")
+        for key, value in settings.items():
+            typer.echo(f"  {key}={value}")
+    assert specification.file.tune is not None
+    for metric in specification.file.tune.objectives:
+        typer.echo(f"{metric} on the homes held out:")
+        for row in found.held_out.paired(metric, {"setting": "as it was"}).to_dicts():
+            interval = f"({row['low']:.4g} to {row['high']:.4g})"
+            typer.echo(
+                f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
+                f" difference {row['difference']:.4g} {interval}: {row['verdict']}"
+            )

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from fleet2d.studies.record import Record
     from fleet2d.studies.results import Counts
+    from fleet2d.studies.tune import TuneObserver
 
 
 class BarObserver:
@@ -97,3 +98,23 @@ def in_words(time_span: timedelta) -> str:
         if seconds >= unit:
             return f"{seconds / unit:.1f} {name}"
     return f"{seconds:.1f} s"
+
+
+@contextmanager
+def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
+    """Return what shows the progress of a search, on a terminal only."""
+    if not show:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("trials", total=None)
+
+        def ended(done: int, trials: int, best: list[float] | None) -> None:
+            words = "" if best is None else ", ".join(f"{value:.4g}" for value in best)
+            progress.update(task, completed=done, total=trials, description=f"best {words}")
+
+        yield ended
