@@ -28,14 +28,17 @@ class _Actor:
 
     Attributes:
         handle: Ray's.
+        start: A reference that is there once it is set up; until then it is given no tasks, for
+            it may wait for a core that never comes.
         tasks: The tasks that it holds with their references; it is running the first.
-        has_worked: Whether it has ever finished one.
+        is_ready: Whether it is set up.
     """
 
     handle: Any
+    start: Any
     number: int = field(default_factory=lambda: next(_numbers))
     tasks: deque[tuple[Task, Any]] = field(default_factory=deque)
-    has_worked: bool = False
+    is_ready: bool = False
 
 
 class RayExecutor:
@@ -80,21 +83,48 @@ class RayExecutor:
         try:
             while tasks or any(actor.tasks for actor in self._crew):
                 self._fill(shared, tasks)
-                running = {actor.tasks[0][1]: actor for actor in self._crew if actor.tasks}
-                ready, _ = self._ray.wait(list(running), timeout=LOOK_EVERY_S)
+                awaited = {
+                    actor.tasks[0][1] if actor.is_ready else actor.start: actor
+                    for actor in self._crew
+                    if actor.tasks or not actor.is_ready
+                }
+                ready, _ = self._ray.wait(list(awaited), timeout=LOOK_EVERY_S)
                 for reference in ready:
-                    yield from self._take(running[reference], tasks, attempts)
+                    actor = awaited[reference]
+                    if actor.is_ready:
+                        yield from self._take(actor, tasks, attempts)
+                    else:
+                        self._begin(actor)
         finally:
             self._stop()
 
     def _fill(self, shared: Any, tasks: Schedule) -> None:
-        """Start workers for cores that have none, and give everybody something to do."""
-        wanted = min(self.workers, len(self._crew) + len(tasks))
-        for _ in range(wanted - len(self._crew)):
-            self._crew.append(_Actor(_worker_class(self._ray).remote([shared])))
+        """Start workers for cores that have none, and give those that are up something to do."""
+        cores = self.workers
+        for actor in [actor for actor in self._crew if not actor.is_ready]:
+            if len(self._crew) > cores:  # the core that it was meant for is gone
+                self._ray.kill(actor.handle)
+                self._crew.remove(actor)
+        for _ in range(min(cores, len(self._crew) + len(tasks)) - len(self._crew)):
+            handle = _worker_class(self._ray).remote([shared])
+            self._crew.append(_Actor(handle, handle.is_up.remote()))
         for actor in self._crew:
-            while len(actor.tasks) < AHEAD and (task := tasks.take(actor.number)) is not None:
+            while actor.is_ready and len(actor.tasks) < AHEAD:
+                task = tasks.take(actor.number)
+                if task is None:
+                    break
                 actor.tasks.append((task, actor.handle.run.remote(task)))
+
+    def _begin(self, actor: _Actor) -> None:
+        """Take in that a worker is set up, or that it could not be."""
+        try:
+            self._ray.get(actor.start)
+            actor.is_ready, self._failed_starts = True, 0
+        except self._ray.exceptions.RayError as error:
+            self._crew.remove(actor)
+            self._failed_starts += 1
+            if self._failed_starts > MOST_STARTS * self.workers:
+                raise InputError(f"workers end before they can work: {error}") from error
 
     def _take(self, actor: _Actor, tasks: Schedule, attempts: dict[int, int]) -> Generator[Event]:
         """Yield what became of the first task of a worker."""
@@ -103,10 +133,7 @@ class RayExecutor:
             payload = self._ray.get(reference)
         except self._ray.exceptions.RayActorError as error:
             yield from self._replace(actor, task, tasks, attempts, error)
-        except self._ray.exceptions.RayTaskError as error:
-            raise InputError(f"a worker can't be set up:\n{error}") from error
         else:
-            actor.has_worked, self._failed_starts = True, 0
             yield Finished(task, payload, attempts.get(task.number, 0) + 1)
 
     def _replace(
@@ -122,10 +149,6 @@ class RayExecutor:
         tasks.leave(actor.number)
         for task, _ in reversed(actor.tasks):
             tasks.put_back(task)
-        if not actor.has_worked:
-            self._failed_starts += 1
-            if self._failed_starts > MOST_STARTS * self.workers:
-                raise InputError(f"workers end before they can work: {error}") from error
         lost = lose(running, attempts, tasks, f"the worker is gone ({type(error).__name__})")
         if lost is not None:
             yield lost
@@ -146,6 +169,10 @@ class Worker:
     def __init__(self, shared: list[Any]) -> None:
         """Fetch the job."""
         self._job: Job = _ray().get(shared[0])
+
+    def is_up(self) -> bool:
+        """Return that it is set up."""
+        return True
 
     def run(self, task: Task) -> bytes:
         """Do a task."""

@@ -1,6 +1,7 @@
 """Where a study's files lie: a local folder, or any store that pyarrow's file systems reach."""
 
 import os
+import re
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ class Storage:
     """Files by name; a file is there whole, or not at all.
 
     Attributes:
-        location: What the user wrote.
+        location: What the user wrote, without the secrets in it.
         folder: The local folder; None for a remote store.
         filesystem: That of pyarrow.
         root: The folder's path in it.
@@ -42,19 +43,20 @@ class Storage:
         import pyarrow as pa
         import pyarrow.fs as pafs
 
-        self.location = str(location)
+        self._written = str(location)
+        self.location = re.sub(r"//[^/@]*@", "//", self._written)
         self.folder: Path | None = None
         self.filesystem: pafs.FileSystem
-        if "://" in self.location:
+        if "://" in self._written:
             try:
-                self.filesystem, self.root = pafs.FileSystem.from_uri(self.location)
+                self.filesystem, self.root = pafs.FileSystem.from_uri(self._written)
             except (pa.ArrowException, OSError, ValueError) as error:
                 raise RunDirectoryError(
                     f"{self.location} can't be used as a store: {error}; write a folder, or a"
                     " location like s3://bucket/study"
                 ) from error
         else:
-            self.folder = Path(self.location).absolute()
+            self.folder = Path(self._written).absolute()
             self.filesystem, self.root = pafs.LocalFileSystem(), str(self.folder)
 
     @property
@@ -161,4 +163,4 @@ class Storage:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the location alone."""
-        return Storage, (self.location,)
+        return Storage, (self._written,)

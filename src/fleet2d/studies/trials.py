@@ -14,7 +14,7 @@ from fleet2d.studies.choice import key_path
 from fleet2d.studies.design import Design
 from fleet2d.studies.engine import describe_error, flat_numbers, run_scenario
 from fleet2d.studies.record import Task
-from fleet2d.studies.sampling import Parameter
+from fleet2d.studies.sampling import Parameter, rounded
 from fleet2d.studies.schedule import Schedule
 
 if TYPE_CHECKING:
@@ -213,7 +213,7 @@ def suggested(trial: "optuna.Trial", name: str, parameter: Parameter) -> Any:
     if parameter.integer:
         low, high = int(parameter.low), int(parameter.high)
         return trial.suggest_int(name, low, high, log=parameter.log)
-    return trial.suggest_float(name, parameter.low, parameter.high, log=parameter.log)
+    return rounded(trial.suggest_float(name, parameter.low, parameter.high, log=parameter.log))
 
 
 def _state(name: str) -> Any:

@@ -13,6 +13,7 @@ from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import Checked, RunOptions, check_study, run_study
 from fleet2d.studies.execution import Executor, Lost
 from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.sampling import rounded
 from fleet2d.studies.specification import Comparison, Specification, read_specification
 from fleet2d.studies.storage import write_error
 from fleet2d.studies.trials import (
@@ -208,6 +209,7 @@ def _overrides(trial: "optuna.trial.FrozenTrial", settings: TuneSettings) -> dic
     for name, value in trial.params.items():
         parameter = settings.search[name]
         own = parameter.choices[value] if parameter.choices else value
+        own = rounded(own) if isinstance(own, float) else own
         found[parameter.key] = parameter.written(own)
     return found
 
