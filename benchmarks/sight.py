@@ -191,14 +191,13 @@ def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[An
 
 def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
     """Measure and compare what finds the cells in view of a pose."""
-    from fleet2d.kernels.seen import bench_for, cells_in_view
+    from fleet2d.kernels.seen import cells_in_view
     from fleet2d.sight.flashlight import Flashlight
     from fleet2d.sight.line_of_sight import LineOfSight
 
-    lattice, reach = home.plan.lattice, reach_in(home)
-    bench = bench_for(home.walls, lattice.rows, lattice.columns)
+    grid, reach = (home.plan.lattice.rows, home.plan.lattice.columns), reach_in(home)
     flashlight, line = Flashlight(memory_mb=500), LineOfSight()
-    fill = best(lambda: [cells_in_view(home.walls, *pose, reach, bench) for pose in poses])
+    fill = best(lambda: [cells_in_view(home.walls, *pose, reach, *grid) for pose in poses])
     kept = best(lambda: [flashlight.cells(home, *pose, reach) for pose in poses])
     some = poses[:20]
     by_lines = best(lambda: [line.cells(home, *pose, reach) for pose in some], 1)
