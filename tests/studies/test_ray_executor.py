@@ -56,4 +56,4 @@ def test_a_node_that_dies_loses_only_what_it_ran(
     assert (20, 0) == (counts.complete, counts.failed)
     _, undisturbed = run(study, tmp_path / "undisturbed")
     assert digests(undisturbed) == digests(killed)
-    assert 1 == executor.workers
+    assert killed.variants["attempts"].max() >= 2  # what the node ran was run again
