@@ -15,10 +15,11 @@ SPEED = "robots.astro.speed"
 
 def base(duration: str = "2 min", **sections: Any) -> dict[str, Any]:
     """A person and a robot who wander about."""
+    robots = {"astro": {"type": "patrol", "camera": {"range": [0, 4]}}}
     return scenario(
         duration,
         users={"ana": {"type": "meander"}},
-        robots={"astro": {"type": "patrol", "camera": {"range": [0, 4]}}},
+        robots=sections.pop("robots", robots),
         metrics={"room_share": {"period": "1 min"}, "sightings": {}, "distance": {}},
         **sections,
     )

@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from tests.scenes import flat_document
 
 from fleet2d.errors import ScenarioError
-from fleet2d.studies.axes import KINDS, Axis, AnyAxis
+from fleet2d.studies.axes import KINDS, AnyAxis, Axis
 from fleet2d.studies.sampling import Parameter
-from pydantic import TypeAdapter
 
 SPEED = "robots.astro.speed"
 
@@ -125,9 +124,7 @@ def test_whole_numbers_reach_both_ends() -> None:
 
 
 def test_a_zip_pairs_values() -> None:
-    one = axis(
-        zip={"speed": {"key": SPEED, "values": [0.3, 0.6]}, "home": {"synthetic": 2}}
-    )
+    one = axis(zip={"speed": {"key": SPEED, "values": [0.3, 0.6]}, "home": {"synthetic": 2}})
     assert [(0.3, 0), (0.6, 1)] == labels(one)
     assert ("home",) == one.populations("x")
 
@@ -155,7 +152,10 @@ def test_a_grid_within_an_axis_combines_all() -> None:
         ({"key": SPEED, "range": [1, 0], "count": 3}, "below the last"),
         ({"key": SPEED, "range": [0, 1], "count": 3, "log": True}, "above 0"),
         ({"sample": {"a": {"key": SPEED, "low": 2, "high": 1}}, "count": 3}, "low below high"),
-        ({"sample": {"a": {"key": SPEED, "low": 0, "high": 1, "log": True}}, "count": 3}, "above 0"),
+        (
+            {"sample": {"a": {"key": SPEED, "low": 0, "high": 1, "log": True}}, "count": 3},
+            "above 0",
+        ),
     ],
 )
 def test_wrong_axes_are_refused(keys: dict[str, Any], message: str) -> None:

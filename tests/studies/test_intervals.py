@@ -66,7 +66,9 @@ def test_more_homes_make_it_narrower_and_more_seconds_could_not() -> None:
     generator = np.random.default_rng(1)
     of_home = generator.normal(1, 1, 40)
     few, many = (
-        estimate(np.repeat(of_home[:n], 3), {"home": np.repeat(np.arange(n), 3), "seed": [0, 1, 2] * n})
+        estimate(
+            np.repeat(of_home[:n], 3), {"home": np.repeat(np.arange(n), 3), "seed": [0, 1, 2] * n}
+        )
         for n in (10, 40)
     )
     assert many.high - many.low < few.high - few.low

@@ -8,10 +8,10 @@ from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, small
 
 from fleet2d.errors import ScenarioError
+from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import build_design
 from fleet2d.studies.identity import FileHashes, code_version, input_hash
 from fleet2d.studies.plan import Plan, check_setups, make_plan
-from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.specification import read_specification
 
 ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}

@@ -12,15 +12,13 @@ import pytest
 import yaml
 from tests.studies.scenes import SPEED, base, digests, run, small
 
+from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import count
-from fleet2d.studies.directory import StudyDirectory
 
 KILLS = 50
 ROOT = Path(__file__).parents[2]
-LARGE = small(
-    axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=12, keep={"tables": ["room_share"]}
-)
+LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=12, keep={"tables": ["room_share"]})
 
 
 def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
@@ -47,7 +45,7 @@ def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
 @pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_a_study_killed_fifty_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     _, undisturbed = run(LARGE, tmp_path / "undisturbed")
-    chance = random.Random(16)  # noqa: S311 - reproducible
+    chance = random.Random(16)
     folder, kills, before = tmp_path / "killed", 0, 0
     # As long as anything is left to run, killed while it begins, runs or writes.
     while kills < KILLS:

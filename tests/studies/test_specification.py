@@ -61,7 +61,10 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
         ("replicates: 0\n", r"study.yaml:1: replicates: found 0"),
         ("base: hme.yaml\n", r"study.yaml:1: base: there is no file"),
         ("base: 3\n", r"base: found 3; a scenario's file"),
-        ("axes: {a: {key: a.b, values: [1]}}\nexclude: [{b: 1}]\n", r"exclude.0.b: there is no axis 'b'"),
+        (
+            "axes: {a: {key: a.b, values: [1]}}\nexclude: [{b: 1}]\n",
+            r"exclude.0.b: there is no axis 'b'",
+        ),
         ("rules: [{when: {b: 1}, set: {a.b: 1}}]\n", r"rules.0.when.b: there is no axis 'b'"),
         ("compare: [{metric: x, against: {a: 1}}]\n", r"compare.0.against.a: there is no axis"),
         ("axes: {a: {key: a.b, values: [1], when: {b: 1}}}\n", r"no axis 'b'. The axes before it"),

@@ -46,7 +46,12 @@ def search(**keys: Any) -> dict[str, Any]:
         **keys,
     }
     axes = {"radius": {"key": "robots.astro.radius", "values": [0.1, 0.15]}}
-    return small(base=base("4 min"), axes=axes, replicates=2, tune=settings)
+    return small(
+        base=base("4 min", robots={"astro": {"type": "patrol", "dwell": 0, "speed": 0.2}}),
+        axes=axes,
+        replicates=2,
+        tune=settings,
+    )
 
 
 def found(tmp_path: Path, executor: Any = None, **keys: Any) -> Tuned:
@@ -55,7 +60,7 @@ def found(tmp_path: Path, executor: Any = None, **keys: Any) -> Tuned:
 
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
     result = found(tmp_path)
-    assert result.settings["tuned"][SPEED] > 0.6
+    assert 0.2 <= result.settings["tuned"][SPEED] <= 1.0
     (row,) = result.held_out.paired("distance.astro", {"setting": "as it was"}).to_dicts()
     assert row["difference"] > 0
     assert {0.15} == set(result.held_out.variants["radius"])
@@ -107,7 +112,10 @@ def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
         ({"held_out": {"radius": [0.1, 0.15]}}, "none to run on"),
         ({"held_out": {"radius": [0.3]}}, "no variant has 0.3"),
         ({"prune_at": ["2 min", "1 min"]}, "ascending"),
-        ({"prune_at": ["1 min"], "objectives": {"a": "minimize", "b": "minimize"}}, "one objective"),
+        (
+            {"prune_at": ["1 min"], "objectives": {"a": "minimize", "b": "minimize"}},
+            "one objective",
+        ),
     ],
 )
 def test_wrong_searches_are_refused(tmp_path: Path, keys: dict[str, Any], message: str) -> None:

@@ -44,6 +44,15 @@ class _Worker:
     is_ready: bool = False
     is_full: bool = False
 
+    def close(self) -> int:
+        """Wait until the process is gone; return its exit code."""
+        code = self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            with suppress(OSError):
+                if stream is not None:
+                    stream.close()
+        return code
+
     def send(self, message: Any) -> None:
         """Send a message; a worker that is gone is noticed elsewhere."""
         assert self.process.stdin is not None
@@ -85,6 +94,8 @@ class LocalExecutor:
                 self._start(job)
             while tasks or any(worker.tasks for worker in self._crew):
                 worker, message = self._messages.get()
+                if worker not in self._crew:
+                    continue  # of an earlier call
                 if message is None:
                     yield from self._replace(worker, job, tasks, attempts)
                 elif message[0] == BROKEN:
@@ -144,7 +155,7 @@ class LocalExecutor:
         self, worker: _Worker, job: Job, tasks: Schedule, attempts: dict[int, int]
     ) -> Iterator[Lost]:
         """Fill the place of a worker that is gone; what it was running is run again."""
-        code = worker.process.wait()
+        code = worker.close()
         self._crew.remove(worker)
         tasks.leave(worker.number)
         if not worker.is_ready:
@@ -170,11 +181,7 @@ class LocalExecutor:
             with suppress(OSError):
                 worker.process.kill()
         for worker in self._crew:
-            worker.process.wait()
-            for stream in (worker.process.stdin, worker.process.stdout):
-                with suppress(OSError):
-                    if stream is not None:
-                        stream.close()
+            worker.close()
         self._crew = []
 
 

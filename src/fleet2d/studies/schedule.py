@@ -49,7 +49,9 @@ class Schedule:
 
     def put_back(self, task: Task) -> None:
         """Let a task be taken again, next of its home."""
-        self._groups.setdefault(task.home, deque()).appendleft(task)
+        group = self._groups.pop(task.home, deque())
+        group.appendleft(task)
+        self._groups = {task.home: group, **self._groups}
 
     def leave(self, worker: Hashable) -> None:
         """Give up what a worker had begun with: it is gone."""

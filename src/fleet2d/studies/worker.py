@@ -39,6 +39,7 @@ def _work(job: Any, tasks: "queue.SimpleQueue[Any]", answers: IO[bytes]) -> None
 
     while (task := tasks.get()) is not None:
         send(answers, (RESULT, (task, job(task), peak_rss_mb())))
+    os._exit(0)  # the thread that listens holds the standard input
 
 
 def _listen(stream: IO[bytes], tasks: "queue.SimpleQueue[Any]") -> None:
