@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fleet2d.engine.buckets import PoseBlock, look_together, new_memory
 from tests.scenes import everything, scenario
 
 import fleet2d
 from fleet2d.engine import buckets
+from fleet2d.engine.buckets import PoseBlock, look_together, new_memory
 
 
 @pytest.mark.parametrize(

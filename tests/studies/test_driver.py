@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Generator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -89,10 +90,8 @@ def test_it_goes_on_where_it_was_interrupted(whole: Path, tmp_path: Path, backwa
     ran = []
     for most in (2, 1, 0, 9):
         executor = CountingExecutor(most, backwards=backwards)
-        try:
+        with suppress(KeyboardInterrupt):
             _, study = run(small(**ROWS), folder, executor)
-        except KeyboardInterrupt:
-            pass
         ran += executor.ran
     assert sorted(ran) == list(range(6))  # nothing twice
     _, undisturbed = run(small(**ROWS), whole)
@@ -196,7 +195,7 @@ def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path)
 
 def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path) -> None:
     other = small(base=base("3 min"), **ROWS)
-    with pytest.raises(RunDirectoryError, match="6 of scenarios.*no longer has.*--changed redo"):
+    with pytest.raises(RunDirectoryError, match=r"6 of scenarios.*no longer has.*--changed redo"):
         run(other, copied)
     executor = CountingExecutor()
     counts, study = run(other, copied, executor, changed="redo")

@@ -92,7 +92,7 @@ def test_a_full_disk_leaves_what_was_there_and_says_so(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "pwrite", full)
-    with pytest.raises(ArtifactError, match="the disk is full.*the same command goes on"):
+    with pytest.raises(ArtifactError, match=r"the disk is full.*the same command goes on"):
         journal.append(record(1))
     monkeypatch.setattr(os, "pwrite", write)
     assert [0] == numbers(path)

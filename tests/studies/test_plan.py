@@ -10,8 +10,9 @@ from tests.studies.scenes import SPEED, base, small
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import build_design
+from fleet2d.studies.execution import SerialExecutor
 from fleet2d.studies.identity import FileHashes, code_version, input_hash
-from fleet2d.studies.plan import Plan, check_setups, make_plan
+from fleet2d.studies.plan import Plan, check_setups, make_plan, setups_to_check
 from fleet2d.studies.specification import read_specification
 
 ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
@@ -73,7 +74,20 @@ def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:
 
 def test_who_can_not_stand_in_a_home_is_found_before_the_first_run() -> None:
     with pytest.raises(ScenarioError, match=r"variant 3 \(start = attic"):
-        check_setups(plan(axes={"start": ATTIC}))
+        check_setups(plan(axes={"start": ATTIC}), SerialExecutor())
+
+
+def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
+    axes = {
+        "home": {"synthetic": 2},
+        SPEED: [0.1, 0.2, 0.3, 0.4],
+        "robots.astro.radius": [0.1, 0.12, 0.14, 0.16],
+    }
+    one = plan(axes=axes, replicates=2)
+    chosen = [one.parameters(variant) for variant in setups_to_check(one)]
+    assert 8 == len(chosen)  # of 32 combinations
+    for column in (SPEED, "robots.astro.radius"):
+        assert 8 == len({(row["home"], row[column]) for row in chosen})
 
 
 def test_two_variants_with_the_same_scenario_are_refused() -> None:

@@ -109,7 +109,7 @@ def test_a_server_that_does_not_answer_is_told(tmp_path: Path) -> None:
         directory = StudyDirectory(gone + options)
     except RunDirectoryError:  # some versions know no such options
         directory = StudyDirectory(gone)
-    with pytest.raises((ArtifactError, RunDirectoryError), match="127.0.0.1|can't be reached"):
+    with pytest.raises((ArtifactError, RunDirectoryError), match=r"127.0.0.1|can't be reached"):
         directory.exists()
 
 

@@ -129,5 +129,5 @@ def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_objective_that_no_run_comes_to_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no trial succeeded.*no number 'happiness'"):
+    with pytest.raises(InputError, match=r"no trial succeeded.*no number 'happiness'"):
         found(tmp_path, objectives={"happiness": "maximize"}, trials=1)

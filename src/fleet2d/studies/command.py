@@ -156,11 +156,13 @@ def _print_plan(checked: "Checked", workers: int | None) -> None:
     """Print the axes, the first variants, and what they will take."""
     from fleet2d.studies.execution import cores
     from fleet2d.studies.forecast import forecast
+    from fleet2d.studies.local import LocalExecutor
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.progress import in_words
 
     plan = checked.plan
-    check_setups(plan)
+    count = workers or cores()
+    check_setups(plan, LocalExecutor(count))
     for column, labels in plan.design.labels.items():
         shown = ", ".join(map(str, labels[:SHOWN]))
         more = f", … {len(labels)} in all" if len(labels) > SHOWN else ""
@@ -170,7 +172,6 @@ def _print_plan(checked: "Checked", workers: int | None) -> None:
         typer.echo(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > SHOWN:
         typer.echo(f"  … {len(plan.variants) - SHOWN} more")
-    count = workers or cores()
     expected = forecast(plan)
     typer.echo(
         f"\n{len(plan.variants)} variants, {len({v.home_key for v in plan.variants})} homes,"

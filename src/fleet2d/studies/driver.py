@@ -130,7 +130,7 @@ def run_study(
     directory = StudyDirectory(location)
     directory.check_empty()
     if not directory.exists():
-        check_setups(checked.plan, options.observer.checked)
+        check_setups(checked.plan, executor, options.observer.checked)
     with directory.locked():
         parts = _intact_parts(directory, options.observer)
         ended = statuses(directory, parts)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from fleet2d.errors import Fleet2DError
 from fleet2d.studies.design import Design
-from fleet2d.studies.engine import Outcome, describe_error, execute, run_scenario
+from fleet2d.studies.engine import Outcome, check_setup, describe_error, execute, run_scenario
 from fleet2d.studies.identity import FileHashes, identity, input_hash, scenario_content
 from fleet2d.studies.record import Task, record_of
 
@@ -61,6 +61,25 @@ CHANGED = (
     "a file that the variant reads, or Fleet2D itself, is not what it was when the study began:"
     " run the study again"
 )
+
+
+@dataclass
+class SetupJob:
+    """Sets variants up without running them.
+
+    Attributes:
+        design: The design.
+    """
+
+    design: Design
+
+    def __call__(self, task: Task) -> bytes:
+        """Return what is wrong with a variant; nothing if nothing is."""
+        try:
+            check_setup(self.design.scenario(task.index))
+        except Fleet2DError as error:
+            return str(error).encode()
+        return b""
 
 
 @dataclass

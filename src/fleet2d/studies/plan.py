@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fleet2d.errors import Fleet2DError, InputError, ScenarioError
+from fleet2d.errors import InputError, ScenarioError
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.choice import Label
 from fleet2d.studies.design import SWITCHES, Design
-from fleet2d.studies.engine import check_setup
+from fleet2d.studies.execution import Executor, Lost, SerialExecutor
 from fleet2d.studies.identity import (
     FileHashes,
     content_hash,
@@ -18,9 +18,13 @@ from fleet2d.studies.identity import (
     input_hash,
     scenario_content,
 )
+from fleet2d.studies.jobs import SetupJob
+from fleet2d.studies.record import Task
+from fleet2d.studies.schedule import Schedule
 from fleet2d.units import parse_duration
 
 MOST_PROBLEMS = 10  # that are reported at once
+FEW_SETUPS = 8  # that are not worth starting workers for
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,33 +103,61 @@ def make_plan(
     return Plan(design, tuple(variants))
 
 
-def check_setups(plan: Plan, on_progress: Callable[[int, int], None] | None = None) -> None:
-    """Set homes up with everybody in them: each home with each choice of every other axis.
+def setups_to_check(plan: Plan) -> list[PlannedVariant]:
+    """Return variants in which each home meets each choice of every other axis, and no more.
 
-    That shows whoever can't stand where they should, in fewer set-ups than there are variants.
+    To set them up shows whoever can't stand where they should, in fewer set-ups than variants.
+    """
+    design = plan.design
+    by_home: dict[str, list[tuple[PlannedVariant, tuple[int, ...]]]] = {}
+    for number, combination in enumerate(design.combinations):
+        variant = plan.variants[number * len(design.seeds)]
+        by_home.setdefault(variant.home_key, []).append((variant, combination))
+    return [variant for variants in by_home.values() for variant in _covering(variants)]
+
+
+def _covering(
+    variants: Sequence[tuple[PlannedVariant, tuple[int, ...]]],
+) -> Iterator[PlannedVariant]:
+    """Yield variants of one home in which each choice of each axis comes at least once."""
+    first = variants[0][1]
+    varying = [i for i in range(len(first)) if any(c[i] != first[i] for _, c in variants)]
+    covered: set[tuple[int, int]] = set()
+    for all_new in (True, False):  # first those in which everything is new: fewer are needed
+        for variant, combination in variants:
+            choices = {(axis, combination[axis]) for axis in varying}
+            new = choices - covered
+            if (new and new == choices) if all_new else new:
+                covered |= choices
+                yield variant
+    if not varying:
+        yield variants[0][0]
+
+
+def check_setups(
+    plan: Plan, executor: Executor, on_progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Set up homes with everybody in them, as `setups_to_check` chooses.
 
     Raises:
         ScenarioError: What is wrong, with axis and value; a line per problem.
     """
-    design, problems = plan.design, list[str]()
-    covered: set[tuple[str, int, int]] = set()
-    chosen = []
-    for number, combination in enumerate(design.combinations):
-        variant = plan.variants[number * len(design.seeds)]
-        pairs = {(variant.home_key, axis, choice) for axis, choice in enumerate((0, *combination))}
-        if not pairs <= covered:
-            covered |= pairs
-            chosen.append(variant.index)
-    for done, index in enumerate(chosen):
-        if on_progress is not None:
-            on_progress(done, len(chosen))
-        try:
-            check_setup(design.scenario(index))
-        except Fleet2DError as error:
-            problems.append(f"{design.describe(index)}: {error}")
+    chosen, problems = setups_to_check(plan), dict[int, str]()
+    tasks = [Task(v.number, v.index, v.identity, v.home_key) for v in chosen]
+    runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
+    events = runner.run(SetupJob(plan.design), Schedule(tasks))
+    try:
+        for done, event in enumerate(events):
+            if on_progress is not None:
+                on_progress(done + 1, len(tasks))
+            text = event.reason if isinstance(event, Lost) else event.payload.decode()
+            if text:
+                problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
             if len(problems) == MOST_PROBLEMS:
                 break
-    _refuse(problems)
+    finally:
+        events.close()
+    _refuse([problems[index] for index in sorted(problems)])
 
 
 def _refuse(problems: list[str]) -> None:
