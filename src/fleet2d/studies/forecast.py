@@ -1,8 +1,10 @@
 """What a study will take: measured on the beginning of some of its variants."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 
+from fleet2d.errors import ComponentError
 from fleet2d.studies.engine import measure
 from fleet2d.studies.plan import Plan
 
@@ -30,12 +32,17 @@ def forecast(plan: Plan, samples: int = SAMPLES) -> Forecast:
     """Measure how fast some variants begin; the first of each is not counted, for it loads code.
 
     Raises:
-        Fleet2DError: A component fails.
+        ComponentError: All variants that are begun fail.
     """
     count = len(plan.variants)
     chosen = sorted({round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)})
     measure(plan.design.scenario(0), most_s=0.0)
-    paces = [measure(plan.design.scenario(plan.variants[i].index)) for i in chosen]
+    paces = []
+    for i in chosen:
+        with suppress(ComponentError):  # a variant may fail, and the study go on
+            paces.append(measure(plan.design.scenario(plan.variants[i].index)))
+    if not paces:
+        raise ComponentError("none of the variants that were begun can be run: run one by itself")
     wall_s = sum(
         sum(pace.seconds(variant.simulated_s) for pace in paces) / len(paces)
         for variant in plan.variants
