@@ -9,6 +9,7 @@ from fleet2d.calibrate.command import calibrating
 from fleet2d.cli import inputs, paper, pictures, runs
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.fit.command import fitting
+from fleet2d.studies.command import studying, tune
 
 app = typer.Typer(
     help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
@@ -28,10 +29,12 @@ for command in (
     runs.export,
     runs.reproduce,
     paper.reproduce_paper,
+    tune,
 ):
     app.command()(command)
 app.add_typer(fitting, name="fit")
 app.add_typer(calibrating, name="calibrate")
+app.add_typer(studying, name="study")
 
 
 @app.callback()
