@@ -1,0 +1,5 @@
+/** Controls of a running simulation. */
+
+export function LiveControls() {
+  return null;
+}

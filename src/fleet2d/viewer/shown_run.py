@@ -1,0 +1,144 @@
+"""A run as it is served: what the page asks for, worked out when first asked for."""
+
+import json
+import tempfile
+from datetime import timedelta
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import ArtifactError
+from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
+from fleet2d.viewer.home_facts import walls_facts
+from fleet2d.viewer.run_facts import run_facts, run_title
+from fleet2d.viewer.sightings import sightings_of
+from fleet2d.viewer.walls import WallsHistory, doors_of
+
+POSES = "poses"
+"""A table that the page reads in place of `key_frames` where bodies walk at random."""
+MOST_POSES = 200_000
+COMPRESSION = "zstd"
+
+
+class ShownRun:
+    """A run, and what the page is sent of it.
+
+    Attributes:
+        run: The run.
+        title: What it is called.
+    """
+
+    def __init__(self, run: Run) -> None:
+        """Work out nothing yet."""
+        self.run = run
+        self.title = run_title(run)
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    @cached_property
+    def _walls(self) -> WallsHistory:
+        return WallsHistory(self.run, self._doors)
+
+    @cached_property
+    def _doors(self) -> Any:
+        return doors_of(self.run)
+
+    @cached_property
+    def facts(self) -> RunFacts:
+        """Everything about the run but its tables.
+
+        Raises:
+            ArtifactError: The run has no floor plan, or is damaged.
+        """
+        facts = run_facts(self.run, self._doors, self._walls)
+        facts["walks_every_s"] = self._walks_every_us / 1e6
+        return facts
+
+    @cached_property
+    def facts_json(self) -> bytes:
+        """The facts as they are sent."""
+        return compact_json(self.facts)
+
+    def walls(self, number: int) -> WallsFacts:
+        """Return what ended sight in one of the run's arrangements.
+
+        Raises:
+            ArtifactError: There is no such arrangement.
+        """
+        return walls_facts(self._walls.mesh(number))
+
+    @property
+    def arrangements(self) -> int:
+        """How many arrangements of doors and furniture the run went through."""
+        return self._walls.count
+
+    @cached_property
+    def sightings(self) -> list[SightingFacts]:
+        """The stretches in which robots noticed users."""
+        return sightings_of(self.run)
+
+    def table_path(self, name: str) -> Path:
+        """Return the Parquet file of a table.
+
+        Raises:
+            ArtifactError: The run has no such table.
+        """
+        if name == POSES and self._walks_every_us:
+            return self._written(POSES, self._poses)
+        if name not in self.run.tables:
+            raise ArtifactError(f"the run has no table {name!r}")
+        if self.run.directory is not None:
+            return self.run.directory / f"{name}.parquet"
+        return self._written(name, lambda: self.run.tables[name])
+
+    def _written(self, name: str, table: Any) -> Path:
+        """Return a file of a table that lies in no run directory."""
+        import pyarrow.parquet as pq
+
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="fleet2d-view-")
+        path = Path(self._folder.name) / f"{name}.parquet"
+        if not path.exists():
+            pq.write_table(table(), path, compression=COMPRESSION)
+        return path
+
+    @cached_property
+    def _walks_every_us(self) -> int:
+        """Time between two positions [us] where bodies walk at random; 0 where none does."""
+        if "key_frames" not in self.run.tables:
+            return 0
+        kinds = self.run.tables["key_frames"]["kind"].cast("string")
+        if "walk" not in kinds.unique().to_pylist():
+            return 0
+        step_us, steps = self.run.manifest["step_us"], self.run.manifest["steps"]
+        return int(step_us * -(-steps // MOST_POSES))
+
+    def _poses(self) -> Any:
+        """Return positions of everybody at equal intervals, in the columns of key_frames."""
+        import pyarrow as pa
+
+        entities = self.run.manifest["entities"]
+        parts = []
+        every = timedelta(microseconds=self._walks_every_us)
+        for name in (*entities["users"], *entities["robots"]):
+            path = self.run.path(name, every)
+            count = len(path.step)
+            columns = {
+                "step": path.step,
+                "time": path.time.astype("M8[us]"),
+                "entity": pa.array([name]).dictionary_encode().take(np.zeros(count, np.int64)),
+                "kind": pa.array(["track"]).dictionary_encode().take(np.zeros(count, np.int64)),
+                "x": path.x,
+                "y": path.y,
+                "heading": path.heading,
+                "away": path.away,
+            }
+            parts.append(pa.table(columns))
+        return pa.concat_tables(parts).unify_dictionaries()
+
+
+def compact_json(content: Any) -> bytes:
+    """Return content as JSON without spaces."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
