@@ -154,7 +154,7 @@ function Controls() {
         <button type="button" aria-label="Zoom out" onClick={() => state.zoom(2)}>
           −
         </button>
-        <button type="button" onClick={() => state.setRange(0, state.endUs.value)}>
+        <button type="button" onClick={() => state.setRange(state.beginUs.value, state.endUs.value)}>
           Whole run
         </button>
         <button

@@ -12,7 +12,7 @@ export function addressOf(run: Run): string {
   const [from, to] = state.range.value;
   const words = new URLSearchParams();
   words.set("at", momentText(clock.startMs, state.moment.value));
-  if (from > 0 || to < state.endUs.value) {
+  if (from > state.beginUs.value || to < state.endUs.value) {
     words.set("from", momentText(clock.startMs, from));
     words.set("to", momentText(clock.startMs, to));
   }

@@ -118,7 +118,7 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. */
 export interface RunFacts {
   title: string;
   status: string;
@@ -126,6 +126,8 @@ export interface RunFacts {
   start: string;
   step_us: number;
   steps: number;
+  first_step: number;
+  end_step: number;
   seed: number | null;
   digest: string | null;
   version: string;

@@ -35,10 +35,10 @@ const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   "+": () => state.zoom(0.5),
   "=": () => state.zoom(0.5),
   "-": () => state.zoom(2),
-  "0": () => state.setRange(0, state.endUs.value),
+  "0": () => state.setRange(state.beginUs.value, state.endUs.value),
   "<": () => state.faster(-1),
   ">": () => state.faster(1),
-  Home: () => state.goTo(0),
+  Home: () => state.goTo(state.beginUs.value),
   End: () => state.goTo(state.endUs.value),
   t: () => {
     state.theme.value = document.documentElement.dataset.theme === "dark" ? "light" : "dark";

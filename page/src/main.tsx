@@ -17,7 +17,8 @@ async function start(box: HTMLElement): Promise<void> {
   const runs = await Promise.all(session.sources.map((source) => Run.open(source)));
   if (runs.length === 0) throw new Error("There is no run to show.");
   state.runs.value = runs;
-  state.setRange(0, state.endUs.value);
+  state.setRange(state.beginUs.value, state.endUs.value);
+  state.goTo(state.beginUs.value);
   applyAddress(location.hash, runs[0]!);
   document.title = `${runs.map((run) => run.facts.title).join(" · ")} – Fleet2D`;
   render(<App />, box);

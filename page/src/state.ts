@@ -29,14 +29,16 @@ export const live = signal(false);
 export const follow = signal(true);
 
 export const run = computed<Run | null>(() => runs.value[0] ?? null);
-export const endUs = computed(() => Math.max(1, ...runs.value.map((entry) => (entry.version.value, entry.clock.endUs))));
+/** The part of the runs that can be shown [us]. */
+export const beginUs = computed(() => Math.min(...runs.value.map((entry) => entry.beginUs)));
+export const endUs = computed(() => Math.max(1, ...runs.value.map((entry) => (entry.version.value, entry.endUs))));
 
 const SHORTEST_US = 10e6;
 
 export function goTo(us: number): void {
   const end = endUs.value;
-  const last = Math.max(0, end - (run.value?.clock.stepUs ?? 1));
-  const at = Math.max(0, Math.min(last, us));
+  const last = Math.max(beginUs.value, end - (run.value?.clock.stepUs ?? 1));
+  const at = Math.max(beginUs.value, Math.min(last, us));
   batch(() => {
     moment.value = at;
     const [from, to] = range.value;
@@ -45,9 +47,10 @@ export function goTo(us: number): void {
 }
 
 export function setRange(from: number, to: number): void {
-  const end = endUs.value;
-  const length = Math.max(Math.min(SHORTEST_US, end), Math.min(end, to - from));
-  const start = Math.max(0, Math.min(end - length, from));
+  const [begin, end] = [beginUs.value, endUs.value];
+  const whole = end - begin;
+  const length = Math.max(Math.min(SHORTEST_US, whole), Math.min(whole, to - from));
+  const start = Math.max(begin, Math.min(end - length, from));
   range.value = [start, start + length];
 }
 

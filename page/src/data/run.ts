@@ -53,6 +53,14 @@ export class Run {
     return run;
   }
 
+  get beginUs(): number {
+    return this.facts.first_step * this.clock.stepUs;
+  }
+
+  get endUs(): number {
+    return Math.min(this.facts.end_step, this.clock.steps) * this.clock.stepUs;
+  }
+
   get bodies(): readonly BodyFacts[] {
     return this.facts.bodies;
   }

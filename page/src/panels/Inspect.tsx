@@ -38,6 +38,7 @@ function Facts({ rows }: { rows: [string, string][] }) {
 }
 
 function BodyView({ run, name }: { run: Run; name: string }) {
+  void run.version.value;
   const us = slowMoment.value;
   const body = run.body(name)!;
   const now = bodyState(run, name, us);
@@ -108,6 +109,7 @@ export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]
 }
 
 function DoorView({ run, name }: { run: Run; name: string }) {
+  void run.version.value;
   const us = slowMoment.value;
   return (
     <div data-inspected={name}>
@@ -120,6 +122,7 @@ function DoorView({ run, name }: { run: Run; name: string }) {
 }
 
 function RoomView({ run, name }: { run: Run; name: string }) {
+  void run.version.value;
   const us = slowMoment.value;
   const index = run.home.roomIndex(name);
   const room = run.facts.home.rooms[index]!;

@@ -66,7 +66,7 @@ function drawChart(box: HTMLElement, run: Run, lines: readonly Series[]): uPlot 
     width: Math.max(200, box.clientWidth),
     height: 150,
     tzDate: (seconds) => new Date(seconds * 1000 + new Date(seconds * 1000).getTimezoneOffset() * 60_000),
-    legend: { show: lines.length <= 8 },
+    legend: { show: true, live: false },
     cursor: { drag: { x: false, y: false } },
     axes: [axis, { ...axis, size: 44 }],
     series: [

@@ -156,7 +156,7 @@ function followPointer(box: HTMLElement, lanes: () => Lane[], words: { value: st
     }
     event.preventDefault();
   };
-  const whole = (): void => state.setRange(0, state.endUs.value);
+  const whole = (): void => state.setRange(state.beginUs.value, state.endUs.value);
   box.addEventListener("pointerdown", down);
   box.addEventListener("pointermove", move);
   box.addEventListener("pointerup", up);

@@ -148,7 +148,7 @@ class SightingFacts(TypedDict):
 
 
 class RunFacts(TypedDict):
-    """Everything about a run but its tables."""
+    """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown."""
 
     title: str
     status: str
@@ -156,6 +156,8 @@ class RunFacts(TypedDict):
     start: str
     step_us: int
     steps: int
+    first_step: int
+    end_step: int
     seed: int | None
     digest: str | None
     version: str

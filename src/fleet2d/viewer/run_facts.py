@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 import fleet2d
 from fleet2d.artifacts.layers import PREFIX
 from fleet2d.artifacts.manifest import plain
@@ -43,6 +41,8 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
         start=manifest["start"],
         step_us=manifest["step_us"],
         steps=manifest["steps"],
+        first_step=0,
+        end_step=manifest["steps"],
         seed=manifest["seed"],
         digest=run.digest,
         version=fleet2d.__version__,
@@ -168,8 +168,3 @@ def _marks(manifest: Mapping[str, Any]) -> list[MarkFacts]:
         label = str(entry.get("label") or plain(entry))
         marks.append(MarkFacts(step=step, end=step, kind="intervention", label=label))
     return marks
-
-
-def heading_units(radians: float) -> int:
-    """Return a heading in 1/4096 of a turn."""
-    return round(radians / (2 * np.pi) * 4096) % 4096

@@ -7,14 +7,20 @@ import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import uvicorn
-
 from fleet2d.errors import InputError
+
+try:
+    import starlette  # noqa: F401 - the server needs both
+    import uvicorn
+except ImportError:
+    raise InputError('watching needs a server: pip install "fleet2d[view]"') from None
+
 from fleet2d.viewer.guard import new_token
 from fleet2d.viewer.server import LiveRoutes, Shelf, page_app
 from fleet2d.viewer.shown_run import ShownRun
 
 HOST = "127.0.0.1"
+MOST_RUNS = 4
 
 
 class PageServer:
@@ -22,6 +28,7 @@ class PageServer:
 
     Attributes:
         address: Where the page is, with its token.
+        listens_at: Host and port.
     """
 
     def __init__(
@@ -47,7 +54,8 @@ class PageServer:
             self._socket.bind((HOST, port))
         except (OSError, OverflowError) as error:
             raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
-        self._port = int(self._socket.getsockname()[1])
+        host, self._port = self._socket.getsockname()[:2]
+        self.listens_at: tuple[str, int] = (str(host), int(self._port))
         token = new_token()
         self.address = f"http://{HOST}:{self._port}/{token}/"
         self._shelf = Shelf(sources)
@@ -61,6 +69,10 @@ class PageServer:
         """Serve until Ctrl-C."""
         threading.Thread(target=self._shelf.warm, daemon=True, name="fleet2d-warm").start()
         asyncio.run(self._server.serve(sockets=[self._socket]))
+
+    def close(self) -> None:
+        """Give the port back; for a server that was never run."""
+        self._socket.close()
 
     def start(self) -> Callable[[], None]:
         """Serve in a thread; return what ends it."""

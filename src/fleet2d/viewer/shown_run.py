@@ -1,7 +1,10 @@
 """A run as it is served: what the page asks for, worked out when first asked for."""
 
+import io
 import json
+import shutil
 import tempfile
+import weakref
 from datetime import timedelta
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +23,7 @@ from fleet2d.viewer.walls import WallsHistory, doors_of
 POSES = "poses"
 """A table that the page reads in place of `key_frames` where bodies walk at random."""
 MOST_POSES = 200_000
-COMPRESSION = "zstd"
+MOST_ROWS = 1 << 17
 
 
 class ShownRun:
@@ -35,7 +38,7 @@ class ShownRun:
         """Work out nothing yet."""
         self.run = run
         self.title = run_title(run)
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: Path | None = None
 
     @cached_property
     def _walls(self) -> WallsHistory:
@@ -95,13 +98,12 @@ class ShownRun:
 
     def _written(self, name: str, table: Any) -> Path:
         """Return a file of a table that lies in no run directory."""
-        import pyarrow.parquet as pq
-
         if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="fleet2d-view-")
-        path = Path(self._folder.name) / f"{name}.parquet"
+            self._folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
+            weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        path = self._folder / f"{name}.parquet"
         if not path.exists():
-            pq.write_table(table(), path, compression=COMPRESSION)
+            write_table(table(), path)
         return path
 
     @cached_property
@@ -142,3 +144,21 @@ class ShownRun:
 def compact_json(content: Any) -> bytes:
     """Return content as JSON without spaces."""
     return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+
+
+def write_table(table: Any, target: Path | io.BytesIO) -> None:
+    """Write a table as Parquet, packed as the tables of a run directory are."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    names = {field.name: field.type for field in table.schema}
+    sorted_names = [n for n, t in names.items() if pa.types.is_int64(t) or pa.types.is_timestamp(t)]
+    words = [n for n, t in names.items() if pa.types.is_dictionary(t) or pa.types.is_string(t)]
+    pq.write_table(
+        table,
+        target,
+        compression="zstd",
+        use_dictionary=words,
+        column_encoding=dict.fromkeys(sorted_names, "DELTA_BINARY_PACKED"),
+        row_group_size=MOST_ROWS,
+    )

@@ -120,7 +120,10 @@ def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
         return []
     from pyarrow import array, compute
 
-    table = run.tables["events"]
+    try:
+        table = run.tables["events"]
+    except ArtifactError:  # the run's notes say that it is damaged
+        return []
     words = compute.cast(table["event"], "string")
     rows = table.filter(compute.is_in(words, array(["opened", "shut", "moved"])))
     columns: list[list[Any]] = [
