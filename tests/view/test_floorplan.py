@@ -117,7 +117,7 @@ def test_empty_tiny_long_slanted_and_large_plans_are_drawn(
 
 @pytest.mark.parametrize("name", ["plan.pdf", "plan", "plan.png.txt"])
 def test_another_ending_is_refused(home: FloorPlan, tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=r"a picture is written as \.png or \.svg"):
+    with pytest.raises(InputError, match=r"a picture is written as \.png, \.svg or \.pdf"):
         draw_floorplan(home, tmp_path / name)
 
     assert [] == list(tmp_path.iterdir())

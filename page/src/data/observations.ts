@@ -116,7 +116,8 @@ function observation(part: Part, i: number): Observation {
   };
 }
 
-/** Whether what was noticed is not the user that it was taken for. */
+/** Whether nobody was there, or somebody else than was thought. */
 export function isFalse(seen: Observation): boolean {
-  return seen.trueUser !== null && seen.trueUser !== seen.user;
+  if (seen.trueUser === null) return false;
+  return seen.trueUser === "" || (seen.user !== "" && seen.trueUser !== seen.user);
 }

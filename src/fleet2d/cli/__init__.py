@@ -25,6 +25,8 @@ for command in (
     inputs.components,
     pictures.show,
     watching.view,
+    watching.film,
+    watching.report,
     inputs.convert,
     runs.export,
     runs.reproduce,

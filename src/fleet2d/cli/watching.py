@@ -62,3 +62,38 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
 
 def _announce(address: str) -> None:
     typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")
+
+
+def film(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[Path | None, typer.Option(help="Film to write: .mp4, .gif or .webp.")] = None,
+    begin: Annotated[
+        str | None, typer.Option("--from", help="Where it begins, such as 'day 3'.")
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
+    speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
+    height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
+) -> None:
+    """Make a film of a stretch of a stored run."""
+    from fleet2d.artifacts.reader import open_run
+    from fleet2d.viewer.film import write_film
+    from fleet2d.viewer.moments import steps_of
+
+    run = open_run(directory)
+    first, last = steps_of(run, begin, end)
+    target = out or directory / "film.mp4"
+    frames = write_film(run, target, first, last, speed=speed, height=height)
+    typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
+
+
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[Path | None, typer.Option(help="HTML file to write.")] = None,
+) -> None:
+    """Write a report of a stored run: what ran, metrics, figures, how to run it again."""
+    from fleet2d.artifacts.reader import open_run
+    from fleet2d.viewer.report import write_report
+
+    target = out or directory / "report.html"
+    write_report(open_run(directory), target)
+    typer.echo(target)

@@ -4,6 +4,7 @@ import io
 import re
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import matplotlib as mpl
@@ -35,6 +36,10 @@ from fleet2d.palette import (
     WALL_COLOR,
 )
 from fleet2d.view.objects import draw_objects, label_objects
+
+# Kinds of pictures, and what each would say of when or by what it was made.
+STAMPS = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
+ENDINGS = tuple(STAMPS)
 
 WALL_M = 0.15  # drawn round the outline; a file says nothing of how thick the outer walls are
 LONG_SIDE_IN = 10.0
@@ -71,9 +76,9 @@ def draw_floorplan(plan: FloorPlan, path: Path) -> None:
 def check_picture(path: Path) -> None:
     """Raise InputError unless a file's name ends as that of a picture that we write."""
     ending = path.suffix.lower()
-    if ending not in (".png", ".svg"):
+    if ending not in ENDINGS:
         raise InputError(
-            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
+            f"{path}: a picture is written as .png, .svg or .pdf, not as {ending or 'no ending'!r}"
         )
 
 
@@ -91,7 +96,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     Raises:
         InputError: The file can't be written.
     """
-    unstamped = {"Date": None} if path.suffix.lower() == ".svg" else {"Software": None}
+    unstamped = {STAMPS[path.suffix.lower()]: None}
     picture = io.BytesIO()
     figure.savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
     unfinished = path.with_name(f".{path.name}.unfinished")

@@ -21,12 +21,13 @@ from fleet2d.sight.region import VisibleRegion
 from fleet2d.view.floorplan import (
     DPI,
     TEXT_COLOR,
+    check_picture,
     drawing_style,
     figure_size,
     floorplan_axes,
     save_figure,
 )
-from fleet2d.view.layers import check_ending, layer_on_axes
+from fleet2d.view.layers import layer_on_axes
 from fleet2d.view.life import field_of_view
 from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 
@@ -95,7 +96,7 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
         PlacementError: The pose is in a wall or outside the home.
         InputError: The name ends otherwise, or the file can't be written.
     """
-    check_ending(path)
+    check_picture(path)
     VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)  # or says what is wrong with the place
     with drawing_style():
         width, height = figure_size(plan)
@@ -110,7 +111,7 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
 
 def draw_fov_alone(plan: FloorPlan, pose: Pose, path: Path) -> None:
     """Draw a robot in its home, and its field of view; arguments as for `draw_fov`."""
-    check_ending(path)
+    check_picture(path)
     VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)
     with drawing_style():
         figure = Figure(figsize=figure_size(plan), dpi=DPI)

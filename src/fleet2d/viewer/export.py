@@ -12,13 +12,13 @@ from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
 from fleet2d.viewer.contract import RunFacts, SightingFacts
 from fleet2d.viewer.files import write_whole
+from fleet2d.viewer.part import KEY_FRAMES, key_frame_rows
 from fleet2d.viewer.shown_run import POSES, ShownRun, write_table
 
 PAGE = Path(__file__).parent / "page"
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 )
-KEY_FRAMES = "key_frames"
 
 
 def export_html(run: Run, path: Path, first: int = 0, end: int | None = None) -> None:
@@ -103,18 +103,7 @@ def _rows(table: Any, name: str, first: int, end: int) -> Any:
     """Return which rows of a table matter between two steps."""
     step = table["step"].to_numpy()
     if name in (KEY_FRAMES, POSES):
-        kept = np.zeros(len(step), np.bool_)
-        encoded = table["entity"].cast("string").combine_chunks().dictionary_encode()
-        entity = encoded.indices.to_numpy()
-        planned = np.array([kind == "planned" for kind in table["kind"].cast("string").to_pylist()])
-        for code in range(len(encoded.dictionary)):
-            mine = np.flatnonzero(entity == code)
-            before = mine[(step[mine] <= first) & ~planned[mine]]
-            after = mine[step[mine] >= end]
-            low = before[-1] if len(before) else mine[0]
-            high = after[0] if len(after) else mine[-1]
-            kept[mine[(mine >= low) & (mine <= high)]] = True
-        return np.flatnonzero(kept)
+        return key_frame_rows(table, first, end)
     if name.startswith("layer."):
         return np.arange(len(step))
     if name == "observations":

@@ -10,12 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ArtifactError
 from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
 from fleet2d.viewer.home_facts import walls_facts
+from fleet2d.viewer.part import positions
 from fleet2d.viewer.run_facts import run_facts, run_title
 from fleet2d.viewer.sightings import sightings_of
 from fleet2d.viewer.walls import WallsHistory, doors_of
@@ -122,23 +121,10 @@ class ShownRun:
         import pyarrow as pa
 
         entities = self.run.manifest["entities"]
-        parts = []
         every = timedelta(microseconds=self._walks_every_us)
-        for name in (*entities["users"], *entities["robots"]):
-            path = self.run.path(name, every)
-            count = len(path.step)
-            columns = {
-                "step": path.step,
-                "time": path.time.astype("M8[us]"),
-                "entity": pa.array([name]).dictionary_encode().take(np.zeros(count, np.int64)),
-                "kind": pa.array(["track"]).dictionary_encode().take(np.zeros(count, np.int64)),
-                "x": path.x,
-                "y": path.y,
-                "heading": path.heading,
-                "away": path.away,
-            }
-            parts.append(pa.table(columns))
-        return pa.concat_tables(parts).unify_dictionaries()
+        names = (*entities["users"], *entities["robots"])
+        parts = [positions(self.run, name, every) for name in names]
+        return pa.concat_tables(parts)
 
 
 def compact_json(content: Any) -> bytes:

@@ -25,7 +25,8 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         true_user, true_names = _codes(table["true_user"])
         names = np.array([*users, ""], dtype=object)
         true = np.array([*true_names, ""], dtype=object)
-        false = names[user] != true[true_user]
+        mistaken = (names[user] != true[true_user]) & (user >= 0)
+        false = (true_user < 0) | mistaken
     gap = max(1, round(JOINED_S * 1e6 / run.manifest["step_us"]))
     lanes = []
     for r, robot_name in enumerate(robots):
