@@ -8,7 +8,6 @@ import typer
 from fleet2d.cli.arguments import Resolution, file_name
 from fleet2d.errors import InputError, RunDirectoryError
 
-
 Figure = Annotated[
     Literal["life", "heat", "strip"],
     typer.Option(

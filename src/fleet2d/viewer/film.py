@@ -121,7 +121,7 @@ def _frames(
             (axes or stage.figure).draw_artist(artist)
         if on_progress and done % 50 == 0:
             on_progress(done, len(moments))
-        yield moment, np.asarray(canvas.buffer_rgba())[..., :3]
+        yield moment, np.asarray(canvas.buffer_rgba())
 
 
 def _write_mp4(
@@ -135,7 +135,7 @@ def _write_mp4(
         stream: Any = None
         last: Any = None
         for number, pixels in frames:
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
+            frame = av.VideoFrame.from_ndarray(pixels, format="rgba")
             if stream is None:
                 stream = container.add_stream("libx264", rate=rate)
                 stream.width, stream.height, stream.pix_fmt = frame.width, frame.height, "yuv420p"
@@ -165,7 +165,7 @@ def _write_pictures(
                 f"{path.suffix[1:].upper()} films have at most {MOST_PICTURES} pictures: choose a"
                 " higher --speed, a shorter stretch, or .mp4"
             )
-        picture = Image.fromarray(pixels)
+        picture = Image.fromarray(pixels).convert("RGB")
         numbers.append(number)
         gif = path.suffix.lower() == ".gif"
         pictures.append(picture.quantize(128, dither=Image.Dither.NONE) if gif else picture)

@@ -1,4 +1,4 @@
-"""A report of a run: one HTML page with what ran, its metrics and figures, and how to run it again."""
+"""A report of a run: one HTML page with what ran, metrics, figures, and how to run it again."""
 
 import base64
 import html
@@ -134,10 +134,8 @@ def _figures(run: Run) -> list[str]:
                 figures.append(f"<p>{html.escape(words)}: {html.escape(str(error))}</p>")
                 continue
             picture = base64.b64encode(target.read_bytes()).decode()
-            source = f"data:image/png;base64,{picture}"
-            figures.append(
-                f'<figure><img alt="{words}" src="{source}"><figcaption>{words}</figcaption></figure>'
-            )
+            image = f'<img alt="{words}" src="data:image/png;base64,{picture}">'
+            figures.append(f"<figure>{image}<figcaption>{words}</figcaption></figure>")
     return figures
 
 
