@@ -173,12 +173,12 @@ export interface LiveEvent {
   detail: string;
 }
 
-/** The state of a running simulation. */
+/** The state of a running simulation; `speed` 0 is as fast as it goes. */
 export interface LiveFrame {
   step: number;
   paused: boolean;
   done: boolean;
-  speed: number | null;
+  speed: number;
   achieved: number;
   bodies: LiveBody[];
   seen: [string, string][];
@@ -191,7 +191,7 @@ export interface LiveFrame {
 
 /** What the page asks a running simulation to do; `x` and `y` in metres. */
 export interface LiveOrder {
-  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "call";
+  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "replan" | "end";
   target: string;
   value: number;
   x: number;

@@ -1,5 +1,7 @@
 /** The whole page by keyboard alone. */
 
+import { status } from "./live/feed";
+import { order } from "./live/orders";
 import * as state from "./state";
 
 export const KEYS: [string, string][] = [
@@ -22,7 +24,8 @@ const DAY_US = 86_400e6;
 
 const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   " ": () => {
-    state.playing.value = !state.playing.value;
+    if (state.live.value) void order({ action: status.value?.paused ? "resume" : "pause" });
+    else state.playing.value = !state.playing.value;
   },
   ",": () => step(-1),
   ".": () => step(1),
@@ -76,7 +79,7 @@ export function followKeyboard(): void {
     if (!panel && !action) return;
     if (panel) state.panel.value = panel;
     else action!(event);
-    state.follow.value = false;
+    if (event.key !== " ") state.follow.value = false;
     event.preventDefault();
   });
 }

@@ -6,6 +6,7 @@ import { App } from "./App";
 import { Run } from "./data/run";
 import { openSession } from "./data/source";
 import { followKeyboard } from "./keyboard";
+import { Feed } from "./live/feed";
 import { followPlaying } from "./player";
 import * as state from "./state";
 import "./style.css";
@@ -14,9 +15,11 @@ import { followTheme } from "./theme";
 async function start(box: HTMLElement): Promise<void> {
   followTheme();
   const session = await openSession();
-  const runs = await Promise.all(session.sources.map((source) => Run.open(source)));
+  const feed = session.facts.live ? await Feed.open() : null;
+  const runs = feed ? [feed.run] : await Promise.all(session.sources.map((source) => Run.open(source)));
   if (runs.length === 0) throw new Error("There is no run to show.");
   state.runs.value = runs;
+  state.live.value = feed !== null;
   state.setRange(state.beginUs.value, state.endUs.value);
   state.goTo(state.beginUs.value);
   applyAddress(location.hash, runs[0]!);
@@ -26,7 +29,8 @@ async function start(box: HTMLElement): Promise<void> {
   followAddress(runs[0]!);
   followKeyboard();
   followPlaying();
-  await Promise.all(runs.map((run) => run.readRest()));
+  if (feed) feed.follow();
+  else await Promise.all(runs.map((run) => run.readRest()));
   document.documentElement.dataset.ready = "true";
 }
 

@@ -28,7 +28,14 @@ interface Part {
 
 const MOST_PARTS = 4;
 
-export class Observations {
+/** Where observations come from: a table, or a running simulation. */
+export interface ObservationSource {
+  /** Observations at a step; null while they aren't read yet. */
+  at(step: number): Observation[] | null;
+  load(step: number): Promise<void>;
+}
+
+export class Observations implements ObservationSource {
   private readonly parts = new Map<number, Promise<Part>>();
   private readonly ready = new Map<number, Part>();
   private readonly starts: number[];

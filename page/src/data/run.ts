@@ -7,7 +7,7 @@ import { Clock } from "./clock";
 import { Events, readEvents } from "./events";
 import { Home } from "./home";
 import { LayerTable } from "./layers";
-import { Observations } from "./observations";
+import { Observations, type ObservationSource } from "./observations";
 import { Table } from "./parquet";
 import { roomStretches } from "./rooms";
 import { lastAtMost } from "./search";
@@ -26,7 +26,7 @@ export class Run {
   events = new Events();
   beliefs: Beliefs[] = [];
   sightings: SightingFacts[] = [];
-  observations: Observations | null = null;
+  observations: ObservationSource | null = null;
   /** Goes up by one whenever something more of the run was read. */
   readonly version = signal(0);
   /** What could not be read, in plain words. */

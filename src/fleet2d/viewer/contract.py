@@ -208,12 +208,12 @@ class LiveEvent(TypedDict):
 
 
 class LiveFrame(TypedDict):
-    """The state of a running simulation."""
+    """The state of a running simulation; `speed` 0 is as fast as it goes."""
 
     step: int
     paused: bool
     done: bool
-    speed: float | None
+    speed: float
     achieved: float
     bodies: list[LiveBody]
     seen: list[tuple[str, str]]
@@ -227,7 +227,7 @@ class LiveFrame(TypedDict):
 class LiveOrder(TypedDict):
     """What the page asks a running simulation to do; `x` and `y` in metres."""
 
-    action: Literal["pause", "resume", "step", "speed", "door", "place", "call"]
+    action: Literal["pause", "resume", "step", "speed", "door", "place", "replan", "end"]
     target: str
     value: float
     x: float

@@ -15,8 +15,9 @@ from starlette.types import ASGIApp
 import fleet2d
 from fleet2d.artifacts.reader import open_run
 from fleet2d.errors import ArtifactError, Fleet2DError
-from fleet2d.viewer.contract import Problem, SessionFacts
+from fleet2d.viewer.contract import SessionFacts
 from fleet2d.viewer.guard import Guard
+from fleet2d.viewer.responses import json_answer, problem
 from fleet2d.viewer.shown_run import ShownRun, compact_json
 
 PAGE = Path(__file__).parent / "page"
@@ -94,7 +95,7 @@ def page_app(
 
     async def session(_: Request) -> Response:
         facts = SessionFacts(runs=shelf.titles, live=live is not None, version=fleet2d.__version__)
-        return _json(compact_json(facts))
+        return json_answer(compact_json(facts))
 
     async def file(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")
@@ -114,15 +115,6 @@ def page_app(
         Route("/{name}", file),
     ]
     return Guard(_below(token, Starlette(routes=routes)), token, port)
-
-
-def problem(message: str, status: int = 422) -> Response:
-    """Return an answer that says why something can't be shown."""
-    return _json(compact_json(Problem(message=message)), status)
-
-
-def _json(content: bytes, status: int = 200) -> Response:
-    return Response(content, status, media_type="application/json")
 
 
 def _below(token: str, app: ASGIApp) -> ASGIApp:
@@ -156,15 +148,15 @@ def _of_run(shelf: Shelf, answer: Callable[[ShownRun, Request], Response]) -> An
 
 
 def _facts(shown: ShownRun, _: Request) -> Response:
-    return _json(shown.facts_json)
+    return json_answer(shown.facts_json)
 
 
 def _sightings(shown: ShownRun, _: Request) -> Response:
-    return _json(compact_json(shown.sightings))
+    return json_answer(compact_json(shown.sightings))
 
 
 def _walls(shown: ShownRun, request: Request) -> Response:
-    return _json(compact_json(shown.walls(request.path_params["walls"])))
+    return json_answer(compact_json(shown.walls(request.path_params["walls"])))
 
 
 def _table(shown: ShownRun, request: Request) -> Response:
