@@ -9,7 +9,7 @@ import fleet2d
 SCENARIO = {
     "extends": "bundled:base",
     "simulation": {"duration": {"hours": 9}, "seed": 11},
-    "floorplan": {"layers": {"explored": {}}},
+    "floorplan": {"layers": {"dust": {"fill": 0.5}}},
     "objects": {
         "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
         "office_door": {"type": "door", "doorway": "office_0", "open": False},

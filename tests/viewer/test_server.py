@@ -52,7 +52,7 @@ def test_facts_are_those_of_the_run(run_dir: Path) -> None:
     assert ["bath_door", "office_door"] == [door["name"] for door in facts["home"]["doors"]]
     roles = {table["name"]: table["role"] for table in facts["tables"]}
     assert ("algorithm", "layer", "log", "metric") == (
-        roles["ltp"], roles["layer.explored.astro"], roles["events"], roles["room_share"],
+        roles["ltp"], roles["layer.dust"], roles["events"], roles["room_share"],
     )  # fmt: skip
 
 
