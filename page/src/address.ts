@@ -66,7 +66,11 @@ export function followAddress(run: Run): void {
     clearTimeout(timer);
     timer = setTimeout(() => {
       written = `#${address}`;
-      history.replaceState(null, "", written);
+      try {
+        history.replaceState(null, "", written);
+      } catch {
+        // A frame in a notebook has no address of its own.
+      }
     }, DELAY_MS);
   });
   addEventListener("hashchange", () => {

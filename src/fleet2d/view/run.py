@@ -102,6 +102,12 @@ def draw_run(run: Run, path: Path) -> None:
         save_figure(_Picture(run).figure, path)
 
 
+def run_figure(run: Run) -> Figure:
+    """Return the picture of a run as a figure; see `draw_run`."""
+    with drawing_style():
+        return _Picture(run).figure
+
+
 class _Picture:
     """The picture of a run: what is gathered, then drawn part by part."""
 

@@ -62,7 +62,7 @@ def write_film(
     rate /= run.manifest["step_us"] * stride
     with drawing_style():
         figure = _figure(run, height)
-        stage = Stage(run, first, end, figure, stride)
+        stage = Stage(run, first, end, figure=figure, every=stride)
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
         frames = _frames(stage, first, moments, on_progress)

@@ -67,8 +67,17 @@ def moment_figure(run: Run, step: int) -> Figure:
     figure = Figure(figsize=(width, height * 1.15), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     first, end = _day_around(run, step)
-    Stage(run, first, end, figure).show(step)
+    Stage(run, first, end, figure=figure).show(step)
     return figure
+
+
+def moment_on_axes(run: Run, step: int, axes: Axes) -> None:
+    """Draw a moment on axes, in metres; see `draw_moment`."""
+    Stage(run, max(0, step - _minute(run)), step + 1, axes).show(step)
+
+
+def _minute(run: Run) -> int:
+    return max(1, round(60e6 / run.manifest["step_us"]))
 
 
 def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = "life") -> None:

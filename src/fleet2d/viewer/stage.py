@@ -65,43 +65,57 @@ class Stage:
         every: Steps between two poses that are known.
     """
 
-    def __init__(self, run: Run, first: int, end: int, figure: Figure, every: int = 1) -> None:
+    def __init__(
+        self,
+        run: Run,
+        first: int,
+        end: int,
+        axes: Axes | None = None,
+        *,
+        figure: Figure | None = None,
+        every: int = 1,
+    ) -> None:
         """Draw what stands still.
 
         Args:
             run: The whole run.
             first: First step that can be shown.
             end: The step before which to end.
-            figure: An empty figure.
+            axes: Where to draw the plan, and nothing else; or
+            figure: an empty figure, for the plan over a strip of the time between both steps.
             every: Steps between two moments that can be shown.
 
         Raises:
             ArtifactError: The run stored no key frames or no floor plan.
         """
-        self.figure, self.every, self._first = figure, every, first
+        self.every, self._first = every, first
         self._run, self._plan = run, run.plan
         self._part = part_of_run(run, first, end)
         self._step_us = run.manifest["step_us"]
         self._walls = WallsHistory(run, doors_of(run))
         self._change_steps = [change["step"] for change in self._walls.changes]
-        self._axes, self._strip = self._lay_out()
+        self._strip: Axes | None = None
+        if axes is None:
+            assert figure is not None
+            axes, self._strip = self._lay_out(figure)
+        self._axes, self.figure = axes, axes.figure
         floorplan_axes(self._plan, self._axes, title=False)
         _, _, _, top = self._plan.bounds
         self._axes.set_ylim(top=top + ABOVE_M)
         bodies = bodies_of(run.manifest["scenario"], run.manifest["entities"])
         self.players = [self._player(facts) for facts in bodies]
-        shown = [(player.facts["name"], player.facts["color"]) for player in self.players]
-        rows = strip_rows(self._part, shown[:STRIP_ROWS])
-        draw_strip(self._part, self._plan, rows, self._strip)
         self._ways = LineCollection([], lw=1.6, alpha=0.7, zorder=3.4)
         self._sightings = LineCollection([], lw=1.0, ls=(0, (2, 1.5)), color=VIEW_EDGE, zorder=3.6)
         for lines in (self._ways, self._sightings):
             self._axes.add_collection(lines, autolim=False)
-        self._cursor = self._strip.axvline(0, color=ACCENT_COLOR, lw=1.2, zorder=4)
-        self._clock = figure.text(0.02, 0.975, "", fontsize=13, weight="bold", color=TEXT_COLOR)
-        self._aside = figure.text(0.98, 0.975, "", fontsize=9, color=QUIET_COLOR, ha="right")
-        for text in (self._clock, self._aside):
-            text.set_verticalalignment("top")
+        write = axes.text if self._strip is None else self.figure.text
+        style: dict[str, Any] = {"va": "top"}
+        if self._strip is None:
+            style = {"va": "bottom", "transform": axes.transAxes}
+        high = 1.0 if self._strip is None else 0.975
+        self._clock = write(0.02, high, "", fontsize=13, weight="bold", color=TEXT_COLOR, **style)
+        self._aside = write(0.98, high, "", fontsize=9, color=QUIET_COLOR, ha="right", **style)
+        self._cursor = None if self._strip is None else self._fill_strip(self._strip)
         self._seen = _Observations(self._part)
 
     @property
@@ -113,8 +127,9 @@ class Stage:
         parts += [(self._axes, self._ways), (self._axes, self._sightings)]
         for player in self.players:
             parts += [(self._axes, part) for part in (player.spot, player.nose, player.name)]
-        parts += [(self._strip, self._cursor), (None, self._clock), (None, self._aside)]
-        return parts
+        if self._cursor is not None:
+            parts.append((self._strip, self._cursor))
+        return [*parts, (None, self._clock), (None, self._aside)]
 
     def show(self, step: int) -> None:
         """Move everything to where it was at a step of the run."""
@@ -126,7 +141,8 @@ class Stage:
         path = self.players[0].path if self.players else None
         if path is not None:
             when = path.time[index]
-            self._cursor.set_xdata([when, when])
+            if self._cursor is not None:
+                self._cursor.set_xdata([when, when])
             moment = when.astype(object)
             self._clock.set_text(f"{moment:%a} {moment.day} {moment:%b %H:%M}")
         away = [p.facts["name"] for p in self.players if p.path.away[index]]
@@ -146,12 +162,19 @@ class Stage:
         changed[0] = True
         return changed
 
-    def _lay_out(self) -> tuple[Axes, Axes]:
+    def _fill_strip(self, strip: Axes) -> Any:
+        """Draw the strip; return its cursor."""
+        shown = [(player.facts["name"], player.facts["color"]) for player in self.players]
+        rows = strip_rows(self._part, shown[:STRIP_ROWS])
+        draw_strip(self._part, self._plan, rows, strip)
+        return strip.axvline(0, color=ACCENT_COLOR, lw=1.2, zorder=4)
+
+    def _lay_out(self, figure: Figure) -> tuple[Axes, Axes]:
         rows = len(self._run.manifest["entities"]["users"])
         rows += len(self._run.manifest["entities"]["robots"])
         height = 0.075 + 0.032 * min(rows, STRIP_ROWS)
-        plan = self.figure.add_axes((0.0, height, 1.0, 0.94 - height))
-        strip = self.figure.add_axes((0.09, 0.055, 0.88, height - 0.06))
+        plan = figure.add_axes((0.0, height, 1.0, 0.94 - height))
+        strip = figure.add_axes((0.09, 0.055, 0.88, height - 0.06))
         return plan, strip
 
     def _player(self, facts: BodyFacts) -> Player:
