@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from fleet2d.errors import InputError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.view.floorplan import ROOM_COLORS, WALL_COLOR, draw_floorplan, floorplan_axes
+from fleet2d.palette import ROOM_COLORS, WALL_COLOR
+from fleet2d.view.floorplan import draw_floorplan, floorplan_axes
 
 
 @pytest.fixture(scope="module")

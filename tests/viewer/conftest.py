@@ -8,7 +8,7 @@ import fleet2d
 
 SCENARIO = {
     "extends": "bundled:base",
-    "simulation": {"duration": {"hours": 9}, "seed": 11},
+    "simulation": {"duration": "9 h", "seed": 11},
     "floorplan": {"layers": {"dust": {"fill": 0.5}}},
     "objects": {
         "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},

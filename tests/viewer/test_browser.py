@@ -1,6 +1,6 @@
 """The page, driven in Chromium: what it shows is what the run's tables say."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,15 @@ def moment(page: Any) -> int:
     return int(page.get_attribute(".lanes", "aria-valuenow"))
 
 
+def until(page: Any, holds: Callable[[], bool]) -> None:
+    """Wait for a condition; the page's policy lets no test run code in it to wait."""
+    for _ in range(100):
+        if holds():
+            return
+        page.wait_for_timeout(100)
+    pytest.fail("the page did not come to it within 10 s")
+
+
 def shows_step(page: Any, step: int) -> None:
     page.wait_for_selector(f"table.now[data-step='{step}']", timeout=5000)
 
@@ -80,7 +89,9 @@ def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
     for row in rows:
         bar = page.locator(f"tr[data-room={row['room']}]")
         if bar.count():
-            assert row["share"] == pytest.approx(float(bar.get_attribute("data-believed")), abs=1e-9)
+            assert row["share"] == pytest.approx(
+                float(bar.get_attribute("data-believed")), abs=1e-9
+            )
 
 
 def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
@@ -95,7 +106,7 @@ def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
 def test_playing_passes_time_at_the_chosen_speed(page: Any) -> None:
     page.select_option("select[aria-label=Speed]", "600")
     page.click("button.play")
-    page.wait_for_function("+document.querySelector('.lanes').ariaValueNow > 300", timeout=10_000)
+    until(page, lambda: moment(page) > 300)
     page.click("button.play")
     stopped = moment(page)
     page.wait_for_timeout(300)
@@ -151,7 +162,7 @@ def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
     page.click("#tab-layers")
     page.uncheck("input[name=ways]")
     page.keyboard.press("+")
-    page.wait_for_function("location.hash.includes('panel=layers')")
+    until(page, lambda: "panel=layers" in page.url)
     page.wait_for_timeout(400)
     with page_at(browser, page.url) as other:
         assert 5 * 3600 == moment(other)

@@ -26,9 +26,7 @@ from fleet2d.floorplan.rooms import NO_ROOM
 from fleet2d.floorplan.standing import grown_cells
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.palette import (
-    ACCENT_COLOR as ACCENT_COLOR,
-)
-from fleet2d.palette import (
+    ACCENT_COLOR,
     BORDER_COLOR,
     OTHER_COLOR,
     ROOM_COLORS,

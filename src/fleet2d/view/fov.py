@@ -15,12 +15,12 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.seen import Reach
+from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.region import VisibleRegion
 from fleet2d.view.floorplan import (
     DPI,
-    TEXT_COLOR,
     check_picture,
     drawing_style,
     figure_size,
@@ -29,7 +29,6 @@ from fleet2d.view.floorplan import (
 )
 from fleet2d.view.layers import layer_on_axes
 from fleet2d.view.life import field_of_view
-from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 
 ROBOT_COLOR = "#22344f"
 RADIUS_M = 0.17

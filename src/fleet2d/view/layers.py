@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from fleet2d.artifacts.layers import PREFIX, layer_steps, read_layer
 from fleet2d.artifacts.reader import Run
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import TEXT_COLOR
 from fleet2d.view.floorplan import (
     DPI,
-    TEXT_COLOR,
     check_picture,
     drawing_style,
     figure_size,

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
 from fleet2d.sight.region import VisibleRegion, Walled
-from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 from fleet2d.view.traces import Trace
 
 BLUR_M = 0.14  # a body is a soft spot of about its own size

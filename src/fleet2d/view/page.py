@@ -11,9 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle, Wedge
 from matplotlib.text import Text
 
-from fleet2d.palette import TEXT_COLOR
-from fleet2d.palette import VIEW_COLOR as VIEW_COLOR
-from fleet2d.palette import VIEW_EDGE as VIEW_EDGE
+from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 
 CHIP_IN = 0.15
 LINE_IN = 0.215

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.reader import Run
+from fleet2d.palette import ACCENT_COLOR
 from fleet2d.view.actogram import (
     MARKS,
     draw_actogram,
@@ -19,7 +20,6 @@ from fleet2d.view.actogram import (
     rooms_by_day,
 )
 from fleet2d.view.floorplan import (
-    ACCENT_COLOR,
     DPI,
     check_picture,
     drawing_style,

@@ -13,8 +13,6 @@ from fleet2d.artifacts.reader import Run
 from fleet2d.engine.rebuild import rebuild_path
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.palette import ROBOT_COLORS as ROBOT_COLORS
-from fleet2d.palette import USER_COLORS as USER_COLORS
 from fleet2d.palette import body_color
 
 SAMPLES = 40_000  # a short run is sampled more often than once a minute, up to about so many times

@@ -118,7 +118,8 @@ def _frames(
         stage.show(first + moment * stage.every)
         canvas.restore_region(ground)
         for axes, artist in moving:
-            (axes or stage.figure).draw_artist(artist)
+            drawn_on: Any = axes or stage.figure
+            drawn_on.draw_artist(artist)
         if on_progress and done % 50 == 0:
             on_progress(done, len(moments))
         yield moment, np.asarray(canvas.buffer_rgba())
@@ -158,7 +159,8 @@ def _write_pictures(
     """Write a GIF or WebP, in which every picture says how long it is shown."""
     from PIL import Image
 
-    numbers, pictures = [], []
+    numbers: list[int] = []
+    pictures: list[Any] = []
     for number, pixels in frames:
         if len(pictures) >= MOST_PICTURES:
             raise InputError(

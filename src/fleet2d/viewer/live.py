@@ -30,6 +30,7 @@ BATCHES_A_S = 30
 MOST_WAITING = 4_000  # frames that wait for a page that doesn't take them
 MOST_BODY = 4_096  # bytes of an order
 ORDER_WAIT_S = 10.0
+IDLE_S = 0.1
 ACTIONS = get_args(get_type_hints(LiveOrder)["action"])
 
 
@@ -89,7 +90,8 @@ class LiveRun:
     def _go(self) -> None:
         try:
             while not self._ending:
-                self._take_orders(wait=self._paused or self.engine.done)
+                idle = self._paused or self.engine.done
+                self._take_orders(IDLE_S if idle else 0.0)
                 if not self._paused and not self.engine.done:
                     self._advance()
         except BaseException as error:  # noqa: BLE001 - is shown on the page and raised by the command
@@ -106,7 +108,7 @@ class LiveRun:
         if self._speed:
             rest = passed / self._speed - (time.perf_counter() - began)
             if rest > 0:
-                self._take_orders(wait=False, seconds=rest)
+                self._take_orders(rest)
         took = max(time.perf_counter() - began, 1e-9)
         self._achieved = 0.9 * self._achieved + 0.1 * passed / took
 
@@ -117,9 +119,9 @@ class LiveRun:
             us = min(us, round(self._speed * 1e6 / FRAMES_A_S))
         return max(1, us // self._clock.step_us)
 
-    def _take_orders(self, *, wait: bool, seconds: float = 0.1) -> None:
-        """Do what pages asked for; wait a little for that where nothing else is to do."""
-        until = time.perf_counter() + seconds if wait or seconds != 0.1 else 0.0
+    def _take_orders(self, seconds: float) -> None:
+        """Do what pages asked for, and go on waiting for more for so long."""
+        until = time.perf_counter() + seconds
         while not self._ending:
             rest = until - time.perf_counter()
             try:
@@ -252,21 +254,17 @@ def read_order(body: bytes) -> LiveOrder:
     Raises:
         InputError: It is none.
     """
+    refusal = InputError("this is no order that a run can follow")
     try:
         content: Any = json.loads(body) if len(body) <= MOST_BODY else None
-        order = LiveOrder(
-            action=content["action"],
-            target=content["target"],
-            value=float(content["value"]),
-            x=float(content["x"]),
-            y=float(content["y"]),
-        )
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError("this is no order that a run can follow") from error
-    finite = all(abs(order[key]) < 1e9 for key in ("value", "x", "y"))
-    if order["action"] not in ACTIONS or not isinstance(order["target"], str) or not finite:
-        raise InputError("this is no order that a run can follow")
-    return order
+        value, x, y = (float(content[key]) for key in ("value", "x", "y"))
+        action, target = content["action"], content["target"]
+    except (ValueError, KeyError, TypeError):
+        raise refusal from None
+    finite = all(abs(number) < 1e9 for number in (value, x, y))
+    if action not in ACTIONS or not isinstance(target, str) or not finite:
+        raise refusal
+    return LiveOrder(action=action, target=target, value=value, x=x, y=y)
 
 
 def watch_scenario(

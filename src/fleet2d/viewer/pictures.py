@@ -77,7 +77,7 @@ def moment_on_axes(run: Run, step: int, axes: Axes) -> None:
 
 
 def _minute(run: Run) -> int:
-    return max(1, round(60e6 / run.manifest["step_us"]))
+    return max(1, round(60e6 / int(run.manifest["step_us"])))
 
 
 def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = "life") -> None:

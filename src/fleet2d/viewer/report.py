@@ -3,15 +3,16 @@
 import base64
 import html
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from fleet2d.artifacts.reader import Run
-from fleet2d.errors import ArtifactError
+from fleet2d.errors import ArtifactError, InputError
 from fleet2d.units import format_duration
 from fleet2d.viewer.files import write_whole
 from fleet2d.viewer.moments import clock_of
@@ -120,17 +121,18 @@ def _figures(run: Run) -> list[str]:
 
     steps = run.manifest["steps"]
     day = min(steps, max(1, DAY // timedelta(microseconds=run.manifest["step_us"])))
+    kinds: tuple[tuple[str, Callable[..., None]], ...] = (
+        ("The run in its home, and who was where by day", partial(draw_run, run)),
+        ("The first day", partial(draw_stretch, run, 0, day, kind="strip")),
+        ("Where time was spent", partial(draw_stretch, run, 0, steps, kind="heat")),
+    )
     figures = []
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "figure.png"
-        for words, draw in (
-            ("The run in its home, and who was where by day", lambda: draw_run(run, target)),
-            ("The first day", lambda: draw_stretch(run, 0, day, target, "strip")),
-            ("Where time was spent", lambda: draw_stretch(run, 0, steps, target, "heat")),
-        ):
+        for words, draw in kinds:
             try:
-                draw()
-            except ArtifactError as error:
+                draw(path=target)
+            except (ArtifactError, InputError) as error:
                 figures.append(f"<p>{html.escape(words)}: {html.escape(str(error))}</p>")
                 continue
             picture = base64.b64encode(target.read_bytes()).decode()

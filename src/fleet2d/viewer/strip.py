@@ -73,8 +73,16 @@ def draw_strip(
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
             if words and room >= 0 and last - first > LABEL_PART * (end - begin):
                 name = plan.rooms[room].name.replace("_", " ")
-                style = {"fontsize": 6.5, "color": TEXT_COLOR, "ha": "center", "va": "center"}
-                axes.text((first + last) / 2, number + 0.42, name, clip_on=True, **style)
+                axes.text(
+                    (first + last) / 2,
+                    number + 0.42,
+                    name,
+                    clip_on=True,
+                    fontsize=6.5,
+                    color=TEXT_COLOR,
+                    ha="center",
+                    va="center",
+                )
     axes.add_collection(PolyCollection(boxes, facecolors=faces, lw=0, zorder=1), autolim=False)
     _mark_sightings(run, rows, axes)
     axes.set(xlim=(begin, end), ylim=(len(rows), -0.05))

@@ -14,7 +14,7 @@ except ImportError:
     raise InputError('a widget needs anywidget: pip install "fleet2d[view]"') from None
 
 
-class RunWidget(anywidget.AnyWidget):
+class RunWidget(anywidget.AnyWidget):  # type: ignore[misc]
     """The page of a run in a frame of its own.
 
     Attributes:
