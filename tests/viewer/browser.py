@@ -1,5 +1,6 @@
 """A real browser, headless, for the tests of the page."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,9 +20,11 @@ READY = "html[data-ready=true], .failure"
 @contextmanager
 def chromium() -> Iterator[Any]:
     """Start Chromium, or skip the test with a reason."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    required = os.environ.get("FLEET2D_REQUIRE_BROWSER") == "1"
     if not CHROMIUM.exists():
-        pytest.skip(f"there is no {CHROMIUM}: install Debian's package chromium")
+        reason = f"there is no {CHROMIUM}: install Debian's package chromium"
+        pytest.fail(reason) if required else pytest.skip(reason)
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
         yield browser

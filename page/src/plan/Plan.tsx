@@ -10,7 +10,7 @@ import { colors, dark, scaleColor } from "../theme";
 import { drawBeliefs } from "./beliefs";
 import { bodyRadius, drawScene } from "./bodies";
 import { fitted, oncePerFrame } from "./canvas";
-import { Frame } from "./frame";
+import { FOOT, Frame } from "./frame";
 import { cellImage, drawCells, drawGround, tracePolygons } from "./ground";
 
 interface Pointer {
@@ -212,7 +212,7 @@ function followPointer(canvas: HTMLCanvasElement, painter: PlanPainter, repaint:
     event.preventDefault();
     const factor = Math.exp(-event.deltaY * 0.0015);
     const next = Math.max(1, Math.min(40, painter.zoom * factor));
-    const [x, y] = [event.offsetX - canvas.clientWidth / 2, event.offsetY - canvas.clientHeight / 2];
+    const [x, y] = [event.offsetX - canvas.clientWidth / 2, event.offsetY - (canvas.clientHeight - FOOT) / 2];
     const share = next / painter.zoom;
     painter.shift = next === 1 ? [0, 0] : [x - (x - painter.shift[0]) * share, y - (y - painter.shift[1]) * share];
     painter.zoom = next;

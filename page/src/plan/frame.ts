@@ -3,6 +3,8 @@
 import type { Home } from "../data/home";
 
 const EDGE = 0.03;
+/** Pixels below the plan, for its scale. */
+export const FOOT = 18;
 
 export class Frame {
   private constructor(
@@ -15,10 +17,10 @@ export class Frame {
   static fit(home: Home, width: number, height: number, zoom = 1, shift: readonly [number, number] = [0, 0]): Frame {
     const [x0, y0, x1, y1] = home.facts.bounds;
     const edge = 0.35 + EDGE * Math.max(x1 - x0, y1 - y0);
-    const fitting = Math.min(width / (x1 - x0 + 2 * edge), height / (y1 - y0 + 2 * edge));
+    const fitting = Math.min(width / (x1 - x0 + 2 * edge), (height - FOOT) / (y1 - y0 + 2 * edge));
     const scale = fitting * zoom;
     const left = width / 2 - ((x0 + x1) / 2) * scale + shift[0];
-    const bottom = height / 2 + ((y0 + y1) / 2) * scale + shift[1];
+    const bottom = (height - FOOT) / 2 + ((y0 + y1) / 2) * scale + shift[1];
     return new Frame(scale, left, bottom, home);
   }
 

@@ -29,7 +29,8 @@ function useLanes(): { value: Lane[] } {
           void run.version.value;
           const other = runs.length === 2 ? runs[1 - i]! : null;
           if (other) void other.version.value;
-          return [...lanesOf(run, `${i}:`, i === 0 ? other : null), ...(extra.value.get(run) ?? [])];
+          const title = runs.length > 1 ? run.facts.title : "";
+          return [...lanesOf(run, `${i}:`, i === 0 ? other : null, title), ...(extra.value.get(run) ?? [])];
         });
       }),
     [],

@@ -23,10 +23,28 @@ export type LanePaint =
 
 /** Told apart with any kind of colour blindness (Paul Tol's muted scheme). */
 const WORD_COLORS = ["#88ccee", "#ddcc77", "#cc6677", "#44aa99", "#aa4499", "#999933", "#332288", "#117733", "#882255"];
+/** Every word keeps its colour, in all lanes of all runs. */
+const known = new Map<string, string>();
+
+function wordColor(word: string): string {
+  let color = known.get(word);
+  if (!color) {
+    color = WORD_COLORS[known.size % WORD_COLORS.length]!;
+    known.set(word, color);
+  }
+  return color;
+}
+
 const SEEN_KINDS = ["user_seen", "user_lost"];
 const ROUTINE_KINDS = new Set(["activity", "left_home", "came_home", "opened", "shut", ...SEEN_KINDS]);
 
-export function lanesOf(run: Run, prefix: string, other: Run | null): Lane[] {
+export function lanesOf(run: Run, prefix: string, other: Run | null, title = ""): Lane[] {
+  const lanes = ownLanes(run, prefix, other);
+  if (title) lanes.forEach((lane) => (lane.label = `${title}: ${lane.label}`));
+  return lanes;
+}
+
+function ownLanes(run: Run, prefix: string, other: Run | null): Lane[] {
   const lanes: Lane[] = [];
   for (const body of run.bodies) {
     lanes.push(roomLane(run, body.name, prefix));
@@ -82,13 +100,13 @@ function differenceLane(run: Run, other: Run, name: string, prefix: string): Lan
 function activityLane(run: Run, name: string, prefix: string): Lane | null {
   const rows = run.events.ofKind("activity").filter((row) => row.entity === name);
   if (rows.length === 0) return null;
-  const words = [...new Set(rows.map((row) => row.detail))].sort();
+  const words = [...new Set(rows.map((row) => row.detail))];
   const stretches: Stretches = {
     from: rows.map((row) => row.us),
     to: rows.map((_, i) => rows[i + 1]?.us ?? run.clock.endUs),
     value: rows.map((row) => words.indexOf(row.detail)),
   };
-  const color = (value: number): string => WORD_COLORS[value % WORD_COLORS.length]!;
+  const color = (value: number): string => wordColor(words[value] ?? "");
   return stretchLane(`${prefix}${name}/activity`, `${name} does`, name, stretches, color, (value) => words[value] ?? "");
 }
 

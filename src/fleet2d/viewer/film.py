@@ -22,7 +22,7 @@ from fleet2d.viewer.stage import Stage
 ENDINGS = (".mp4", ".gif", ".webp")
 MOST_FRAMES_A_S = 25
 HEIGHT_PX = 720
-FILM_DPI = 100
+HEIGHT_IN = 7.2
 # Pictures of a whole film are held in memory while a GIF or WebP is written.
 MOST_PICTURES = 3_000
 
@@ -96,7 +96,8 @@ def _figure(run: Run, height: int) -> Figure:
     wide, high = figure_size(run.plan)
     rows = height - height % 2
     columns = min(2 * round(rows * min(max(wide / high, 1.0), 1.9) / 2), 3840)
-    figure = Figure(figsize=(columns / FILM_DPI, rows / FILM_DPI), dpi=FILM_DPI, facecolor="white")
+    dpi = rows / HEIGHT_IN  # words grow with the film
+    figure = Figure(figsize=(columns / dpi, rows / dpi), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 

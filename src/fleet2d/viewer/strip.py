@@ -126,7 +126,7 @@ def _label(axes: Axes, rows: Sequence[Row]) -> None:
     locator = mdates.AutoDateLocator(minticks=3, maxticks=10)
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator))
-    axes.xaxis.get_offset_text().set(fontsize=7, color=QUIET_COLOR)
+    axes.xaxis.get_offset_text().set_visible(False)
     axes.set_yticks(np.arange(len(rows)) + ROW_PART / 2, [row.name for row in rows])
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
     for label, row in zip(axes.get_yticklabels(), rows, strict=True):
