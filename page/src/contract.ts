@@ -191,7 +191,7 @@ export interface LiveFrame {
 
 /** What the page asks a running simulation to do; `x` and `y` in metres. */
 export interface LiveOrder {
-  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "replan" | "end";
+  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "call" | "replan" | "end";
   target: string;
   value: number;
   x: number;

@@ -25,7 +25,8 @@ async function start(box: HTMLElement): Promise<void> {
   applyAddress(location.hash, runs[0]!);
   document.title = `${runs.map((run) => run.facts.title).join(" · ")} – Fleet2D`;
   render(<App />, box);
-  requestAnimationFrame(() => performance.mark("first-picture"));
+  if (!feed) await Promise.all(runs.map((run) => run.readPoses()));
+  requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("first-picture")));
   followAddress(runs[0]!);
   followKeyboard();
   followPlaying();

@@ -28,6 +28,7 @@ export const source: RunSource = {
 
 export async function wholeRun(): Promise<Run> {
   const run = await Run.open(source);
+  await run.readPoses();
   await run.readRest();
   return run;
 }

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from datetime import timedelta
+from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
@@ -12,6 +13,7 @@ from fleet2d.errors import InputError
 from fleet2d.viewer.contract import LiveOrder
 from fleet2d.viewer.live import LiveRun, read_order
 from fleet2d.viewer.server import Shelf, page_app
+from fleet2d.viewer.shown_run import ShownRun
 
 PORT = 8765
 OWN = f"http://127.0.0.1:{PORT}"
@@ -84,9 +86,45 @@ def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
     assert (x, y) == pytest.approx((state["x"], state["y"]), abs=0.02)
     live.end()
     assert live.run is not None
-    assert any("script" in note for note in live.run.notes)
+    assert ["put"] == [entry["do"] for entry in live.run.manifest["interventions"]]
     path = live.run.path("ana", timedelta(seconds=1))
     assert len(path.x) == live.run.manifest["steps"]
+
+
+def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
+    live.ask(order("step", value=60))
+    x, y = live.engine.simulation.home.plan.room("kitchen_0").anchor_xy
+    assert "" == live.ask(order("call", "astro", x=x, y=y))
+    live.ask(order("step", value=120))
+    state = live.engine.simulation.state["astro"]
+    assert "kitchen_0" == state["room"]
+    assert "" == live.ask(order("call", "astro", x=x + 0.5, y=y))
+    live.end()
+    assert live.run is not None
+    done = [entry["do"] for entry in live.run.manifest["interventions"]]
+    assert ["drive", "decide", "decide"] == done
+
+
+def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
+    run_dir = tmp_path / "steered"
+    watched = LiveRun(
+        fleet2d.Simulation("bundled:base", "simulation.duration=3 h", DOOR, seed=4, out=run_dir),
+        paused=True,
+    )
+    watched.start()
+    watched.ask(order("step", value=300))
+    for wish in (order("door", "bath_door", value=0), order("replan", "astro")):
+        assert "" == watched.ask(wish)
+    watched.ask(order("resume"))
+    for batch in watched.frames():
+        if batch and batch[-1]["done"]:
+            break
+    watched.end()
+    assert fleet2d.reproduce(run_dir).same
+    marks = ShownRun(fleet2d.open_run(run_dir)).facts["marks"]
+    assert [(300, "shut bath_door"), (300, "replan astro")] == [
+        (mark["step"], mark["label"]) for mark in marks
+    ]
 
 
 def test_door_is_shut_from_the_next_step_on(live: LiveRun) -> None:

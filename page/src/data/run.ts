@@ -48,9 +48,7 @@ export class Run {
   }
 
   static async open(source: RunSource): Promise<Run> {
-    const run = new Run(await source.facts(), source);
-    await run.readPoses();
-    return run;
+    return new Run(await source.facts(), source);
   }
 
   get beginUs(): number {
@@ -73,7 +71,8 @@ export class Run {
     this.version.value++;
   }
 
-  private async readPoses(): Promise<void> {
+  /** Read where everybody is; until then only the home can be shown. */
+  async readPoses(): Promise<void> {
     const name = this.facts.walks_every_s > 0 ? "poses" : "key_frames";
     const facts = this.facts.tables.find((table) => table.name === "key_frames");
     if (!facts) {

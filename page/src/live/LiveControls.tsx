@@ -2,7 +2,7 @@
 
 import * as state from "../state";
 import { connected, status } from "./feed";
-import { order, placing, refusal } from "./orders";
+import { calling, order, placing, refusal } from "./orders";
 
 const SPEEDS: [number, string][] = [
   [0, "as fast as it goes"],
@@ -74,6 +74,16 @@ function Interventions() {
           }}
         >
           {placing.value === name ? "Click on the plan …" : `Put ${name} …`}
+        </button>
+        <button
+          type="button"
+          title="It goes there and stays; from then on it goes only where it is called."
+          aria-pressed={calling.value === name}
+          onClick={() => {
+            calling.value = calling.value === name ? "" : name;
+          }}
+        >
+          {calling.value === name ? "Click where to …" : `Call ${name} …`}
         </button>
         <button type="button" onClick={() => void order({ action: "replan", target: name })}>
           Decide anew

@@ -5,6 +5,8 @@ import type { LiveOrder, Problem } from "../contract";
 
 /** The body that the next click on the plan puts somewhere; empty: none. */
 export const placing = signal("");
+/** The body that goes where the next click on the plan is; empty: none. */
+export const calling = signal("");
 /** Why the last order was refused; empty if it was not. */
 export const refusal = signal("");
 
@@ -22,4 +24,9 @@ export async function order(wish: Partial<LiveOrder> & Pick<LiveOrder, "action">
 export async function askPlace(name: string, x: number, y: number): Promise<void> {
   placing.value = "";
   await order({ action: "place", target: name, x, y });
+}
+
+export async function askCall(name: string, x: number, y: number): Promise<void> {
+  calling.value = "";
+  await order({ action: "call", target: name, x, y });
 }

@@ -4,7 +4,7 @@ import { effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Run } from "../data/run";
 import type { Layer } from "../data/layers";
-import { askPlace, placing } from "../live/orders";
+import { askCall, askPlace, calling, placing } from "../live/orders";
 import * as state from "../state";
 import { colors, dark, scaleColor } from "../theme";
 import { drawBeliefs } from "./beliefs";
@@ -204,6 +204,7 @@ function followPointer(canvas: HTMLCanvasElement, painter: PlanPainter, repaint:
     const [x, y] = at(event);
     const place = painter.placeAt(x, y);
     if (held?.moved && held.body && place) void askPlace(held.body, ...place);
+    else if (held && !held.moved && calling.value && place) void askCall(calling.value, ...place);
     else if (held && !held.moved && placing.value && place) void askPlace(placing.value, ...place);
     else if (held && !held.moved) state.select(painter.thingAt(x, y));
     held = null;

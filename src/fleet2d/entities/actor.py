@@ -334,6 +334,8 @@ class Actor:
             self.charge.follow(self.motion, now.step * self.clock.step_us)
             if self.charge.is_empty:
                 return False
+        if self._chosen is not None:  # from outside
+            return False
         with blame(self.path, now.step):
             found = self.arbiter.goes_on(now, self.plan, self._asked)
             if found is True:

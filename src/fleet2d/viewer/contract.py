@@ -227,7 +227,7 @@ class LiveFrame(TypedDict):
 class LiveOrder(TypedDict):
     """What the page asks a running simulation to do; `x` and `y` in metres."""
 
-    action: Literal["pause", "resume", "step", "speed", "door", "place", "replan", "end"]
+    action: Literal["pause", "resume", "step", "speed", "door", "place", "call", "replan", "end"]
     target: str
     value: float
     x: float

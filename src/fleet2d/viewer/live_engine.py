@@ -10,7 +10,7 @@ import numpy as np
 
 from fleet2d.artifacts.reader import Run
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.plan import Pose, Track
+from fleet2d.entities.plan import Track
 from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.change import HomeChange
 from fleet2d.kernels.headings import TURN
@@ -33,6 +33,7 @@ class LiveEngine:
         self._heard_until = simulation.step
         self._meshes: dict[int, int] = {}
         self._walls: list[Mesh] = []
+        self._driven: set[str] = set()
 
     @property
     def step(self) -> int:
@@ -107,7 +108,7 @@ class LiveEngine:
     def events(self) -> list[LiveEvent]:
         """Return the events since this was asked last."""
         users = self.simulation.scenario.users
-        recorded = self.simulation.events_since(self._heard_until)
+        recorded = self.simulation.events(self._heard_until)
         self._heard_until = self.step
         return [
             LiveEvent(
@@ -141,40 +142,55 @@ class LiveEngine:
         return self._walls[number]
 
     def apply(self, order: LiveOrder) -> None:
-        """Do to the run what the page asks for; the run's manifest says so.
+        """Intervene as the page asks; the run's manifest keeps it, and `reproduce` does it again.
 
         Raises:
             InputError: There is nothing of that name, or nobody can be there.
             ComponentError: The same, of doors.
         """
-        name = order["target"]
+        name, place = order["target"], (order["x"], order["y"])
         if order["action"] == "door":
-            change = HomeChange(open=name) if order["value"] else HomeChange(shut=name)
-            self.simulation.change(change)
+            self.simulation.change(
+                HomeChange(open=name) if order["value"] else HomeChange(shut=name)
+            )
         elif order["action"] == "place":
-            self._place(name, order["x"], order["y"])
+            self.simulation.put(name, self._near(name, place))
+        elif order["action"] == "call":
+            self._call(name, place)
         elif order["action"] == "replan":
             self.simulation.replan(name)
         else:
             raise InputError(f"{order['action']} is nothing that can be done to a run")
 
-    def _place(self, name: str, x: float, y: float) -> None:
-        """Put a body somewhere, or as near to that as it fits; it decides anew from there."""
+    def _call(self, name: str, place: tuple[float, float]) -> None:
+        """Let a body go somewhere and stay; from then on it goes only where it is called."""
+        near = self._near(name, place)
+        if name not in self._driven:
+            self.simulation.drive(name)
+            self._driven.add(name)
+        plan = self.simulation.plan(name).go_to(near).stay()
+        self.simulation.decide(name, plan)
+
+    def _near(self, name: str, place: tuple[float, float]) -> tuple[float, float]:
+        """Return the place nearest to a point where a body fits [m].
+
+        Raises:
+            InputError: There is nobody of that name.
+            PlacementError: It fits nowhere near.
+        """
         actors = self.simulation.actors
         if name not in actors:
             raise InputError(f"there is nobody named {name!r}")
-        actor = actors[name]
-        lattice = self.simulation.home.plan.lattice
-        at = lattice.to_lattice((x, y)).tolist()
-        space = actor.space
+        space, lattice = actors[name].space, self.simulation.home.plan.lattice
+        at = lattice.to_lattice(place).tolist()
         part = space.part_at(*at)
         if part < 0:
             part = space.part_near(*at)
-        place = space.nearest(*at, part) if part >= 0 else None
-        if place is None:
-            raise PlacementError(f"{name} can't be at ({x:g}, {y:g}) m")
-        self.simulation.replan(name)
-        actor.state = Pose(int(place[0]), int(place[1]), int(actor.state.heading), 0)
+        near = space.nearest(*at, part) if part >= 0 else None
+        if near is None:
+            raise PlacementError(f"{name} can't be at ({place[0]:g}, {place[1]:g}) m")
+        x, y = lattice.to_metres(near).tolist()
+        return x, y
 
 
 def _note(actor: Any) -> str:

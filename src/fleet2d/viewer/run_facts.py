@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import fleet2d
 from fleet2d.artifacts.layers import PREFIX
-from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
@@ -161,10 +160,27 @@ def _role(scenario: Mapping[str, Any], name: str) -> Role:
 
 
 def _marks(manifest: Mapping[str, Any]) -> list[MarkFacts]:
-    """Return the interventions and expectations that a manifest records."""
-    marks = []
-    for entry in manifest.get("interventions") or ():
-        step = int(entry.get("step", 0))
-        label = str(entry.get("label") or plain(entry))
-        marks.append(MarkFacts(step=step, end=step, kind="intervention", label=label))
-    return marks
+    """Return the interventions that a manifest records."""
+    return [
+        MarkFacts(
+            step=int(entry["step"]),
+            end=int(entry["step"]),
+            kind="intervention",
+            label=_intervention_label(entry),
+        )
+        for entry in manifest.get("interventions") or ()
+    ]
+
+
+def _intervention_label(entry: Mapping[str, Any]) -> str:
+    """Return an intervention in few words.
+
+    >>> _intervention_label({"do": "change", "change": {"shut": "bath_door", "at": None}})
+    'shut bath_door'
+    >>> _intervention_label({"do": "put", "entity": "ana", "x": 5})
+    'put ana'
+    """
+    change = entry.get("change")
+    if isinstance(change, Mapping):
+        return next((f"{key} {value}" for key, value in change.items() if value), "change")
+    return f"{entry.get('do', '')} {entry.get('entity', '')}".strip()
