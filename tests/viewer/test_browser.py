@@ -231,7 +231,7 @@ def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
     stop = server.start()
     with page_at(browser, server.address) as page:
         page.keyboard.press("End")
-        assert 51 == page.locator("table.now tr[data-body]").count()
+        assert 52 == page.locator("table.now tr[data-body]").count()
         page.click("tr[data-body=u49] button")
         page.wait_for_selector("[data-inspected=u49]")
     stop()

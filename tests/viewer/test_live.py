@@ -82,8 +82,9 @@ def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
     home = live.engine.simulation.home
     x, y = home.plan.room("living_room_0").anchor_xy
     assert "" == live.ask(order("place", "ana", x=x, y=y))
+    live.ask(order("step", value=1))
     state = live.engine.simulation.state["ana"]
-    assert (x, y) == pytest.approx((state["x"], state["y"]), abs=0.02)
+    assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)
     live.end()
     assert live.run is not None
     assert ["put"] == [entry["do"] for entry in live.run.manifest["interventions"]]
@@ -99,6 +100,7 @@ def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
     state = live.engine.simulation.state["astro"]
     assert "kitchen_0" == state["room"]
     assert "" == live.ask(order("call", "astro", x=x + 0.5, y=y))
+    live.ask(order("step", value=1))
     live.end()
     assert live.run is not None
     done = [entry["do"] for entry in live.run.manifest["interventions"]]

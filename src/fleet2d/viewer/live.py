@@ -293,7 +293,7 @@ def watch_scenario(
     """
     import webbrowser
 
-    settings = {} if seed is None else {"seed": seed}
+    settings: dict[str, Any] = {} if seed is None else {"seed": seed}
     live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
     server = PageServer([], port=port, live=live)
     announce(server.address)
