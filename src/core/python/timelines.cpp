@@ -351,9 +351,7 @@ Args:
             "__setstate__",
             [](OwnedTimelines& self, nb::tuple state) {
                 require(state.size() == 3, NO_STATE);
-                const i64 bodies = Part<i64>(state[0]).value();
-                const i64 step_us = Part<i64>(state[1]).value();
-                OwnedTimelines made(bodies, step_us);
+                OwnedTimelines made(Part<i64>{state[0]}.value(), Part<i64>{state[1]}.value());
                 made.restore(state[2]);
                 new (&self) OwnedTimelines(std::move(made));
             },
