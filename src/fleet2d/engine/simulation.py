@@ -463,6 +463,18 @@ class Simulation:
         """
         return Plan(self._body(name), self.step)
 
+    def decide(self, name: str, plan: Plan) -> None:
+        """Let a driven body follow a plan from the present step on; time does not go on.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+            InputError: The body isn't driven.
+        """
+        row = list(self.actors).index(self._body(name).name)
+        if row not in self._state.driven:
+            raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
+        self._intervene(Decide(step=self.step, entity=name, plan=plan.data()))
+
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""
         missing = [name for name in self.pending() if name not in plans]
@@ -471,10 +483,7 @@ class Simulation:
                 f"advance(): {missing[0]} has to decide now, and there is no plan for it"
             )
         for name, plan in plans.items():
-            row = list(self.actors).index(self._body(name).name)
-            if row not in self._state.driven:
-                raise InputError(f"advance(): {name} isn't driven: call drive({name!r}) first")
-            self._intervene(Decide(step=self.step, entity=name, plan=plan.data()))
+            self.decide(name, plan)
         while not self.done:
             self._run_to(self.clock.steps, spans=1)
             if self.pending():
