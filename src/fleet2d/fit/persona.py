@@ -65,6 +65,8 @@ def fit_persona(timeline: Timeline, days: Sequence[Day], about: str = "") -> Fit
     document = {
         "about": about or f"fitted to {len(days)} days of a log",
         "activities": fitter.activities,
+        "needs": {},  # the log has them already
+        "errands": {},
         "days": templates,
     }
     return Fitted(document, Persona.model_validate(document), fitter.states, notes)
@@ -307,7 +309,7 @@ def to_yaml(document: Mapping[str, Any]) -> str:
     lines = [f"about: {document['about']}", "activities:"]
     for name, fields in sorted(document["activities"].items()):
         lines.append(f"  {name}: {_flow(fields)}")
-    lines.append("days:")
+    lines += ["needs: {}", "errands: {}", "days:"]
     for name, day in document["days"].items():
         lines += [f"  {name}:", f"    on: {day['on']}"]
         lines += [f"    {key}: {_flow(day[key])}" for key in ("wake", "sleep")]

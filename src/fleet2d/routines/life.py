@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from datetime import date
 
+from fleet2d.routines.busy import Busy
+from fleet2d.routines.interruptions import interrupted
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import DAY_S, DayPlan, Doing, plan_day
 from fleet2d.streams import Draws, stream_key
@@ -29,6 +31,7 @@ class Life:
         self.persona = persona
         self._wake = stream_key(seed, path, "wake")
         self._day = stream_key(seed, path, "day")
+        self._needs = stream_key(seed, path, "needs")
         self._known: dict[int, Sequence[Doing]] = {}
 
     def template(self, ordinal: int) -> DayPlan:
@@ -52,8 +55,16 @@ class Life:
         return self._known[ordinal]
 
     def draw_day(
-        self, ordinal: int, plan: DayPlan, busy: Sequence[tuple[int, int]] = ()
+        self, ordinal: int, plan: DayPlan, busy: Busy | None = None
     ) -> Sequence[Doing]:
-        """Draw a day from a template that may differ from its own."""
+        """Draw a day from a template that may differ from its own, and what comes up in it."""
+        day = self.planned(ordinal, plan, busy)
+        body = self.persona.body
+        if not (body.urges or body.chores):
+            return day
+        return interrupted(body, Draws(self._needs, ordinal), day, busy)
+
+    def planned(self, ordinal: int, plan: DayPlan, busy: Busy | None = None) -> Sequence[Doing]:
+        """Draw a day from a template, without what comes up in it."""
         next_wake = self.wake(ordinal + 1) + DAY_S
         return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, busy)
