@@ -86,3 +86,18 @@ def count_visits(trace: I16, kinds: Sequence[str]) -> Visits:
         counts[3, day] += back and found[i + 1].begin - stay.begin < BACK_S and stay.kind != AWAY
         counts[4, day] += before == AWAY
     return Visits(*(row[: len(trace) // DAY_S].tolist() for row in counts))
+
+
+def spread(homes: Sequence[Visits]) -> tuple[list[int], list[int]]:
+    """Return the lowest and the highest count of any day of some homes, by field of Visits.
+
+    Days on which nobody was seen at all, such as the last of a log that ends at night, don't count.
+    """
+    lows, highs = [], []
+    for field in range(len(Visits._fields)):
+        days = [
+            home[field][i] for home in homes for i in range(len(home.bathroom)) if home.bathroom[i]
+        ]
+        lows.append(min(days))
+        highs.append(max(days))
+    return lows, highs
