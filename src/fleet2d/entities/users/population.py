@@ -36,7 +36,7 @@ class Population(Inhabitant):
         default="any", description="whose days; any: drawn by the groups' shares of the people"
     )
 
-    needs: bool = Field(
+    bodily_needs: bool = Field(
         default=True,
         description="whether an adult's needs and errands interrupt what is done, which the survey"
         " doesn't tell: its shares count them as what they interrupt",
@@ -55,7 +55,7 @@ class Population(Inhabitant):
         known = catalogue()
         names = {*activities(self.people), REST}
         self.body, self.interruptions = None, actor.stream("needs")
-        if self.needs:
+        if self.bodily_needs:
             self.body = body_of(usual_needs(), usual_errands(), known)
             names |= activities_of(usual_needs(), usual_errands())
         self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))

@@ -101,8 +101,10 @@ class RoomSampling(Behavior):
         stop = self.stops[weighted(draws, [stop.chance for stop in self.stops])]
         dwell_us = self.law.draw(draws) * SECOND_US
         if stop.room is None:
-            self._walk(actor, plan, Spot(*actor.way_out))
-            plan.leave_home().stay(timedelta(microseconds=dwell_us))
+            if not plan.away:  # who is out already stays out
+                self._walk(actor, plan, Spot(*actor.way_out))
+                plan.leave_home()
+            plan.stay(timedelta(microseconds=dwell_us))
             return
         self._walk(actor, plan, draws.choice(self.spots.in_room(stop.room)))
         owed = self.debt_us[stop.room.index]
