@@ -63,10 +63,13 @@ def test_find_keeps_its_distance_from_who_is_already_near() -> None:
     assert apart.min() >= 1.19
 
 
-def test_show_step_without_layer_is_refused() -> None:
-    result = CliRunner().invoke(app, ["show", "family_home", "--step", "3"])
+@needs_jit
+def test_show_of_a_run_does_not_ignore_step(tmp_path: Path) -> None:
+    fleet2d.run(scenario("1 min", users={"ana": {"type": "meander"}}), out=tmp_path / "run")
+    result = CliRunner().invoke(app, ["show", str(tmp_path / "run"), "--step", "3"])
     assert isinstance(result.exception, InputError)
-    assert "--layer" in str(result.exception)
+    assert "--step goes with --layer" in str(result.exception)
+    assert not (tmp_path / "run" / "picture.png").exists()
 
 
 def test_show_of_a_run_that_is_not_there_speaks_of_runs() -> None:

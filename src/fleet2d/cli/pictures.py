@@ -12,9 +12,7 @@ from fleet2d.errors import InputError, RunDirectoryError
 def show(
     what: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="[FLOORPLAN|RUN_DIR|PERSONA]", help="Left out: the bundled home."
-        ),
+        typer.Argument(metavar="[FLOORPLAN|RUN_DIR|PERSONA]", help="Left out: the bundled home."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Picture to write, .png or .svg.")] = None,
     resolution: Resolution = None,

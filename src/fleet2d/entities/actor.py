@@ -14,6 +14,7 @@ from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.battery import Charge
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.entity import Entity
+from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, State
@@ -57,6 +58,7 @@ class Actor:
         motion: The motion of the plan.
         planned_at: The step at which it was last asked.
         ask_at: The step at which it is asked again; None: never.
+        notes: What of its scenario this home lacks, and what was left out for it.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Actor:
     clock: Clock
     seed: int
     behaviors: list[Behavior] = field(init=False)
+    notes: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
@@ -179,11 +182,12 @@ class Actor:
         Raises:
             PlacementError: It names no room, or none that can be reached.
         """
-        return self._match(names)[1]
+        return room_of_furniture(self, names) or self._match(names)[1]
 
     def _match(self, names: RoomChoice) -> tuple[str, list[Room]]:
         try:
-            return matching_rooms(names, self.home.rooms, self.reachable_rooms())
+            home = self.home
+            return matching_rooms(names, home.rooms, self.reachable_rooms(), home.objects)
         except PlacementError as error:
             raise PlacementError(f"{self.path}: {error}") from None
 
@@ -201,6 +205,9 @@ class Actor:
         where = parse_place(place)
         if is_point(where):
             return self.point(where)  # type: ignore[arg-type]
+        thing = furniture_of(self, where)
+        if thing is not None:
+            return self.place_at(thing, 0).approach
         draws = Draws(self.stream(purpose), time_us)
         name, rooms = self._match(where)  # type: ignore[arg-type]
         habit = Draws(self.stream(f"room of {name}"), 0)

@@ -32,8 +32,8 @@ class Takes(Settings):
     between, as likely as any other.
     """
 
-    law: Literal["lognormal", "gamma", "normal", "uniform", "exponential", "fixed", "measured"] = Field(
-        default="lognormal", description="its shape"
+    law: Literal["lognormal", "gamma", "normal", "uniform", "exponential", "fixed", "measured"] = (
+        Field(default="lognormal", description="its shape")
     )
     mean: PositiveDuration = Field(
         default=timedelta(minutes=30), description="its mean, before it is cut"

@@ -221,9 +221,7 @@ class Lives:
             if day >= self._first
             for name, doings in self.day(day).items()
             for doing in doings
-            if name != member
-            and doing.room in (ANY_ROOM, room)
-            and self._is_exclusive(name, doing)
+            if name != member and doing.room in (ANY_ROOM, room) and self._is_exclusive(name, doing)
         ]
 
     def _is_exclusive(self, name: str, doing: Doing) -> bool:

@@ -139,9 +139,7 @@ def _urge(name: str, need: "Need", activities: Mapping[str, "Activity"]) -> Urge
     )
 
 
-def _step(
-    name: str, chance: float, takes: object, activities: Mapping[str, "Activity"]
-) -> Step:
+def _step(name: str, chance: float, takes: object, activities: Mapping[str, "Activity"]) -> Step:
     activity = activities[name]
     law = (takes or activity.takes).table()  # type: ignore[attr-defined]
     return Step(name, round(chance * CERTAIN), _quantiles(law), activity.exclusive)
@@ -186,9 +184,7 @@ def uninterrupted(day: Sequence[Doing]) -> list[Doing]:
 class _Interruptions:
     """A day in the making."""
 
-    def __init__(
-        self, body: Body, draws: Draws, day: Sequence[Doing], busy: Busy | None
-    ) -> None:
+    def __init__(self, body: Body, draws: Draws, day: Sequence[Doing], busy: Busy | None) -> None:
         self.body, self.bits, self.busy = body, Bits(draws), busy
         self.result: list[Doing] = []
         begin = day[0].begin

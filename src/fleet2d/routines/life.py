@@ -54,9 +54,7 @@ class Life:
             self._known[ordinal] = self.draw_day(ordinal, self.template(ordinal))
         return self._known[ordinal]
 
-    def draw_day(
-        self, ordinal: int, plan: DayPlan, busy: Busy | None = None
-    ) -> Sequence[Doing]:
+    def draw_day(self, ordinal: int, plan: DayPlan, busy: Busy | None = None) -> Sequence[Doing]:
         """Draw a day from a template that may differ from its own, and what comes up in it."""
         day = self.planned(ordinal, plan, busy)
         body = self.persona.body

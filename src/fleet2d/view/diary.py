@@ -43,7 +43,9 @@ def written_diary(name: str, persona: Persona, days: Days) -> list[str]:
             again = " (goes on)" if doing.role == RESUMES else ""
             away = " (out)" if persona.activity(doing.activity).away else ""
             shown = f"{depth}{doing.activity.replace('_', ' ')}{away}{again}"
-            lines.append(f"  {_clock(doing.begin)}  {_length(doing.end - doing.begin):>10}  {shown}")
+            lines.append(
+                f"  {_clock(doing.begin)}  {_length(doing.end - doing.begin):>10}  {shown}"
+            )
     return [*lines, *_summary(days)]
 
 

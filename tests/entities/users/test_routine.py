@@ -28,7 +28,6 @@ FAMILY = {
 # Everybody is up at night, and often.
 RESTLESS = {
     "sleep": {
-
         **catalogue()["sleep"].model_dump(mode="json", exclude_none=True),
         "fetches": "1 h 30 min",
         "fetches_from": ["bathroom", "toilet", "any"],
@@ -48,7 +47,7 @@ SHORT = {
             },
             "leisure": {"read": 1},
         }
-    }
+    },
 }
 
 

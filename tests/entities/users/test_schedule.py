@@ -307,7 +307,7 @@ def test_days_that_are_none_are_refused(on: Any) -> None:
 def test_an_unreachable_rest_is_refused_before_the_run() -> None:
     item = {"at": "08:00", "place": "kitchen", "dwell": "1 h"}
     with pytest.raises(InputError, match="storage") as caught:
-        fleet2d.Simulation(one(agenda(item), rest="storage"))
+        fleet2d.Simulation(one(agenda(item), rest="storage_0"))
     assert "users.ana" in str(caught.value)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from pydantic import Field
 
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import matching_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Seat, Spot, Spots
@@ -116,10 +117,19 @@ class Inhabitant(Behavior):
         self.spots = spots
         self.own_part = actor.reachable_rooms()
         self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
+        self._leave_out(actor)
         exclusive = (s for s in self.settings.values() if s.activity.exclusive)
         self.private_rooms = {room.index for setting in exclusive for room in setting.rooms}
         if sleeps_in is not None:
             self.settings[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
+
+    def _leave_out(self, actor: "Actor") -> None:
+        """Rest instead of what this home has no room for, and note it."""
+        none = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]
+        for name in none:
+            rooms = " or ".join(self.settings[name].activity.rooms)
+            actor.notes.append(f"activities.{name}.rooms: left out, for this home has no {rooms}")
+            self.settings[name] = self.settings[REST]
 
     def decide(self, now: Situation) -> Plan:
         """Plan the rest of the date.
@@ -346,7 +356,7 @@ class Inhabitant(Behavior):
     def _own_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
         """Return the rooms that a list of names stands for: of several of a kind, its own one."""
         name, rooms = _match(actor, names)
-        if name == "any":
+        if name == "any" or not rooms:
             return rooms
         return [Draws(actor.stream(f"room of {name}"), 0).choice(rooms)]
 
@@ -355,6 +365,8 @@ def _match(actor: "Actor", names: "RoomChoice") -> tuple[str, list["Room"]]:
     try:
         return matching_rooms(names, actor.home.rooms, actor.reachable_rooms())
     except PlacementError as error:
+        if is_kind(actor, names):
+            return "", []
         raise PlacementError(f"{actor.path}: {error}") from None
 
 
