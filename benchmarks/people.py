@@ -1,15 +1,15 @@
 """How true the people are: simulated time use beside the American Time Use Survey.
 
     python benchmarks/people.py compare [--people 1000] [--weeks 1] [--figure FILE] [--json FILE]
-    python benchmarks/people.py visits --data FOLDER [--days 28] [--seed 4]   # beside real homes
+    python benchmarks/people.py visits --data FOLDER [--days 28]   # moving about, as real people
     python benchmarks/people.py rooms [--figure FILE]      # room_sampling: shares over time
     python benchmarks/people.py speed [--users N]          # how long people take
     python benchmarks/people.py derive SURVEY_FOLDER       # writes routines/survey.json anew
 
 `compare` draws the days of that many people of each group of `population`, and prints how far the
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
-the largest difference of each activity. `visits` prints how often each persona visits bathrooms, goes
-somewhere for less than three minutes, and comes back, and how long it stays in which kind of room
+the largest difference of each activity. `visits` prints how often each persona visits bathrooms,
+goes somewhere for less than three minutes, and comes back, and how long it stays in which kind of room
 and how its hours differ from the survey's, beside the real homes of CASAS and UCI ADL and the
 simulated one of HOMER+; it fails where a persona is outside the spread of the real ones. `rooms` simulates a user who samples rooms and prints how
 far the shares of time are from the given ones after 1, 2, 4, … days. `speed` times the planning of
@@ -51,7 +51,8 @@ REAL = ("CASAS AL", "UCI ADL A")
 # Which group of the survey a persona is most like, and which category an activity counts for there.
 LIKE = {"works_outside": "workers", "retired": "retired", "works_from_home": "workers"}
 CATEGORY_OF = {
-    "sleep": "sleeping", "nap": "sleeping", "work": "work", "work_at_home": "work", "cook": "food_prep",
+    "sleep": "sleeping", "nap": "sleeping", "work": "work", "work_at_home": "work",
+    "cook": "food_prep",
     "breakfast": "eating", "lunch": "eating", "dinner": "eating", "snack": "eating", "tv": "tv",
     "laundry": "laundry", "exercise": "exercise", "sport": "exercise", "walk": "exercise",
 }  # fmt: skip

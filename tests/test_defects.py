@@ -1,6 +1,7 @@
 """Defects that a check from outside found: each has a test that is named after it."""
 
 from datetime import timedelta
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ def test_room_sampling_logs_no_return_that_did_not_happen() -> None:
     poses = path(stored, "ana")
     returns = int(((poses.away[:-1] == 1) & (poses.away[1:] == 0)).sum())
     assert returns == told.count("came_home")
-    assert all(a != b for a, b in zip(told, told[1:], strict=False))
+    assert all(a != b for a, b in pairwise(told))
 
 
 @pytest.mark.parametrize(("step", "good"), [("2 s", False), ("1 s", True), ("2.5 s", True)])

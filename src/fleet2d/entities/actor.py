@@ -16,6 +16,7 @@ from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.entity import Entity
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
+from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, State
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
@@ -366,6 +367,8 @@ class Actor:
         if place is None:
             begins = (behavior.begins_at(self.clock.start) for behavior in self.behaviors)
             place = next((begin for begin in begins if begin is not None), (ANY,))
+            if place and is_kind(self, place) and not self._has_any(place):
+                place = (ANY,)
         away = int(len(place) == 0)
         if away:
             x, y = self.way_out
@@ -380,6 +383,10 @@ class Actor:
         if heading is None:
             return State(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
         return State(x, y, round(heading / 360 * TURN) % TURN, away)
+
+    def _has_any(self, names: RoomChoice | Point) -> bool:
+        """Tell whether the largest part of its space has a room of these kinds."""
+        return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
 
     def _first_part(self, names: RoomChoice) -> int:
         """Return the largest part of its space with one of these rooms; else the largest."""

@@ -33,7 +33,7 @@ def furniture_of(actor: "Actor", place: RoomChoice | Point) -> "PlacedObject | N
 
 
 def room_of_furniture(actor: "Actor", place: RoomChoice | Point) -> "list[Room]":
-    """Return the room from which the furniture that a place names is used; none if it names none."""
+    """Return the room from which the furniture of a place is used; none if it names none."""
     thing = furniture_of(actor, place)
     if thing is None:
         return []

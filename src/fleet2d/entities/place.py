@@ -52,8 +52,8 @@ Place = Annotated[
     PlainSerializer(_dump),
     WithJsonSchema(
         {
-            "description": "a room, a kind of room, a piece or kind of furniture, a list of those to"
-            " try in turn, or [x, y] in metres; 'any' is any room",
+            "description": "a room, a kind of room, a piece or kind of furniture, a list of those"
+            " to try in turn, or [x, y] in metres; 'any' is any room",
             "x-quantity": "place",
             "anyOf": [
                 {"type": "string"},

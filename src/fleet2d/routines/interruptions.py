@@ -171,9 +171,8 @@ def uninterrupted(day: Sequence[Doing]) -> list[Doing]:
     for doing in day:
         if doing.role == INTERRUPTS:
             continue
-        if doing.role == FINISHES:
-            planned[-1] = planned[-1]._replace(end=doing.end)
-        elif doing.role == RESUMES and planned and planned[-1].activity == doing.activity:
+        resumes = doing.role == RESUMES and planned and planned[-1].activity == doing.activity
+        if doing.role == FINISHES or resumes:
             planned[-1] = planned[-1]._replace(end=doing.end)
         else:
             planned.append(doing._replace(begin=begin))

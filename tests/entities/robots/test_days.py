@@ -108,7 +108,7 @@ def product() -> dict[str, Any]:
             "battery": {
                 "driving": "1 h",
                 "standing": "4 h",
-                "charging": "15 min",
+                "charging": "4 min",
                 "charger": [1, 3],
             },
         },
