@@ -9,12 +9,13 @@
 `compare` draws the days of that many people of each group of `population`, and prints how far the
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
 the largest difference of each activity. `visits` prints how often each persona visits bathrooms,
-goes somewhere for less than three minutes, and comes back, and how long it stays in which kind of room
-and how its hours differ from the survey's, beside the real homes of CASAS and UCI ADL and the
-simulated one of HOMER+; it fails where a persona is outside the spread of the real ones. `rooms` simulates a user who samples rooms and prints how
-far the shares of time are from the given ones after 1, 2, 4, … days. `speed` times the planning of
-days, the base month with a routine beside the one with a schedule (in processor time: other work
-on the machine doesn't count), and a month of N people. `derive` makes the table that `population`
+goes somewhere for less than three minutes, and comes back, and how long it stays in which kind of
+room, and how its hours differ from the survey's, beside the real homes of CASAS and UCI ADL and the
+simulated one of HOMER+; it fails where a persona is outside the spread of the real ones. `rooms`
+simulates a user who samples rooms and prints how far the shares of time are from the given ones
+after 1, 2, 4, … days. `speed` times the planning of days, the base month with a routine beside the
+one with a schedule (in processor time: other work on the machine doesn't count), and a month of N
+people. `derive` makes the table that `population`
 draws from of the survey's summary files.
 """
 
