@@ -191,14 +191,13 @@ def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[An
 
 def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
     """Measure and compare what finds the cells in view of a pose."""
-    from fleet2d.kernels.seen import bench_for, cells_in_view
+    from fleet2d.kernels.seen import cells_in_view
     from fleet2d.sight.flashlight import Flashlight
     from fleet2d.sight.line_of_sight import LineOfSight
 
-    lattice, reach = home.plan.lattice, reach_in(home)
-    bench = bench_for(home.walls, lattice.rows, lattice.columns)
+    grid, reach = (home.plan.lattice.rows, home.plan.lattice.columns), reach_in(home)
     flashlight, line = Flashlight(memory_mb=500), LineOfSight()
-    fill = best(lambda: [cells_in_view(home.walls, *pose, reach, bench) for pose in poses])
+    fill = best(lambda: [cells_in_view(home.walls, *pose, reach, *grid) for pose in poses])
     kept = best(lambda: [flashlight.cells(home, *pose, reach) for pose in poses])
     some = poses[:20]
     by_lines = best(lambda: [line.cells(home, *pose, reach) for pose in some], 1)
@@ -244,6 +243,7 @@ def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:
 def compiled_lines() -> Callable[..., int]:
     """Return a loop over pairs as the engine's: it locates the eye, then follows the line."""
     from fleet2d.kernels._jit import kernel
+
     from fleet2d.kernels.mesh import locate
     from fleet2d.kernels.sight import walk_line_of_sight
 

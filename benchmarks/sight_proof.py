@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from fleet2d.kernels._jit import kernel
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
@@ -26,12 +27,11 @@ from fleet2d.floorplan.gates import Gates
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels._jit import kernel
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh, locate
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import region_contains_points, visible_region
-from fleet2d.kernels.seen import Reach, bench_for, cells_in_view, mark_spans
-from fleet2d.kernels.sight import line_of_sight, scratch_for
+from fleet2d.kernels.seen import Reach, cells_in_view, mark_spans
+from fleet2d.kernels.sight import line_of_sight
 
 I64 = NDArray[np.int64]
 Turn = Callable[[Any], Any]
@@ -148,13 +148,10 @@ def compare(mesh: Mesh, walls: I64, doors: I64, eye: I64, points: I64) -> tuple[
     """Return mismatches by line, line back, region and cells, and how many points are seen."""
     x, y = eye.tolist()
     expected = seen_past_every_wall(walls, doors, x, y, points)
-    wall, stack = scratch_for(mesh.vertices)
-    right = np.empty_like(wall)
-    pieces = visible_region(mesh, x, y, locate(mesh, x, y), right, wall, stack)
-    in_region = region_contains_points(mesh, x, y, right[:pieces], wall[:pieces], points)
+    in_region = region_contains_points(mesh, x, y, *visible_region(mesh, x, y), points)
     columns, rows = (walls.reshape(-1, 2).max(axis=0) // SUB + 2).tolist()
-    mask, bench = np.zeros((rows, columns), np.bool_), bench_for(mesh, rows, columns)
-    mark_spans(bench.spans, cells_in_view(mesh, x, y, 0, ALL_ROUND, bench), mask)
+    mask = np.zeros((rows, columns), np.bool_)
+    mark_spans(cells_in_view(mesh, x, y, 0, ALL_ROUND, rows, columns), mask)
     column, row = points.T // SUB
     is_cell = ((points % SUB == CELL_CENTRE) & (points > 0)).all(axis=1)
     is_cell &= (column < columns) & (row < rows)

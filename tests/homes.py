@@ -1,7 +1,6 @@
 """Homes for the tests of meshes and sight: HouseExpo files, pieces of walls, shuffled meshes."""
 
 import json
-import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -9,12 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pytest
 import shapely
 from shapely.geometry import Polygon
 
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
-from fleet2d.kernels.mesh import Mesh, build_buckets, rasterize_cells
+from fleet2d.kernels.mesh import Mesh, rasterize_cells
 
 Int64 = npt.NDArray[np.int64]
 Float64 = npt.NDArray[np.float64]
@@ -22,9 +20,6 @@ Turn = Callable[[Float64], Float64]
 
 SUB = 64
 CELL_M = 0.05
-
-JIT_IS_OFF = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-needs_jit = pytest.mark.skipif(JIT_IS_OFF, reason="too slow, or meaningless, without the compiler")
 
 
 class Home(NamedTuple):
@@ -85,10 +80,10 @@ def houseexpo(path: Path) -> Home:
 
 
 def all_homes(shared_data: Path) -> Iterator[Home]:
-    """Yield the HouseExpo homes: all fifty, without the compiler only three small ones."""
+    """Yield all fifty HouseExpo homes."""
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert len(paths) == 50
-    for path in paths[2:5] if JIT_IS_OFF else paths:
+    for path in paths:
         yield houseexpo(path)
 
 
@@ -143,14 +138,7 @@ def meshed(mesh: Mesh, triangles: list[list[int]]) -> Mesh:
     """Return a mesh of other triangles over the vertices of `mesh`."""
     edges = {(t[k], t[(k + 1) % 3]): i for i, t in enumerate(triangles) for k in range(3)}
     neighbors = [[edges.get((t[(k + 1) % 3], t[k]), -1) for k in range(3)] for t in triangles]
-    corners = np.array(triangles, np.int32)
-    buckets = build_buckets(mesh.vertices, corners, mesh.bucket_rows, mesh.bucket_columns)
-    return mesh._replace(
-        triangles=corners,
-        neighbors=np.array(neighbors, np.int32),
-        bucket_start=buckets[0],
-        bucket_triangles=buckets[1],
-    )
+    return Mesh(mesh.vertices, np.array(triangles, np.int32), np.array(neighbors, np.int32))
 
 
 def awkward_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
@@ -185,8 +173,3 @@ def behind_corners(home: Home, eye: Int64, rng: np.random.Generator, count: int)
     corners = rng.choice(home.mesh.vertices, count)
     away = corners - eye
     return np.concatenate([corners, corners + away, corners + away // 2, eye + away // 2])
-
-
-def times_compiled(function: Any) -> int:
-    """Return for how many combinations of argument types a kernel was compiled."""
-    return len(function.signatures)

@@ -1,7 +1,5 @@
 """Random free space for property tests, with the degenerate cases that real homes are full of."""
 
-import os
-
 import shapely
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -13,7 +11,7 @@ STEP = 64
 """Corners of random homes lie on a coarse raster, so that many are in line and many rings touch."""
 
 quick = settings(
-    max_examples=4 if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") else 60,
+    max_examples=60,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )

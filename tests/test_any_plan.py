@@ -3,12 +3,10 @@
 from pathlib import Path
 
 import pytest
-from tests.homes import needs_jit
 
 import fleet2d
 
 
-@needs_jit
 def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
     plans = sorted((shared_data / "houseexpo").glob("*.json"))
     assert 50 == len(plans)
@@ -25,7 +23,6 @@ def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
         assert run.metrics["distance"]["ana"] > 1, plan.name
 
 
-@needs_jit
 def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
     maps = [
         *(("ros", path) for path in sorted((shared_data / "ros_maps").glob("*/map.yaml"))),

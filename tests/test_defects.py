@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.entities.robots.robots import events, home_with
-from tests.homes import needs_jit
 from tests.scenes import path, run, scenario, table
 from typer.testing import CliRunner
 
@@ -20,7 +19,6 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
 
-@needs_jit
 def test_room_sampling_logs_no_return_that_did_not_happen() -> None:
     shares = {"living_room": 1, "away": 3}
     ana = {"type": "room_sampling", "shares": shares, "dwell": "20 min"}
@@ -50,7 +48,6 @@ def test_lost_after_left_out_goes_with_every_step() -> None:
     Simulation(content)
 
 
-@needs_jit
 def test_find_keeps_its_distance_from_who_is_already_near() -> None:
     """It looked round, saw the user 0.7 m off, and stayed there for as long as it stays."""
     sits = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [1.7, 3.0]}]}]}
@@ -64,7 +61,6 @@ def test_find_keeps_its_distance_from_who_is_already_near() -> None:
     assert apart.min() >= 1.19
 
 
-@needs_jit
 def test_show_of_a_run_does_not_ignore_step(tmp_path: Path) -> None:
     fleet2d.run(scenario("1 min", users={"ana": {"type": "meander"}}), out=tmp_path / "run")
     result = CliRunner().invoke(app, ["show", str(tmp_path / "run"), "--step", "3"])
@@ -81,7 +77,6 @@ def test_show_of_a_run_that_is_not_there_speaks_of_runs() -> None:
     assert "floorplan.path" not in str(result.exception)
 
 
-@needs_jit
 def test_path_every_wants_a_timedelta() -> None:
     stored = run(scenario("1 min", users={"ana": {"type": "meander"}}))
     assert 6 == len(stored.path("ana", every=timedelta(seconds=10)).step)
@@ -109,7 +104,6 @@ def test_shutting_a_doorway_without_a_door_says_how_to_hang_one() -> None:
         Simulation(content)
 
 
-@needs_jit
 @pytest.mark.parametrize("seed", range(4))
 def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(seed: int) -> None:
     import time

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 import shapely
 from tests.engine.test_pace import Wall
-from tests.homes import needs_jit
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario, table
 
 import fleet2d
@@ -31,8 +30,6 @@ from fleet2d.scenario.model import SimulationSettings
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.region import VisibleRegion
 from fleet2d.sight.settings import SightSettings
-
-pytestmark = needs_jit
 
 
 @pytest.fixture(scope="module")

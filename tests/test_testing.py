@@ -5,12 +5,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 
 from fleet2d import Algorithm, RoomDistribution
 from fleet2d.testing import check_algorithm
 
-pytestmark = needs_jit
 SHARED = [0]
 
 

@@ -22,6 +22,9 @@ constexpr i64 floor_mod(i64 a, i64 b) {
     return rest < 0 ? rest + b : rest;
 }
 
+// The first multiple of a period, above 0, from `step` on.
+constexpr i64 next_multiple(i64 step, i64 period) { return step + floor_mod(-step, period); }
+
 // Twice the signed area of (a, b, c): positive when c lies left of the line from a to b.
 constexpr i64 orient(i64 ax, i64 ay, i64 bx, i64 by, i64 cx, i64 cy) {
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);

@@ -99,6 +99,24 @@ Buckets build_buckets(View<const i64, 2> vertices, View<const i32, 2> triangles)
     return buckets;
 }
 
+Array<Beyond> build_beyond(const Mesh& mesh) {
+    auto beyond = Array<Beyond>::empty({3 * mesh.triangle_count()});
+    for (i64 edge = 0; edge < beyond.size(); ++edge) {
+        const i64 here = edge / 3, next = mesh.neighbor(here, edge - 3 * here);
+        if (next == WALL) {
+            beyond[edge] = {static_cast<i32>(WALL), 0, 0, 0, 0};
+            continue;
+        }
+        const i64 entry = entry_edge(mesh, next, here);
+        const i64 right = following_edge(entry), left = previous_edge(entry);
+        const i64 apex = mesh.corner(next, left);
+        const Point at = mesh.vertex(apex);
+        beyond[edge] = {static_cast<i32>(apex), static_cast<i32>(at.x), static_cast<i32>(at.y),
+                        static_cast<i32>(3 * next + right), static_cast<i32>(3 * next + left)};
+    }
+    return beyond;
+}
+
 Array<i32, 2> rasterize_cells(const Mesh& mesh, i64 rows, i64 columns) {
     auto made = Array<i32, 2>::filled({rows, columns}, static_cast<i32>(OUTSIDE));
     const View<i32, 2> cells = made;

@@ -22,6 +22,14 @@ struct Point {
     i64 x, y;
 };
 
+// What lies beyond an edge of a triangle: how a walk from triangle to triangle goes on. Edges are numbered
+// 3 * triangle + k.
+struct Beyond {
+    i32 apex;         // the vertex of the triangle across the edge that isn't on the edge; WALL: none, it's a wall
+    i32 x, y;         // where the apex is, lattice units
+    i32 right, left;  // the edges of that triangle to the right and to the left of the apex, seen from the edge
+};
+
 // A triangulation of free space without extra points; may have holes and several components.
 struct Mesh {
     View<const i64, 2> vertices;   // (n, 2) lattice units
@@ -31,6 +39,7 @@ struct Mesh {
     View<const i32> bucket_triangles;  // the triangles that overlap each bucket, ascending
     i64 bucket_columns = 0;
     i64 bucket_rows = 0;
+    View<const Beyond> beyond;         // (3 t,) what lies beyond each edge
 
     i64 vertex_count() const { return vertices.size(); }
     i64 triangle_count() const { return triangles.size(); }
@@ -38,6 +47,12 @@ struct Mesh {
     i64 corner(i64 triangle, i64 k) const { return triangles(triangle, k); }
     i64 neighbor(i64 triangle, i64 k) const { return neighbors(triangle, k); }
 };
+
+// Which edge of `triangle` it shares with the triangle `previous`.
+inline i64 entry_edge(const Mesh& mesh, i64 triangle, i64 previous) {
+    if (mesh.neighbor(triangle, 0) == previous) return 0;
+    return mesh.neighbor(triangle, 1) == previous ? 1 : 2;
+}
 
 // Whether the closed triangle holds the point.
 inline bool contains_triangle(const Mesh& mesh, i64 triangle, i64 x, i64 y) {
@@ -99,6 +114,9 @@ struct Buckets {
 };
 
 Buckets build_buckets(View<const i64, 2> vertices, View<const i32, 2> triangles);
+
+// What lies beyond each edge of a mesh: its member `beyond`, from the others.
+Array<Beyond> build_beyond(const Mesh& mesh);
 
 // The triangle of every cell centre that lies strictly inside free space, (rows, columns): the
 // lowest that holds the centre; OUTSIDE for a centre outside or on a wall.

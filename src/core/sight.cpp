@@ -1,5 +1,6 @@
 #include "sight.hpp"
 
+#include <stdexcept>
 #include <vector>
 
 namespace fleet2d {
@@ -15,6 +16,11 @@ bool is_before_corner(const Mesh& mesh, i64 triangle, i64 qx, i64 qy, i64 dx, i6
         }
     }
     return false;
+}
+
+// Vertices are seen once each, unless triangles round one of them overlap.
+void check_room(i64 count, View<const i32> seen) {
+    if (count == seen.size()) throw std::invalid_argument("triangles of the mesh overlap");
 }
 
 }  // namespace
@@ -69,36 +75,32 @@ i64 look_through(const Mesh& mesh, i64 x, i64 y, i64 triangle, i64 edge, View<i3
     i64 waiting = 1;
     while (waiting > 0) {
         --waiting;
-        // The cone of sight between two vertices, as far as the edge `seen` of triangle `here`.
-        i64 seen = stack(waiting, 0);
+        // The cone of sight between two vertices, as far as the edge `seen`.
+        i32 seen = stack(waiting, 0);
         const i32 cone_right = stack(waiting, 1);
         i32 cone_left = stack(waiting, 2);
-        i64 here = seen / 3;
-        i64 beyond = mesh.neighbor(here, seen - 3 * here);
         const i64 rx = mesh.vertices(cone_right, 0) - x, ry = mesh.vertices(cone_right, 1) - y;
         i64 lx = mesh.vertices(cone_left, 0) - x, ly = mesh.vertices(cone_left, 1) - y;
-        while (beyond != WALL) {
-            const i64 entry = entry_edge(mesh, beyond, here);
-            const i64 right_edge = following_edge(entry), left_edge = previous_edge(entry);
-            const i32 apex = mesh.triangles(beyond, left_edge);
-            const i64 ox = mesh.vertices(apex, 0) - x, oy = mesh.vertices(apex, 1) - y;
-            here = beyond;
-            i64 next = left_edge;
-            if (rx * oy - ry * ox > 0) {
-                next = right_edge;
-                if (lx * oy - ly * ox < 0) {
-                    stack(waiting, 0) = static_cast<i32>(3 * here + left_edge);
-                    stack(waiting, 1) = apex;
-                    stack(waiting, 2) = cone_left;
-                    ++waiting;
-                    cone_left = apex, lx = ox, ly = oy;
-                }
+        for (;;) {
+            const Beyond& beyond = mesh.beyond[seen];
+            if (beyond.apex == WALL) break;
+            const i64 ox = beyond.x - x, oy = beyond.y - y;
+            if (rx * oy - ry * ox <= 0) {  // the apex is to the right of the cone, or on its border
+                seen = beyond.left;
+                continue;
             }
-            seen = 3 * here + next;
-            beyond = mesh.neighbor(here, next);
+            if (lx * oy - ly * ox < 0) {  // it is inside: the cone is split, and its left part waits
+                stack(waiting, 0) = beyond.left;
+                stack(waiting, 1) = beyond.apex;
+                stack(waiting, 2) = cone_left;
+                ++waiting;
+                cone_left = beyond.apex, lx = ox, ly = oy;
+            }
+            seen = beyond.right;
         }
+        check_room(count, right);
         right[count] = cone_right;
-        wall[count] = static_cast<i32>(seen);
+        wall[count] = seen;
         ++count;
     }
     return count;
@@ -157,7 +159,10 @@ i64 vertices_seen_from_vertex(const Mesh& mesh, const Fans& fans, i64 vertex, Vi
         count = look_through(mesh, at.x, at.y, triangle, following_edge(corner), seen, scratch.wall, count,
                              scratch.stack);
         const i64 last = previous_edge(corner);
-        if (mesh.neighbor(triangle, last) == WALL) seen[count++] = mesh.triangles(triangle, last);
+        if (mesh.neighbor(triangle, last) == WALL) {
+            check_room(count, seen);
+            seen[count++] = mesh.triangles(triangle, last);
+        }
     }
     return count;
 }

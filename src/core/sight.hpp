@@ -8,12 +8,6 @@
 
 namespace fleet2d {
 
-// Which edge of `triangle` it shares with the triangle `previous`.
-inline i64 entry_edge(const Mesh& mesh, i64 triangle, i64 previous) {
-    if (mesh.neighbor(triangle, 0) == previous) return 0;
-    return mesh.neighbor(triangle, 1) == previous ? 1 : 2;
-}
-
 // Whether p is visible from q: the segment between them touches no wall point. A point outside or
 // on a wall sees nothing and isn't seen. `triangle` holds q (see locate); OUTSIDE is allowed.
 bool line_of_sight(const Mesh& mesh, i64 qx, i64 qy, i64 triangle, i64 px, i64 py);

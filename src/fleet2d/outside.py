@@ -148,6 +148,11 @@ def _folder_package(folder: Path) -> str:
     return name
 
 
+def is_scenario_module(name: str) -> bool:
+    """Return whether a module was imported from the folder of a scenario."""
+    return name.partition(".")[0] in _FOLDERS
+
+
 def written_path(cls: type) -> str:
     """Write where a class is so that :func:`lookup` finds it from anywhere."""
     package, _, module = cls.__module__.partition(".")

@@ -5,7 +5,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Present
@@ -83,7 +82,6 @@ def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:
     return run(content, **settings)
 
 
-@needs_jit
 @pytest.mark.parametrize("max_span", [7, None])
 def test_bins_sum_up_to_the_exposure_whatever_the_spans(max_span: int | None) -> None:
     rows = evidence_of("10 min", max_span=max_span).tables["tell"].to_pandas()

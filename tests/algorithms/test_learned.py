@@ -7,14 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Home, Present
 from fleet2d.algorithms.learned import load_learned, save_learned
 from fleet2d.errors import ComponentError, InputError
-
-pytestmark = needs_jit
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_learned"
 

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import TESTS, everything, run
 
 import fleet2d
@@ -71,7 +70,6 @@ class Tell(Algorithm):
         }
 
 
-@needs_jit
 @pytest.mark.parametrize("max_span", [7, None])
 def test_evidence_by_patches_sums_up_to_that_by_rooms(max_span: int | None) -> None:
     content = everything("1 h")

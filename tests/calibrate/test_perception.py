@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import yaml
 from tests.calibrate.logs import TRUE, falling, simulated, write
-from tests.homes import needs_jit
 from tests.scenes import run
 from tests.sight.watching import LATTICE, Watch, agree, around
 
@@ -101,7 +100,6 @@ def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1(
     assert any("ana, ben" in note for note in found.notes)
 
 
-@needs_jit
 def test_what_a_run_logs_calibrates_to_what_the_run_was_told() -> None:
     """The whole circle: a simulated camera, its log, and the parameters again."""
     rng = np.random.default_rng(12)
@@ -129,7 +127,6 @@ def test_what_a_run_logs_calibrates_to_what_the_run_was_told() -> None:
     assert agree(hits, detected.mean())
 
 
-@needs_jit
 def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path: Path) -> None:
     log = simulated(13, 2000, bearing=True, turned=True)
     path = write(

@@ -4,14 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
+from fleet2d.engine.buckets import PoseBlock, look_together, new_memory
 from tests.scenes import everything, scenario
 
 import fleet2d
 from fleet2d.engine import buckets
-from fleet2d.engine.buckets import PoseBlock, look_together, new_memory
-
-pytestmark = needs_jit
 
 
 @pytest.mark.parametrize(

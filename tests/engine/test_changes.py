@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from tests.homes import needs_jit
 from tests.scenes import digests, run, scenario, table
 
 import fleet2d
@@ -15,8 +14,6 @@ from fleet2d import Algorithm, ComponentError, InputError
 from fleet2d.engine.changes import crossings
 from fleet2d.floorplan.change import HomeChange, HomeChanges
 from fleet2d.kernels.motion import Breakpoints
-
-pytestmark = needs_jit
 
 
 def flat() -> dict[str, Any]:

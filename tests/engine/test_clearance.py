@@ -13,13 +13,10 @@ from tests.entities.robots.robots import (
     rooms,
 )
 from tests.entities.robots.test_find import told
-from tests.homes import needs_jit
 from tests.scenes import digests, each_step, everything, path, run
 
 import fleet2d
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 GIVES_WAY = {"distance": 0.4, "patience": "10 s"}
 TO_AND_FRO = {

@@ -10,15 +10,12 @@ import numpy as np
 import pytest
 import shapely
 from numpy.typing import NDArray
-from tests.homes import needs_jit
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
 
 from fleet2d import Algorithm, Behavior, History, Home, Present
 from fleet2d.artifacts.layers import read_layer
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 HERE = f"{TESTS.as_posix()}/engine/test_costs"
 RUG = shapely.box(2.8, 2.3, 4.2, 3.9)  # between most of the living room and the kitchen

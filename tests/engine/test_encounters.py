@@ -3,11 +3,11 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from fleet2d.engine.buckets import PoseBlock
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.scenes import scenario
 
-from fleet2d.engine.buckets import PoseBlock
 from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.simulation import Simulation
 

@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import digests, everything, run, table
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, History, Home, Metric, Plan, Present, Situation
-
-pytestmark = needs_jit
 
 SENSORS = {
     "hall": {"type": "motion_sensor", "at": [2.5, 2.5], "range": 4},

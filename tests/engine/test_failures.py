@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import digests, fleet2d_process, run, scenario, table
 
 import fleet2d
@@ -16,8 +15,6 @@ from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.errors import ComponentError
-
-pytestmark = needs_jit
 
 AT = 10_799
 """The step of the third hour's end, at which everything here fails."""

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.homes import needs_jit, walls_of
+from tests.homes import walls_of
 from tests.reference import seen as slow
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
 
@@ -19,8 +19,6 @@ from fleet2d.artifacts.layers import layer_names, layer_steps, read_layer
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError
 from fleet2d.kernels.headings import half_sine
-
-pytestmark = needs_jit
 
 HERE = f"{TESTS.as_posix()}/engine/test_layers"
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)

@@ -13,13 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import digests, process, scenario, table
 
 import fleet2d
 from fleet2d.artifacts.reader import Run
-
-pytestmark = needs_jit
 
 LEARNS = (
     "simulation.duration=1 d",
@@ -133,8 +130,8 @@ print(fleet2d.run("bundled:base", *json.loads(sys.argv[1])).digest)
 @pytest.mark.parametrize(
     "environment",
     [
-        {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "7"},
-        {"NUMBA_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4", "PYTHONHASHSEED": "8"},
+        {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "7"},
+        {"OMP_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4", "PYTHONHASHSEED": "8"},
         {"NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3", "PYTHONWARNINGS": "ignore"},
     ],
     ids=["1 thread", "4 threads", "older processor"],

@@ -1,20 +1,16 @@
 """Runs in which perception errs: spans never show, truth stands beside it, algorithms don't see it."""
 
-import json
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
-from tests.scenes import digests, everything, process, run, scenario, table
+from tests.scenes import digests, everything, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, History, Metric, Present
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ComponentError, InputError, ScenarioError
-
-pytestmark = needs_jit
 
 PERCEPTION: dict[str, Any] = {
     "detection": {
@@ -98,20 +94,12 @@ def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> No
     assert whole.metrics == other.metrics
 
 
-def test_every_table_is_the_same_when_sightings_fill_the_block(
+def test_every_table_is_the_same_when_watchers_take_in_few_steps_at_once(
     whole: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fleet2d.engine.buckets.BLOCK_VALUES", 1)
-    monkeypatch.setattr("fleet2d.engine.buckets.LEAST_STEPS", 50)
+    monkeypatch.setattr("fleet2d.engine.state.MOST_STEPS", 1)
+    monkeypatch.setattr("fleet2d.engine.state.LEAST_STEPS", 50)
     assert digests(whole) == digests(run(full()))
-
-
-def test_kernels_as_plain_python_give_the_same_run(tmp_path: Path) -> None:
-    file = tmp_path / "full.json"
-    file.write_text(json.dumps(full("40 s")))
-    code = f"import fleet2d, json; print(fleet2d.run(json.load(open({str(file)!r}))).digest)"
-    other = process("-c", code, NUMBA_DISABLE_JIT="1")
-    assert run(full("40 s")).digest == other.stdout.strip(), other.stderr
 
 
 def test_a_run_that_errs_is_reproduced_from_its_manifest(tmp_path: Path) -> None:

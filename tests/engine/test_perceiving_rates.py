@@ -15,13 +15,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import yaml
-from tests.homes import needs_jit
 from tests.scenes import OWN, table
 from tests.sight.watching import agree
 
 import fleet2d
-
-pytestmark = needs_jit
 
 Float64 = npt.NDArray[np.float64]
 Rows = dict[str, npt.NDArray[Any]]

@@ -8,14 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.engine.test_changes import flat, home, stands
-from tests.homes import needs_jit
 from tests.scenes import digests, run, table
 
 import fleet2d
 from fleet2d import Algorithm, InputError
 from fleet2d.entities.objects.sensor import Memory
-
-pytestmark = needs_jit
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import OWN, digests, every_step, everything, process, run, table
 
 import fleet2d
@@ -18,8 +17,6 @@ from fleet2d.artifacts.store import RunStore
 
 GOLDEN = Path(__file__).parents[1] / "golden.json"
 SPANS = [None, 3600, 7, 1]
-
-pytestmark = needs_jit
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +57,8 @@ def test_every_table_is_the_same_however_rows_are_gathered_and_stored(
     whole: Run, monkeypatch: pytest.MonkeyPatch, steps: int, gathered: int, rows: int
 ) -> None:
     """Blocks of poses, rows on their way to the store and row groups all end somewhere else."""
-    monkeypatch.setattr("fleet2d.engine.buckets.BLOCK_VALUES", 1)
-    monkeypatch.setattr("fleet2d.engine.buckets.LEAST_STEPS", steps)
+    monkeypatch.setattr("fleet2d.engine.state.MOST_STEPS", 1)
+    monkeypatch.setattr("fleet2d.engine.state.LEAST_STEPS", steps)
     monkeypatch.setattr("fleet2d.engine.recorder.GATHERED", gathered)
     store = functools.partial(RunStore, flush_rows=rows)
     monkeypatch.setattr("fleet2d.engine.simulation.RunStore", store)
@@ -148,11 +145,11 @@ def digest_elsewhere(content: dict[str, Any], folder: Path, **environment: str) 
 @pytest.mark.parametrize(
     "environment",
     [
-        {"NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
+        {"OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
         {
-            "NUMBA_NUM_THREADS": "4",
-            "PYTHONHASHSEED": "2",
             "OMP_NUM_THREADS": "4",
+            "OPENBLAS_NUM_THREADS": "4",
+            "PYTHONHASHSEED": "2",
             "TZ": "Asia/Tokyo",
         },
     ],
@@ -164,26 +161,11 @@ def test_another_process_gets_the_same_run(
     assert whole.digest == digest_elsewhere(everything(), tmp_path, **environment)
 
 
-@pytest.fixture(scope="module")
-def short() -> Run:
-    """What a process without the compiler can do in a few seconds."""
-    return run(everything("90 s"))
-
-
-def test_kernels_as_plain_python_give_the_same_run(short: Run, tmp_path: Path) -> None:
-    assert short.digest == digest_elsewhere(everything("90 s"), tmp_path, NUMBA_DISABLE_JIT="1")
-
-
 def test_numpy_for_an_older_processor_gives_the_same_run(whole: Run, tmp_path: Path) -> None:
     # What NumPy doesn't know, or has built in, it warns about; and NumPy on other machines has others.
     features = "AVX2 FMA3 AVX512F AVX512_SKX AVX512CD AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V3 X86_V4"
     environment = {"NPY_DISABLE_CPU_FEATURES": features, "PYTHONWARNINGS": "ignore"}
     assert whole.digest == digest_elsewhere(everything(), tmp_path, **environment)
-
-
-def test_kernels_for_a_generic_processor_give_the_same_run(whole: Run, tmp_path: Path) -> None:
-    # Numba keeps what it compiles apart by processor, so the usual cache can take it.
-    assert whole.digest == digest_elsewhere(everything(), tmp_path, NUMBA_CPU_NAME="generic")
 
 
 # --- Who else is there -------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.homes import needs_jit
 from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, table
 
 import fleet2d
@@ -23,8 +22,6 @@ from fleet2d.sight.fov import Bool, FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.tables import Scene, stack_lenses
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
-
-pytestmark = needs_jit
 
 HERE = f"{TESTS.as_posix()}/engine/test_verdicts"
 SECOND = 1_000_000

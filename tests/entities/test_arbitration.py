@@ -6,15 +6,12 @@ from typing import Any
 
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, rooms
-from tests.homes import needs_jit
 from tests.scenes import digests, run
 
 import fleet2d
 from fleet2d import Behavior, Plan, Situation
 from fleet2d.entities.hours import holds, parse_span
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 OWN = __name__
 

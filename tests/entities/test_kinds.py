@@ -3,7 +3,6 @@
 from typing import Any
 
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import path, run, scenario
 
 from fleet2d.engine.simulation import Simulation
@@ -71,7 +70,6 @@ def test_an_item_of_a_schedule_in_a_room_that_is_not_there_is_left_out() -> None
     assert "schedule.days: left out" in notes(content)
 
 
-@needs_jit
 def test_furniture_is_a_place_wherever_a_place_goes() -> None:
     items = [{"at": "00:00", "place": "sofa", "dwell": "1 d"}]
     users = {"ana": {"type": "schedule", "days": [{"items": items}], "start": "kitchen"}}

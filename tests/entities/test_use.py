@@ -5,15 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from tests.homes import needs_jit
 
 import fleet2d
 from fleet2d import Behavior, ComponentError, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-
-pytestmark = needs_jit
 
 BED = PlacedObject(
     "bed",

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 
 from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
 from fleet2d.fit.visits import Visits, count_visits, spread, stays
@@ -51,7 +50,6 @@ def real_homes(shared_data: Path) -> list[Visits]:
     return [count_visits(*trace_of_log(shared_data / "activity" / log)) for log in logs]
 
 
-@needs_jit
 @pytest.mark.parametrize("name", bundled())
 def test_a_persona_moves_about_as_people_of_real_homes_do(
     name: str, real_homes: list[Visits]
@@ -62,7 +60,6 @@ def test_a_persona_moves_about_as_people_of_real_homes_do(
         assert a <= statistics.mean(values) <= b, field
 
 
-@needs_jit
 @pytest.mark.parametrize("name", ["retired", "works_from_home"])
 def test_who_is_at_home_goes_to_the_bathroom_in_the_daytime(name: str) -> None:
     counted = count_visits(*trace_of_persona(name, 14, 4))

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from tests.homes import needs_jit
 from tests.scenes import flat_path
 
 import fleet2d
@@ -24,8 +23,6 @@ from fleet2d.floorplan.space import Space
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.taut import leg_cost
-
-pytestmark = needs_jit
 
 HALL = FloorPlan.build(
     "hall", shapely.box(0, 0, 6, 4), no_go=[shapely.box(2, 1, 4, 3), shapely.box(5, 3.5, 5.5, 4)]

@@ -10,7 +10,6 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely import Polygon
-from tests.homes import JIT_IS_OFF
 from tests.strategies import homes, quick
 
 from fleet2d.errors import FloorPlanError
@@ -93,17 +92,17 @@ def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data: Path) ->
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert 50 == len(paths)
     pieces = 0
-    for path in paths[2:4] if JIT_IS_OFF else paths:
+    for path in paths:
         plan = furnish(plan_of(path))
         check_all(plan_of(path), plan)
         pieces += len(plan.objects)
-    assert pieces > (0 if JIT_IS_OFF else 700)
+    assert pieces > 700
 
 
 def test_maps_of_robots_are_furnished_without_harm(shared_data: Path) -> None:
     paths = [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]
     assert 6 == len(paths)
-    for path in paths[:1] if JIT_IS_OFF else paths:
+    for path in paths:
         check_all(plan_of(path), furnish(plan_of(path)))
 
 

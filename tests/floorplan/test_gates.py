@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from numpy.typing import NDArray
-from tests.homes import Home, all_homes, awkward_points, home_of, needs_jit
+from tests.homes import Home, all_homes, awkward_points, home_of
 from tests.reference.sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
 
@@ -18,7 +18,7 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.region import region_contains, visible_region
-from fleet2d.kernels.sight import line_of_sight, scratch_for
+from fleet2d.kernels.sight import line_of_sight
 
 I64 = NDArray[np.int64]
 ROOM = [shapely.box(0, 0, 640, 640)]
@@ -87,7 +87,6 @@ def test_who_sees_what_past_shut_and_open_doors_is_as_every_wall_says(
     compared(home_of(polygons), np.random.default_rng(seed), doors=4, eyes=3, points=40)
 
 
-@needs_jit
 def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data: Path) -> None:
     rng = np.random.default_rng(5)
     pairs = sum(compared(home, rng, doors=6, eyes=4, points=250) for home in all_homes(shared_data))
@@ -108,10 +107,7 @@ def test_regions_follow_doors_as_single_sight_lines_do(
     eye = home.cells[rng.integers(len(home.cells))]
     points = awkward_points(home, rng, 60)
     x, y = eye.tolist()
-    wall, stack = scratch_for(mesh.vertices)
-    right = np.empty_like(wall)
-    count = visible_region(mesh, x, y, locate(mesh, x, y), right, wall, stack)
-    pieces = right[:count], wall[:count]
+    pieces = visible_region(mesh, x, y)
     found = [region_contains(mesh, x, y, *pieces, *p) for p in points.tolist()]
     assert found == truth(home, segments, eye, points).tolist()
 

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import all_homes, home_of, needs_jit
+from tests.homes import all_homes, home_of
 from tests.strategies import homes, quick
 
 from fleet2d.errors import FloorPlanError
@@ -53,7 +53,6 @@ def test_mesh_fills_the_free_space_and_ends_at_walls(polygons: list[Polygon]) ->
     check_mesh(home_of(polygons).mesh, polygons)
 
 
-@needs_jit
 def test_mesh_fills_fifty_homes(shared_data: Path) -> None:
     for home in all_homes(shared_data):
         assert 2 * sum(polygon.area for polygon in home.polygons) == doubled_area(home.mesh)

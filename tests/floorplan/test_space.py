@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from tests.homes import JIT_IS_OFF, needs_jit, walls_of
+from tests.homes import walls_of
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.reference.sight import visible
 from tests.strategies import homes, quick, seeds
@@ -105,7 +105,7 @@ def check_routes(space: Space, rng: np.random.Generator, count: int) -> int:
     return bent
 
 
-@pytest.mark.parametrize("name", HOMES[:2] if JIT_IS_OFF else HOMES)
+@pytest.mark.parametrize("name", HOMES)
 def test_routes_in_real_homes_are_shortest_and_keep_the_radius_from_walls(
     shared_data: Path, name: str
 ) -> None:
@@ -140,7 +140,7 @@ def _is_pinched(space: Space) -> bool:
     return len(set(starts.tolist())) < len(starts)
 
 
-@pytest.mark.parametrize("name", HOMES[:1] if JIT_IS_OFF else HOMES)
+@pytest.mark.parametrize("name", HOMES)
 @pytest.mark.parametrize("radius", RADII)
 def test_space_is_what_is_a_radius_off_the_walls_and_no_farther_off_than_stated(
     shared_data: Path, name: str, radius: float
@@ -250,7 +250,6 @@ def test_space_of_a_turned_and_mirrored_home_is_the_same(radius: float) -> None:
     check_symmetry(built(home), radius, 0.0)
 
 
-@needs_jit
 @pytest.mark.parametrize("name", HOMES)
 def test_space_of_a_turned_and_mirrored_real_home_is_the_same_to_the_grid_of_walls(
     shared_data: Path, name: str
@@ -323,7 +322,6 @@ def test_route_to_the_border_of_the_space_is_none() -> None:
         assert space.route(tuple(start), tuple((goal + 1).tolist())) is not None
 
 
-@needs_jit
 def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> None:
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert len(paths) == 50
@@ -335,7 +333,7 @@ def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> No
             assert space.parts >= 1
             assert sizes == sorted(sizes, reverse=True)
             assert sum(sizes) == np.count_nonzero(space.part_of_cell >= 0)
-            assert len(space.graph.node) == space.graph.start[-1]
+            assert len(space.routes.leg_end) == space.routes.leg_start[-1]
 
 
 @pytest.mark.parametrize("radius", [1.01, 5.0])

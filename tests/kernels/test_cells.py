@@ -7,8 +7,7 @@ from tests.homes import home_of
 from tests.reference.routes import parts_of
 from tests.strategies import homes, quick
 
-from fleet2d.kernels.cells import label_triangles
-from fleet2d.kernels.mesh import rasterize_cells
+from fleet2d.kernels.mesh import label_triangles, rasterize_cells
 
 
 @quick

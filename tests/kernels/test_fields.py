@@ -44,13 +44,6 @@ def test_squared_distance_is_the_same_on_every_side(turns: int) -> None:
     assert np.array_equal(squared_distance(mask)[:, ::-1], mirrored)
 
 
-def test_squared_distance_compiles_once() -> None:
-    for shape in ((3, 5), (8, 2)):
-        squared_distance(np.ones(shape, np.bool_))
-
-    assert len(getattr(squared_distance, "signatures", [1])) == 1
-
-
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29)])
 @pytest.mark.parametrize("free", [0.0, 0.3, 0.6, 0.9, 1.0])
 @pytest.mark.parametrize("count", [0, 1, 3])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.homes import JIT_IS_OFF
 from tests.reference import headings as slow
 from tests.strategies import quick
 
@@ -99,7 +98,7 @@ def test_heading_of_known_directions(dx: int, dy: int, expected: int) -> None:
 
 
 def test_heading_of_small_vectors_is_the_nearest() -> None:
-    reach = 2 if JIT_IS_OFF else 12
+    reach = 12
     for dx in range(-reach, reach + 1):
         for dy in range(-reach, reach + 1):
             if dx or dy:
@@ -117,7 +116,7 @@ def test_heading_of_large_vectors_is_the_nearest(dx: int, dy: int) -> None:
 def test_heading_of_vectors_beside_a_half_way_direction_is_the_nearest() -> None:
     """The hardest vectors: up to 700 units long, all but in the middle between two headings."""
     rng = np.random.default_rng(5)
-    for part in 2 * rng.integers(0, TURN, 8 if JIT_IS_OFF else 60) + 1:
+    for part in 2 * rng.integers(0, TURN, 60) + 1:
         c, s = float(slow.cosine(int(part))), float(slow.sine(int(part)))
         length = float(rng.integers(100, 700))
         x, y = round(length * c), round(length * s)

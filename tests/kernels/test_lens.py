@@ -10,7 +10,6 @@ from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
 from tests.strategies import quick
 
 from fleet2d.kernels.lens import Lenses, camera_pose, in_wedge, near_wedge, points_in_view
-from fleet2d.kernels.mesh import locate
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.tables import stack_lenses
 
@@ -70,10 +69,9 @@ def test_no_body_that_reaches_into_a_wedge_is_left_out(
 
 def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
     found = lenses(range=[0, 5], body_points=8)
-    at = locate(HALL, MIDDLE, MIDDLE)
-    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, at, 2 * UNITS_PER_M, 0)
+    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
     assert 9 == shown
-    behind = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, at, -2 * UNITS_PER_M, 0)
+    behind = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, -2 * UNITS_PER_M, 0)
     assert 0 == behind
 
 
@@ -81,17 +79,13 @@ def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
 def test_points_beyond_the_range_are_not_in_view(far: float, expected: int) -> None:
     """A body of 20 cm at 2 m: its nearest point, then half of it, then all."""
     found = lenses(range=[0, far], body_points=8)
-    at = locate(HALL, MIDDLE, MIDDLE)
-    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, at, 2 * UNITS_PER_M, 0)
+    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
     assert expected == pytest.approx(shown, abs=2)
     assert (far > 2.2) == (shown == 9)
 
 
 def test_a_pillar_hides_a_body_behind_it() -> None:
     walls, found = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
-    at = locate(walls, MIDDLE, MIDDLE)
     x, y = (round(v * UNITS_PER_M) for v in (3.5, 1.2))
-    assert 0 == points_in_view(walls, found, 0, 0, MIDDLE, MIDDLE, 0, at, x, y)
-    assert 9 == points_in_view(
-        HALL, found, 0, 0, MIDDLE, MIDDLE, 0, locate(HALL, MIDDLE, MIDDLE), x, y
-    )
+    assert 0 == points_in_view(walls, found, 0, 0, MIDDLE, MIDDLE, 0, x, y)
+    assert 9 == points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, x, y)

@@ -157,14 +157,3 @@ def test_an_empty_mask_has_no_ring() -> None:
 
     assert (0, 2) == corners.shape
     assert [0] == starts.tolist()
-
-
-def test_masks_kernels_compile_once() -> None:
-    for shape in ((3, 5), (8, 2)):
-        mask = np.ones(shape, np.bool_)
-        label_parts(mask, True)
-        count_steps(mask, mask)
-        trace_rings(mask)
-
-    for kernel in (label_parts, count_steps, trace_rings):
-        assert 1 == len(getattr(kernel, "signatures", [1]))

@@ -13,14 +13,11 @@ from tests.homes import (
     all_homes,
     awkward_points,
     home_of,
-    needs_jit,
     shuffled,
-    times_compiled,
 )
 from tests.reference.sight import is_inside, on_any_wall
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels import mesh as kernels
 from fleet2d.kernels.mesh import (
     BUCKET,
     contains_triangle,
@@ -29,8 +26,6 @@ from fleet2d.kernels.mesh import (
     rasterize_cells,
     strictly_inside,
 )
-
-ROOM_WITH_DIAGONAL = Polygon([(0, 0), (640, 0), (640, 640), (2, 2)])
 
 
 @pytest.mark.parametrize(
@@ -116,7 +111,6 @@ def test_cells_on_a_diagonal_wall_are_not_free() -> None:
     assert free[4, 5]
 
 
-@needs_jit
 def test_cells_of_every_home_are_those_that_shapely_holds_free(shared_data: Path) -> None:
     for home in all_homes(shared_data):
         if home.rows * home.columns > 10**6:
@@ -128,13 +122,3 @@ def test_cells_of_every_home_are_those_that_shapely_holds_free(shared_data: Path
         found = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
 
         assert np.array_equal(shapely.contains_xy(free, x, y), found)
-
-
-@needs_jit
-def test_every_kernel_is_compiled_once() -> None:
-    home = home_of([ROOM_WITH_DIAGONAL])
-    rasterize_cells(home.mesh, home.rows, home.columns)
-    strictly_inside(home.mesh, 100, 50)
-
-    for name in ("build_buckets", "rasterize_cells"):
-        assert 1 == times_compiled(getattr(kernels, name)), name

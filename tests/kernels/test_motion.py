@@ -1,5 +1,6 @@
 """Poses over time against fractions, and the random walk against a look at every wall."""
 
+import math
 from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
@@ -11,7 +12,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from tests.homes import JIT_IS_OFF, Home, home_of, houseexpo
+from tests.homes import Home, home_of, houseexpo
 from tests.reference import motion as slow
 from tests.reference.sight import is_inside, touches_any_wall
 from tests.strategies import homes, quick, seeds
@@ -21,8 +22,6 @@ from fleet2d.kernels.motion import (
     Breakpoints,
     Poses,
     WalkRule,
-    interpolate,
-    last_breakpoint,
     time_route,
     trace_meander,
     trace_track,
@@ -48,7 +47,7 @@ def traced(track: list[slow.Row], begin: int, step: int, count: int) -> list[slo
     """Return the poses that the kernel finds."""
     time, x, y, heading, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
     out = poses(count)
-    trace_track(Breakpoints(time, x, y, heading, away.astype(np.uint8)), begin, step, count, out)
+    trace_track(Breakpoints(time, x, y, heading, away.astype(np.uint8)), begin, step, out)
     return rows_of(out)
 
 
@@ -149,44 +148,46 @@ def test_trace_track_of_a_ten_year_halt_and_a_day_long_leg_does_not_overflow() -
         assert twin(track, begin, step, 14) == traced(track, begin, step, 14)
 
 
-def test_trace_track_leaves_the_rest_of_the_room_alone() -> None:
-    out = poses(5)
-    time = np.array([0, 3])
-    track = Breakpoints(time, time, time, time, np.zeros(2, np.uint8))
-
-    trace_track(track, 0, 1, 3, out)
-
-    assert [0, 1, 2, -7, -7] == out.x.tolist()
-    assert [0, 0, 0, 9, 9] == out.away.tolist()
-
-
+@quick
 @given(
     st.integers(-(2**20), 2**20),
     st.integers(-(2**20), 2**20),
     st.integers(1, 10**9),
-    st.fractions(0, 1),
+    st.integers(1, 10**8),
 )
-def test_interpolate_rounds_halves_up(start: int, change: int, whole: int, share: Fraction) -> None:
-    elapsed = int(share * whole)
-    expected = slow.half_up(start + Fraction(change * elapsed, whole))
+def test_trace_track_rounds_halves_up(start: int, change: int, whole: int, step: int) -> None:
+    """However many steps a leg has: quotients are carried along from step to step."""
+    track = [(0, start, -start, 0, 0), (whole, start + change, -start - change, 1, 0)]
 
-    assert expected == interpolate(start, change, elapsed, whole)
+    for begin in (0, whole // 2):
+        assert twin(track, begin, step, 60) == traced(track, begin, step, 60)
 
 
-@given(st.lists(st.integers(0, 30), min_size=1, max_size=12), st.integers(-5, 35))
-def test_last_breakpoint_is_the_last_that_has_passed(times: list[int], moment: int) -> None:
-    times.sort()
-    expected = max((i for i, time in enumerate(times) if time <= moment), default=0)
+KNOWN = Breakpoints(*(np.array([0, 5, 9]) for _ in range(4)), np.zeros(3, np.uint8))
 
-    assert expected == last_breakpoint(np.array(times), moment)
+
+@pytest.mark.parametrize(
+    ("track", "step", "message"),
+    [
+        pytest.param(KNOWN._replace(x=np.zeros(2, np.int64)), 1, "one length", id="lengths"),
+        pytest.param(Breakpoints(*(a[:0] for a in KNOWN)), 1, "1 or more", id="empty"),
+        pytest.param(KNOWN._replace(time=np.array([0, 9, 5])), 3, "ascend", id="backwards"),
+        pytest.param(KNOWN._replace(x=np.array([0, 2**41, 0])), 3, "small", id="far"),
+        pytest.param(KNOWN._replace(time=KNOWN.time << 57), 3, "short", id="long"),
+        pytest.param(KNOWN, 0, "step", id="no-step"),
+        pytest.param(KNOWN, 1 << 60, "step", id="beyond-all-time"),
+    ],
+)
+def test_trace_track_refuses_what_it_would_get_wrong(
+    track: Breakpoints, step: int, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        trace_track(track, 0, step, poses(4))
 
 
 def timed(route: list[tuple[int, int]], speed: float, rate: float, heading: int = 0) -> Int64:
     """Return the breakpoints of a route that begins at 1 s."""
-    out = np.full((2 * len(route), 4), -7, np.int64)
-    count = time_route(np.array(route, np.int64), 1_000_000, heading, speed, rate, out)
-    assert np.all(out[count:] == -7)
-    return out[:count]
+    return time_route(np.array(route, np.int64), 1_000_000, heading, speed, rate)
 
 
 corners = st.one_of(
@@ -256,13 +257,23 @@ def test_time_route_rounds_every_time_up() -> None:
     assert [1_000_000, 1_341_334, 1_674_668] == rows[:, 0].tolist()
 
 
+@pytest.mark.parametrize(("speed", "rate"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (math.nan, 1.0)])
+def test_time_route_refuses_speeds_that_lead_nowhere(speed: float, rate: float) -> None:
+    with pytest.raises(ValueError, match="above 0"):
+        timed([(0, 0), (5, 5)], speed, rate)
+
+
+def test_time_route_that_takes_for_ever_ends_at_the_last_time_there_is() -> None:
+    assert 2**61 == timed([(0, 0), (5, 5), (0, 9)], 1e-300, 1e-300)[-1, 0]
+
+
 # --- The random walk ---
 
 
 def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: Int64, count: int) -> Int64:
     """Return the poses of a walk: int64 (count, 3)."""
     out = poses(count)
-    trace_meander(walls.mesh, space.mesh, rule, first, start.copy(), out)
+    trace_meander(walls.mesh, space.mesh, rule, first, tuple(start.tolist()), out)
     assert not out.away.any()
     return np.stack(out[:3], axis=1)
 
@@ -368,7 +379,7 @@ def test_trace_meander_never_leaves_a_real_home(shared_data: Path, stride: float
     path = shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json"
     home, rng = houseexpo(path), np.random.default_rng(8)
     rule = WalkRule(np.uint64(12), int(stride), 30_000, 300)
-    count = 100 if JIT_IS_OFF else 4000
+    count = 4000
 
     moved = 0
     for x, y in inner_points(home, rng, 2):
@@ -409,3 +420,14 @@ def test_trace_meander_turns_no_faster_than_the_limit(limit: int) -> None:
     turns = (np.diff(steps[:, 2]) + 2048) % TURN - 2048
 
     assert {limit} == set(np.abs(turns).tolist()) - {0}.difference({limit})
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"stride": -1}, {"stride": 2**31}, {"sway": -1}, {"turn_limit": -1}]
+)
+def test_trace_meander_refuses_a_rule_that_is_none(wrong: dict[str, int]) -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+    rule = WalkRule(np.uint64(1), 5, 5, 5)._replace(**wrong)
+
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        walked(home, home, rule, 0, np.array([33, 33, 0]), 3)

@@ -7,7 +7,6 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.homes import needs_jit
 from tests.sight.watching import scene
 from tests.strategies import quick
 
@@ -125,7 +124,6 @@ def test_a_user_at_the_camera_and_one_without_noise_stay_where_they_are() -> Non
     assert (300, -40) == k.blurred(table_of(), keys, 0, 0, 7, 300, -40)
 
 
-@needs_jit
 def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
     keys = np.full((1, 3, k.PURPOSES), 5, np.uint64)
     table = table_of(attributes={"range_noise": 3})

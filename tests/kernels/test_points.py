@@ -5,21 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given
+from numpy.typing import NDArray
 from shapely.geometry import Polygon
-from tests.homes import (
-    all_homes,
-    awkward_points,
-    behind_corners,
-    home_of,
-    needs_jit,
-    times_compiled,
-)
+from tests.homes import all_homes, awkward_points, behind_corners, home_of
 from tests.reference.sight import visible
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels.headings import half_sine
-from fleet2d.kernels.points import points_in_reach, points_in_sight, questions
+from fleet2d.kernels.points import points_in_reach, points_in_sight
 from fleet2d.kernels.seen import Reach
+
+Int64 = NDArray[np.int64]
 
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 
@@ -66,7 +62,6 @@ def test_points_in_sight_are_those_that_no_wall_hides(polygons: list[Polygon], s
         assert np.array_equal(expected, points_in_sight(home.mesh, *eye.tolist(), points))
 
 
-@needs_jit
 def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data: Path) -> None:
     rng, seen = np.random.default_rng(2), 0
     for home in list(all_homes(shared_data))[::7]:
@@ -80,12 +75,11 @@ def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data:
     assert seen > 200
 
 
-@needs_jit
-def test_kernels_are_compiled_once() -> None:
+@pytest.mark.parametrize("points", [np.array([[33, 33, 1]]), np.array([[33, 2**40]])])
+def test_points_that_are_none_are_refused(points: Int64) -> None:
     home = home_of([Polygon([(0, 0), (640, 0), (640, 640), (0, 640)])])
-    points = np.array([[33, 33]])
-    points_in_sight(home.mesh, 5, 5, points)
-    points_in_reach(5, 5, 0, Reach(0, 100, 1), points)
 
-    assert 1 == times_compiled(points_in_sight) == times_compiled(points_in_reach)
-    assert times_compiled(questions) <= 1  # its twin is in tests/engine/test_verdicts.py
+    with pytest.raises(ValueError, match="points"):
+        points_in_sight(home.mesh, 5, 5, points)
+    with pytest.raises(ValueError, match="points"):
+        points_in_reach(5, 5, 0, Reach(0, 100, 1), points)

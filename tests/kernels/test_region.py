@@ -16,15 +16,13 @@ from tests.homes import (
     behind_corners,
     home_of,
     houseexpo,
-    needs_jit,
     shuffled,
-    times_compiled,
 )
 from tests.reference.sight import visible_area
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels._jit import kernel
-from fleet2d.kernels.mesh import Mesh, locate, rasterize_cells, strictly_inside
+from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
+from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import (
     region_contains,
     region_contains_points,
@@ -32,21 +30,10 @@ from fleet2d.kernels.region import (
     regions_of_cells,
     visible_region,
 )
-from fleet2d.kernels.sight import line_of_sight, scratch_for
 
-Int64 = npt.NDArray[np.int64]
 Int32 = npt.NDArray[np.int32]
-Bool = npt.NDArray[np.bool_]
 
 ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
-
-
-def region_of(mesh: Mesh, x: int, y: int) -> tuple[Int32, Int32]:
-    """Return the region of a point: `right` and `wall` of its pieces."""
-    wall, stack = scratch_for(mesh.vertices)
-    right = np.empty_like(wall)
-    count = visible_region(mesh, x, y, locate(mesh, x, y), right, wall, stack)
-    return right[:count].copy(), wall[:count].copy()
 
 
 def canonical(mesh: Mesh, right: Int32, wall: Int32) -> list[tuple[int, int, int]]:
@@ -59,19 +46,8 @@ def canonical(mesh: Mesh, right: Int32, wall: Int32) -> list[tuple[int, int, int
 
 def area_of(mesh: Mesh, x: int, y: int) -> tuple[float, npt.NDArray[np.float64]]:
     """Return the area of a region, and the corners of its outline."""
-    right, wall = region_of(mesh, x, y)
-    outline = np.empty((2 * len(right), 2))
-    return region_outline(mesh, x, y, right, wall, outline), outline
-
-
-@kernel
-def _sees_each(mesh: Mesh, x: int, y: int, points: Int64) -> Bool:
-    """Return which points are visible from (x, y), by lines of sight."""
-    found = np.zeros(points.shape[0], np.bool_)
-    triangle = locate(mesh, x, y)
-    for i in range(points.shape[0]):
-        found[i] = line_of_sight(mesh, x, y, triangle, points[i, 0], points[i, 1])
-    return found
+    outline, area = region_outline(mesh, x, y, *visible_region(mesh, x, y))
+    return area, outline
 
 
 def check_verdicts(home: Home, mesh: Mesh, rng: np.random.Generator, eyes: int, count: int) -> None:
@@ -83,8 +59,8 @@ def check_verdicts(home: Home, mesh: Mesh, rng: np.random.Generator, eyes: int, 
             eye[None],
         ]
         points = np.concatenate(around)
-        right, wall = region_of(mesh, *eye.tolist())
-        expected = _sees_each(mesh, *eye.tolist(), points)
+        right, wall = visible_region(mesh, *eye.tolist())
+        expected = points_in_sight(mesh, *eye.tolist(), points)
         found = region_contains_points(mesh, *eye.tolist(), right, wall, points)
         assert np.array_equal(expected, found)
 
@@ -99,7 +75,6 @@ def test_region_holds_exactly_the_points_in_line_of_sight(
     check_verdicts(home, shuffled(home.mesh, rng), rng, eyes=1, count=4)
 
 
-@needs_jit
 def test_region_holds_exactly_the_points_in_line_of_sight_in_fifty_homes(shared_data: Path) -> None:
     rng = np.random.default_rng(3)
 
@@ -114,7 +89,7 @@ def test_every_direction_belongs_to_one_piece(polygons: list[Polygon], seed: int
     mesh = home.mesh
 
     for x, y in awkward_points(home, np.random.default_rng(seed), 2).tolist():
-        right, _ = region_of(mesh, x, y)
+        right, _ = visible_region(mesh, x, y)
         if not strictly_inside(mesh, x, y):
             assert len(right) == 0
             continue
@@ -132,8 +107,8 @@ def test_region_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) 
     other = shuffled(home.mesh, rng)
 
     for x, y in awkward_points(home, rng, 2).tolist():
-        expected = canonical(home.mesh, *region_of(home.mesh, x, y))
-        assert expected == canonical(other, *region_of(other, x, y))
+        expected = canonical(home.mesh, *visible_region(home.mesh, x, y))
+        assert expected == canonical(other, *visible_region(other, x, y))
         assert area_of(home.mesh, x, y)[0] == area_of(other, x, y)[0]
 
 
@@ -148,7 +123,6 @@ def test_area_is_exact(polygons: list[Polygon], seed: int) -> None:
             assert expected == pytest.approx(area_of(home.mesh, x, y)[0], rel=1e-12)
 
 
-@needs_jit
 def test_area_is_exact_and_the_outline_has_it_in_a_real_home(shared_data: Path) -> None:
     home = houseexpo(shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json")
 
@@ -171,12 +145,12 @@ def test_convex_room_is_seen_whole_from_everywhere() -> None:
 
     for x, y in [(1, 1), (320, 160), (639, 319), (10, 300)]:
         assert area_of(mesh, x, y)[0] == pytest.approx(640 * 320, rel=1e-15)
-        assert len(region_of(mesh, x, y)[0]) == 4
+        assert len(visible_region(mesh, x, y)[0]) == 4
 
 
 def test_no_eye_in_a_wall_has_a_region() -> None:
     for x, y in [(128, 200), (128, 128), (600, 350), (0, 0), (-5, 9), (600, 300)]:
-        right, wall = region_of(ROOM.mesh, x, y)
+        right, wall = visible_region(ROOM.mesh, x, y)
         assert len(right) == 0
         assert not region_contains(ROOM.mesh, x, y, right, wall, x, y)
 
@@ -190,7 +164,7 @@ def check_regions_of_cells(home: Home, step: int) -> float:
 
     assert len(right) == len(wall) == start[-1]
     for i, (row, column) in enumerate(cells.tolist()):
-        expected = region_of(home.mesh, 64 * column + 33, 64 * row + 33)
+        expected = visible_region(home.mesh, 64 * column + 33, 64 * row + 33)
         piece = slice(start[i], start[i + 1])
         assert np.array_equal(expected[0], right[piece])
         assert np.array_equal(expected[1], wall[piece])
@@ -210,12 +184,32 @@ def test_regions_of_cells_may_have_any_number_of_pieces() -> None:
     assert check_regions_of_cells(hall, step=40) > 64
 
 
-@needs_jit
-def test_every_kernel_is_compiled_once() -> None:
-    right, wall = region_of(ROOM.mesh, 200, 200)
-    region_contains(ROOM.mesh, 200, 200, right, wall, 201, 201)
-    check_regions_of_cells(ROOM, step=50)
-    area_of(ROOM.mesh, 200, 200)
+def test_points_far_outside_the_home_are_in_no_region() -> None:
+    right, wall = visible_region(ROOM.mesh, 200, 200)
+    far = np.array([[200, 200], [2**62, 2**62], [-(2**63), 200], [200, 2**63 - 1]])
 
-    for function in (visible_region, region_contains, regions_of_cells, region_outline):
-        assert 1 == times_compiled(function)
+    found = region_contains_points(ROOM.mesh, 200, 200, right, wall, far)
+
+    assert found.tolist() == [True, False, False, False]
+
+
+def test_numbers_that_name_no_vertex_wall_or_cell_are_refused() -> None:
+    mesh = ROOM.mesh
+    right, wall = visible_region(mesh, 200, 200)
+    points, triangles = np.array([[1, 1]]), rasterize_cells(mesh, ROOM.rows, ROOM.columns)
+
+    for wrong, message in [
+        ((right[1:], wall), "one length"),
+        ((right + np.int32(10**6), wall), "right must hold"),
+        ((right, wall - np.int32(10**6)), "wall must hold"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            region_contains_points(mesh, 200, 200, *wrong, points)
+        with pytest.raises(ValueError, match=message):
+            region_outline(mesh, 200, 200, *wrong)
+    with pytest.raises(ValueError, match="an eye"):
+        region_contains(mesh, -1, 200, right, wall, 1, 1)
+    with pytest.raises(ValueError, match="in cell_triangles"):
+        regions_of_cells(mesh, np.array([[ROOM.rows, 0]]), triangles)
+    with pytest.raises(ValueError, match="the triangle of each"):
+        regions_of_cells(mesh, np.argwhere(triangles >= 0), triangles + np.int32(1))

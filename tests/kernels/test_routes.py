@@ -1,6 +1,8 @@
 """Shortest paths against Dijkstra over all corners, in free space with holes and pinches."""
 
 import math
+import pickle
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -8,11 +10,11 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import JIT_IS_OFF, Home, home_of, shuffled
+from tests.homes import Home, home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, distance, find_route
+from fleet2d.kernels.routes import Corners, Routes, distance
 
 Int64 = npt.NDArray[np.int64]
 
@@ -36,27 +38,22 @@ def corners_of(home: Home) -> Corners:
             before.append(a[0])
             after.append(b[0])
             simple.append(alone)
-    node_of_vertex = np.full(len(home.mesh.vertices), -1, np.int32)
-    node_of_vertex[vertex] = np.arange(len(vertex))
     return Corners(
-        node_of_vertex,
         np.array(vertex, np.int64),
         np.array(before, np.int64).reshape(-1, 2),
         np.array(after, np.int64).reshape(-1, 2),
-        np.array(simple, np.uint8),
+        np.array(simple, np.bool_),
     )
 
 
-def routes_of(home: Home) -> RouteGraph:
-    """Return the route graph of a home."""
-    return build_route_graph(home.mesh, corners_of(home))
+def routes_of(home: Home) -> Routes:
+    """Return the corners of a home and the legs between them."""
+    return Routes(home.mesh, corners_of(home))
 
 
-def route(home: Home, graph: RouteGraph, start: Int64, goal: Int64) -> Int64 | None:
-    """Return the path of the kernel, or None."""
-    out = np.full((len(graph.corners.vertex) + 2, 2), -7, np.int64)
-    count = find_route(home.mesh, graph, *start.tolist(), *goal.tolist(), out)
-    return out[:count] if count else None
+def legs_of(routes: Routes) -> list[Int64]:
+    """Return all legs, as arrays that can be compared."""
+    return [routes.leg_start, routes.leg_end, routes.leg_length]
 
 
 def some_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
@@ -73,19 +70,18 @@ def some_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
 def check_routes(home: Home, rng: np.random.Generator, count: int) -> tuple[int, int]:
     """Compare paths between random points with the twin; return how many bend and how many fail."""
     vertices = home.mesh.vertices
-    region, graph = region_of(vertices, home.mesh.triangles), routes_of(home)
+    region, routes = region_of(vertices, home.mesh.triangles), routes_of(home)
     slow_graph = graph_of(region, vertices)
     points = some_points(home, rng, 2 * count)
     bent = failed = 0
     for start, goal in zip(points[::2], points[1::2], strict=False):
         expected = shortest(region, vertices, slow_graph, start, goal)
-        path = route(home, graph, start, goal)
+        path, back = routes.find(*start, *goal), routes.find(*goal, *start)
         if path is None:
             assert math.isinf(expected)
-            assert route(home, graph, goal, start) is None
+            assert back is None
             failed += 1
             continue
-        back = route(home, graph, goal, start)
         assert back is not None
         assert [start.tolist(), goal.tolist()] == path[[0, -1]].tolist()
         assert straight_ways(region, path[:-1], path[1:]).all()
@@ -108,12 +104,12 @@ def test_find_route_is_as_short_as_dijkstra_over_all_corners(
 def test_find_route_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) -> None:
     home, rng = home_of(polygons), np.random.default_rng(seed)
     other = home._replace(mesh=shuffled(home.mesh, rng))
-    graph, other_graph = routes_of(home), routes_of(other)
+    routes, other_routes = routes_of(home), routes_of(other)
     points = some_points(home, rng, 8)
 
-    assert all(np.array_equal(a, b) for a, b in zip(graph[1:], other_graph[1:], strict=True))
+    assert all(map(np.array_equal, legs_of(routes), legs_of(other_routes)))
     for start, goal in zip(points[::2], points[1::2], strict=False):
-        path, same = route(home, graph, start, goal), route(other, other_graph, start, goal)
+        path, same = routes.find(*start, *goal), other_routes.find(*start, *goal)
         assert (path is None) == (same is None)
         assert path is None or np.array_equal(path, same)
 
@@ -122,7 +118,7 @@ def crowded(seed: int) -> Home:
     """Return a hall full of slanted pillars."""
     rng = np.random.default_rng(seed)
     pillars = []
-    for _ in range(6 if JIT_IS_OFF else 22):
+    for _ in range(22):
         centre, spread = rng.integers(300, 3800, 2), rng.integers(60, 500)
         outline = centre + rng.integers(-spread, spread, (6, 2))
         pillars.append(shapely.convex_hull(shapely.multipoints(outline)))
@@ -134,24 +130,24 @@ def crowded(seed: int) -> Home:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_find_route_among_many_pillars_is_as_short_as_dijkstra(seed: int) -> None:
-    bent, _ = check_routes(crowded(seed), np.random.default_rng(seed), 8 if JIT_IS_OFF else 40)
+    bent, _ = check_routes(crowded(seed), np.random.default_rng(seed), 40)
 
-    assert bent > (0 if JIT_IS_OFF else 15)
+    assert bent > 15
 
 
 def test_find_route_between_two_parts_is_none() -> None:
     home = home_of([shapely.box(0, 0, 640, 640), shapely.box(704, 0, 1344, 640)])
-    graph = routes_of(home)
+    routes = routes_of(home)
 
-    assert route(home, graph, np.array([33, 33]), np.array([737, 33])) is None
-    assert route(home, graph, np.array([33, 33]), np.array([670, 33])) is None
-    assert route(home, graph, np.array([670, 33]), np.array([33, 33])) is None
+    assert routes.find(33, 33, 737, 33) is None
+    assert routes.find(33, 33, 670, 33) is None
+    assert routes.find(670, 33, 33, 33) is None
 
 
 def test_find_route_without_corners_is_straight() -> None:
     home = home_of([shapely.box(0, 0, 640, 640)])
 
-    path = route(home, routes_of(home), np.array([33, 33]), np.array([601, 97]))
+    path = routes_of(home).find(33, 33, 601, 97)
 
     assert path is not None
     assert [[33, 33], [601, 97]] == path.tolist()
@@ -160,7 +156,7 @@ def test_find_route_without_corners_is_straight() -> None:
 def test_find_route_to_where_it_starts_has_no_length() -> None:
     home = home_of([shapely.box(0, 0, 640, 640)])
 
-    path = route(home, routes_of(home), np.array([33, 33]), np.array([33, 33]))
+    path = routes_of(home).find(33, 33, 33, 33)
 
     assert path is not None
     assert [[33, 33], [33, 33]] == path.tolist()
@@ -169,7 +165,7 @@ def test_find_route_to_where_it_starts_has_no_length() -> None:
 def test_find_route_round_a_pillar_goes_the_shorter_way() -> None:
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
 
-    path = route(home, routes_of(home), np.array([101, 301]), np.array([501, 301]))
+    path = routes_of(home).find(101, 301, 501, 301)
 
     assert path is not None
     assert [[101, 301], [200, 100], [400, 100], [501, 301]] == path.tolist()
@@ -179,9 +175,8 @@ def test_find_route_along_a_row_of_corners_touches_each() -> None:
     """The straight line touches four corners: strictly no line of sight, but the shortest way."""
     pillars = [shapely.box(128, 64, 192, 320), shapely.box(384, 128, 448, 320)]
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
-    graph = routes_of(home)
 
-    path = route(home, graph, np.array([64, 320]), np.array([512, 320]))
+    path = routes_of(home).find(64, 320, 512, 320)
 
     assert path is not None
     assert length_of(path) == 448
@@ -192,7 +187,7 @@ def test_find_route_through_a_point_where_two_pillars_meet_bends_at_it() -> None
     pillars = [shapely.box(128, 320, 320, 512), shapely.box(320, 128, 512, 320)]
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
 
-    path = route(home, routes_of(home), np.array([319, 129]), np.array([321, 511]))
+    path = routes_of(home).find(319, 129, 321, 511)
 
     assert path is not None
     assert [[319, 129], [320, 320], [321, 511]] == path.tolist()
@@ -201,23 +196,56 @@ def test_find_route_through_a_point_where_two_pillars_meet_bends_at_it() -> None
 def test_find_route_of_equal_ways_is_always_the_same() -> None:
     """The tie goes to corners with lower ids: the lower way, as ids are sorted by x, then y."""
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(220, 220, 420, 420))])
-    graph = routes_of(home)
 
-    path = route(home, graph, np.array([100, 320]), np.array([540, 320]))
+    path = routes_of(home).find(100, 320, 540, 320)
 
     assert path is not None
     assert [[100, 320], [220, 220], [420, 220], [540, 320]] == path.tolist()
 
 
-def test_route_graph_has_each_leg_in_both_directions() -> None:
-    graph = routes_of(crowded(1))
-    legs = {
-        (node, int(graph.node[k])): float(graph.length[k])
-        for node in range(len(graph.corners.vertex))
-        for k in range(graph.start[node], graph.start[node + 1])
-    }
+def test_routes_keep_their_mesh_and_can_be_pickled() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
+    routes = routes_of(home)
 
-    assert len(legs) == len(graph.node)
+    other = pickle.loads(pickle.dumps(routes))
+
+    assert all(map(np.array_equal, legs_of(routes), legs_of(other)))
+    ends = other.leg_end
+    path = other.find(101, 301, 501, 301)
+    del other
+    assert path is not None
+    assert [[101, 301], [200, 100], [400, 100], [501, 301]] == path.tolist()
+    assert not ends.flags.writeable
+    assert len(ends) == len(routes.leg_end)
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("vertex", lambda a: a[::-1]),
+        ("vertex", lambda a: a + 10**6),
+        ("before", lambda a: a[:-1]),
+        ("after", lambda a: a - 10**7),
+        ("simple", lambda a: a[:-1]),
+    ],
+)
+def test_routes_refuse_corners_that_are_none(
+    field: str, change: Callable[[Int64], Int64]
+) -> None:
+    home = crowded(1)
+    corners = corners_of(home)
+
+    with pytest.raises(ValueError, match="must"):
+        Routes(home.mesh, corners._replace(**{field: change(getattr(corners, field))}))
+
+
+def test_route_graph_has_each_leg_in_both_directions() -> None:
+    routes = routes_of(crowded(1))
+    begins = np.repeat(np.arange(len(routes.leg_start) - 1), np.diff(routes.leg_start))
+    ends = zip(begins.tolist(), routes.leg_end.tolist(), strict=True)
+    legs = dict(zip(ends, routes.leg_length.tolist(), strict=True))
+
+    assert len(legs) == len(routes.leg_end)
     assert len(legs) > 20
     assert all(legs[b, a] == length for (a, b), length in legs.items())
 

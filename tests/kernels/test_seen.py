@@ -8,28 +8,15 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import (
-    Home,
-    all_homes,
-    awkward_points,
-    home_of,
-    needs_jit,
-    shuffled,
-    times_compiled,
-    transformed,
-    turns,
-)
+from tests.homes import Home, all_homes, awkward_points, home_of, shuffled, transformed, turns
 from tests.reference import seen as slow
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels._jit import kernel
 from fleet2d.kernels.headings import half_sine
-from fleet2d.kernels.lens import in_wedge
-from fleet2d.kernels.mesh import Mesh, locate, rasterize_cells
-from fleet2d.kernels.seen import Bench, Reach, bench_for, cells_in_view, mark_spans
-from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.mesh import Mesh, rasterize_cells
+from fleet2d.kernels.points import points_in_reach, points_in_sight
+from fleet2d.kernels.seen import Reach, cells_in_view, mark_spans
 
-Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
 
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
@@ -39,26 +26,19 @@ ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300
 
 def found_in(home: Home, mesh: Mesh, pose: tuple[int, int, int], reach: Reach) -> Bool:
     """Return the mask of the cells in view; no cell may be told twice."""
-    bench = bench_for(mesh, home.rows, home.columns)
-    count = cells_in_view(mesh, *pose, reach, bench)
-    spans = bench.spans[:count]
+    spans = cells_in_view(mesh, *pose, reach, home.rows, home.columns)
     mask = np.zeros((home.rows, home.columns), np.bool_)
-    mark_spans(bench.spans, count, mask)
+    mark_spans(spans, mask)
     assert int(mask.sum()) == int((spans[:, 2] - spans[:, 1] + 1).sum())
     return mask
 
 
-@kernel
-def _by_lines(mesh: Mesh, x: int, y: int, heading: int, reach: Reach, mask: Bool) -> None:
-    """Set the cells in view, each by its own line of sight."""
-    triangle = locate(mesh, x, y)
-    for row in range(mask.shape[0]):
-        for column in range(mask.shape[1]):
-            dx, dy = column * 64 + 33 - x, row * 64 + 33 - y
-            if not reach.near_squared <= dx * dx + dy * dy <= reach.far_squared:
-                continue
-            if in_wedge(heading, reach.half_angle, dx, dy):
-                mask[row, column] = line_of_sight(mesh, x, y, triangle, x + dx, y + dy)
+def by_lines(home: Home, pose: tuple[int, int, int], reach: Reach) -> Bool:
+    """Return the mask of the cells in view, each by its own line of sight."""
+    centres = np.indices((home.rows, home.columns))[::-1].reshape(2, -1).T * 64 + 33
+    mask = points_in_reach(*pose, reach, centres)
+    mask[mask] = points_in_sight(home.mesh, *pose[:2], centres[mask])
+    return mask.reshape(home.rows, home.columns)
 
 
 def random_reach(rng: np.random.Generator) -> tuple[int, int, int]:
@@ -101,7 +81,6 @@ def test_cells_round_a_pillar_are_those_that_brute_force_finds(
         assert np.array_equal(expected, found_in(ROOM, ROOM.mesh, pose, Reach(4900, 490_000, half)))
 
 
-@needs_jit
 def test_cells_are_those_in_line_of_sight_in_fifty_homes_turned_and_mirrored(
     shared_data: Path,
 ) -> None:
@@ -113,14 +92,12 @@ def test_cells_are_those_in_line_of_sight_in_fifty_homes_turned_and_mirrored(
             for _ in range(6):
                 pose, (near, far, half) = random_pose(turned, rng), random_reach(rng)
                 reach = Reach(near**2, far**2, half)
-                expected = np.zeros((turned.rows, turned.columns), np.bool_)
-                _by_lines(turned.mesh, *pose, reach, expected)
+                expected = by_lines(turned, pose, reach)
                 assert np.array_equal(expected, found_in(turned, turned.mesh, pose, reach)), pose
                 compared += expected.size
     assert compared > 10_000_000
 
 
-@needs_jit
 def test_everything_in_view_all_round_is_free(shared_data: Path) -> None:
     for home in list(all_homes(shared_data))[:10]:
         free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
@@ -143,10 +120,18 @@ def test_range_ends_are_in_view_and_what_is_nearer_is_not() -> None:
     assert np.argwhere(found).tolist() == [[3, 7], [3, 8]]
 
 
-@needs_jit
-def test_every_kernel_is_compiled_once() -> None:
-    found_in(ROOM, ROOM.mesh, (200, 200, 0), Reach(0, 10**6, 1000))
+def test_numbers_without_a_meaning_are_refused() -> None:
+    mesh, mask = ROOM.mesh, np.zeros((9, 9), np.bool_)
 
-    for function in (bench_for, cells_in_view, mark_spans):
-        assert 1 == times_compiled(function)
-    assert Bench._fields[-1] == "spans"
+    for reach, message in [
+        (Reach(-1, 100, 1), "near_squared and far_squared"),
+        (Reach(0, 2**52, 1), "near_squared and far_squared"),
+        (Reach(0, 100, -1), "half_angle"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            cells_in_view(mesh, 200, 200, 0, reach, 9, 9)
+    with pytest.raises(ValueError, match="rows and columns"):
+        cells_in_view(mesh, 200, 200, 0, Reach(0, 100, 1), -1, 9)
+    for span in ([9, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 9]):
+        with pytest.raises(ValueError, match="spans must lie in the mask"):
+            mark_spans(np.array([span], np.int32), mask)

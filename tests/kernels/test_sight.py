@@ -9,56 +9,42 @@ import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
 from tests.homes import (
-    JIT_IS_OFF,
     Home,
     all_homes,
     awkward_points,
     behind_corners,
     home_of,
     houseexpo,
-    needs_jit,
     shuffled,
-    times_compiled,
     transformed,
     turns,
 )
 from tests.reference.sight import vertices_seen, visible, visible_exactly
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels._jit import kernel
+from fleet2d.kernels.chambers import see_each
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.sight import (
     build_fans,
     line_of_sight,
     vertices_seen_from_point,
     vertices_seen_from_vertex,
-    walk_line_of_sight,
 )
 
 Int64 = npt.NDArray[np.int64]
 Bool = npt.NDArray[np.bool_]
 
-EYES, POINTS = (1, 3) if JIT_IS_OFF else (2, 24)
+EYES, POINTS = 2, 24
 
 
-@kernel
 def _sees_each(mesh: Mesh, eye: Int64, points: Int64) -> Bool:
     """Return which points the eye sees."""
-    found = np.zeros(points.shape[0], np.bool_)
-    triangle = locate(mesh, eye[0], eye[1])
-    for i in range(points.shape[0]):
-        found[i] = line_of_sight(mesh, eye[0], eye[1], triangle, points[i, 0], points[i, 1])
-    return found
+    return see_each(mesh, np.broadcast_to(eye, points.shape), points)
 
 
-@kernel
 def _is_seen_by_each(mesh: Mesh, eye: Int64, points: Int64) -> Bool:
     """Return which points see the eye."""
-    found = np.zeros(points.shape[0], np.bool_)
-    for i in range(points.shape[0]):
-        x, y = points[i, 0], points[i, 1]
-        found[i] = line_of_sight(mesh, x, y, locate(mesh, x, y), eye[0], eye[1])
-    return found
+    return see_each(mesh, points, np.broadcast_to(eye, points.shape))
 
 
 def sees(home: Home, eye: tuple[int, int], point: tuple[int, int]) -> bool:
@@ -102,7 +88,6 @@ def test_line_of_sight_does_not_depend_on_the_mesh(polygons: list[Polygon], seed
     check_against_every_wall(home, shuffled(home.mesh, rng), rng)
 
 
-@needs_jit
 def test_line_of_sight_agrees_with_every_wall_of_fifty_homes(shared_data: Path) -> None:
     rng = np.random.default_rng(1)
 
@@ -110,7 +95,6 @@ def test_line_of_sight_agrees_with_every_wall_of_fifty_homes(shared_data: Path) 
         assert check_against_every_wall(home, home.mesh, rng) > 50
 
 
-@needs_jit
 @pytest.mark.parametrize("name", ["658e5214673c7a4e25b458e56bdb6144"])
 def test_line_of_sight_is_the_same_in_the_turned_and_mirrored_home(
     shared_data: Path, name: str
@@ -219,13 +203,11 @@ def test_vertices_seen_from_a_point_are_those_no_wall_blocks(
     home, rng = home_of(polygons), np.random.default_rng(seed)
     mesh = shuffled(home.mesh, rng)
     corners = {(x, y) for x, y in mesh.vertices.tolist()}
-    seen = np.empty(len(mesh.vertices), np.int32)
 
     for x, y in awkward_points(home, rng, 2).tolist():
-        triangle = locate(mesh, x, y)
-        count = vertices_seen_from_point(mesh, x, y, triangle, seen)
-        found = [tuple(mesh.vertices[i].tolist()) for i in seen[:count]]
-        if triangle == -1:
+        seen = vertices_seen_from_point(mesh, x, y)
+        found = [tuple(vertex) for vertex in mesh.vertices[seen].tolist()]
+        if locate(mesh, x, y) == -1:
             expected = set()
         elif (x, y) in corners:
             expected = {(x, y)}
@@ -242,35 +224,19 @@ def test_vertices_seen_from_a_vertex_are_those_no_wall_blocks(
 ) -> None:
     home = home_of(polygons)
     mesh = shuffled(home.mesh, np.random.default_rng(seed))
-    fans = build_fans(mesh)
-    seen = np.empty(len(mesh.vertices), np.int32)
 
     for vertex in range(0, len(mesh.vertices), 3):
-        count = vertices_seen_from_vertex(mesh, fans, vertex, seen)
-        found = [tuple(mesh.vertices[i].tolist()) for i in seen[:count]]
+        seen = vertices_seen_from_vertex(mesh, vertex)
+        found = [tuple(other) for other in mesh.vertices[seen].tolist()]
         x, y = mesh.vertices[vertex].tolist()
         assert len(set(found)) == len(found)
         assert vertices_seen(home.walls, (x, y)) == set(found)
 
 
 def test_fans_list_each_triangle_at_its_three_corners() -> None:
-    fans = build_fans(HALL_WITH_PILLAR.mesh)
+    start, triangles = build_fans(HALL_WITH_PILLAR.mesh)
 
     for vertex in range(len(HALL_WITH_PILLAR.mesh.vertices)):
         expected = np.flatnonzero((HALL_WITH_PILLAR.mesh.triangles == vertex).any(axis=1))
-        at_vertex = fans.triangles[fans.start[vertex] : fans.start[vertex + 1]]
+        at_vertex = triangles[start[vertex] : start[vertex + 1]]
         assert expected.tolist() == at_vertex.tolist()
-
-
-@needs_jit
-def test_every_kernel_is_compiled_once() -> None:
-    mesh, seen = CORRIDOR.mesh, np.empty(9, np.int32)
-    sees(CORRIDOR, (130, 190), (131, 190))
-    vertices_seen_from_point(mesh, 130, 190, locate(mesh, 130, 190), seen)
-    vertices_seen_from_vertex(mesh, build_fans(mesh), 0, seen)
-
-    assert 1 == times_compiled(line_of_sight)
-    assert 1 == times_compiled(build_fans)
-    assert 1 == times_compiled(vertices_seen_from_point)
-    assert 1 == times_compiled(vertices_seen_from_vertex)
-    assert times_compiled(walk_line_of_sight) <= 2

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.homes import JIT_IS_OFF
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.presence.chain_model import steps_of

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from tests.homes import home_of, needs_jit, times_compiled
+from tests.homes import home_of
 from tests.reference.costs import cost_distance as slow_cost_distance
 
 from fleet2d.kernels.fields import cost_distance, descend, step_cost, walking_distance
@@ -120,9 +120,3 @@ def test_pulled_way_keeps_its_ends_and_is_never_dearer() -> None:
             assert after <= before * (1 + 1e-6)
             straight += len(way) - len(pulled)
     assert straight > 10
-
-
-@needs_jit
-def test_kernels_are_compiled_once() -> None:
-    for function in (cost_distance, descend, pull_taut):
-        assert 1 >= times_compiled(function)

@@ -6,14 +6,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
-from tests.homes import Home, home_of, needs_jit, times_compiled
+from tests.homes import Home, home_of
 from tests.reference import seen as slow
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.seen import bench_for
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.tables import Scene, stack_lenses
@@ -108,17 +107,17 @@ def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[i
     )  # fmt: skip
     watched = Watched(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
     binned, most = np.zeros((8, ROOMS), np.int64), np.zeros((8, ROOMS), np.int64)
-    glances, bench = no_glances(slots, ROOMS), bench_for(FLAT.mesh, *shape)
+    glances = no_glances(slots, ROOMS)
     begin = 0
     for end in [*ends, len(poses.x)]:
         part = Poses(*(np.ascontiguousarray(column[begin:end]) for column in poses))
-        watch(watched, part, begin, glances, bench, record)
+        watch(watched, part, begin, glances, record)
         reached = slice(begin // BIN, (end - 1) // BIN + 1)
         length = reached.stop - reached.start
         binned[reached] += record.binned[:length]
         most[reached] = np.maximum(most[reached], record.most[:length])
         begin = end
-    settle(watched, glances, bench, record.last)
+    settle(watched, glances, record.last)
     lists = (record.exposure.tolist(), binned.tolist(), most.tolist())
     return Seen(record.first, record.last, *lists)
 
@@ -136,7 +135,6 @@ TWO = [
 ]  # fmt: skip
 
 
-@needs_jit
 @pytest.mark.parametrize("cameras", [ONE, WIDE, TWO], ids=["one", "wide", "two, one of them pans"])
 @pytest.mark.parametrize(("every", "slots"), [(1, 64), (1, 2), (3, 8)])
 @pytest.mark.parametrize("ends", [[], [1, 2, 17, 18, 40]], ids=["whole", "in spans"])
@@ -157,9 +155,37 @@ def test_what_was_seen_is_what_brute_force_sees(
     assert (expected.first >= 0).sum() > 20
 
 
-@needs_jit
-def test_kernels_are_compiled_once() -> None:
-    by_kernel(random_poses(np.random.default_rng(1), 5), lenses_of(*ONE), 1, 8, [])
+def test_tables_that_do_not_fit_are_refused() -> None:
+    shape, rooms = (FLAT.rows, FLAT.columns), rooms_of(FLAT)
+    none = np.zeros((0, ROOMS), np.int64)
+    record = Record(
+        np.full(shape, NEVER), np.zeros((0, 0), np.int64), np.zeros(ROOMS, np.int64),
+        np.zeros((0, 0), np.int64), none, none,
+    )  # fmt: skip
+    watched = Watched(FLAT.mesh, lenses_of(*ONE), rooms, SECOND, 1, BIN)
+    poses = random_poses(np.random.default_rng(1), 60)
+    glances = no_glances(8, ROOMS)
+    full = no_glances(8, ROOMS)
+    full.last[:] = 0
+    bins = record._replace(
+        binned=np.zeros((2, ROOMS), np.int64), most=np.zeros((2, ROOMS), np.int64)
+    )
 
-    for function in (watch, settle):
-        assert 1 == times_compiled(function)
+    for arguments, message in [
+        ((watched, poses, 0, no_glances(6, ROOMS), record), "a power of two"),
+        ((watched, poses, 0, no_glances(8, 2), record), "cells must be"),
+        ((watched, poses, 0, full, record), "more slots of glances"),
+        (
+            (watched._replace(patch_of_cell=rooms + np.int16(9)), poses, 0, glances, record),
+            "patches",
+        ),
+        ((watched._replace(patch_of_cell=rooms[1:]), poses, 0, glances, record), "patch_of_cell"),
+        ((watched._replace(every=0), poses, 0, glances, record), "every"),
+        ((watched, poses._replace(away=poses.away[1:]), 0, glances, record), "poses"),
+        ((watched, poses, -1, glances, record), "begin"),
+        ((watched, poses, 0, glances, bins), "a row for every bin"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            watch(*arguments)
+    with pytest.raises(ValueError, match="seen must be"):
+        settle(watched, glances, record.last)

@@ -4,12 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import run, scenario, table
 
 from fleet2d.artifacts.reader import Run
-
-pytestmark = needs_jit
 
 CONFUSION = {"ana": {"ben": 1.0}, "ben": {"ana": 0.5, "cleo": 0.5}}
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.homes import needs_jit
 
 from fleet2d import cli
 from fleet2d.cli import paper
@@ -33,7 +32,6 @@ def reproduce(
     return call
 
 
-@needs_jit
 def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Result]) -> None:
     code, out, _ = reproduce("ltp-gap", *TINY)
     assert 0 == code
@@ -44,7 +42,6 @@ def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Result]) ->
     assert 2 == json.loads(Path("paper/ltp-gap.json").read_text(encoding="utf-8"))["days"]
 
 
-@needs_jit
 def test_units_in_brackets_are_printed(reproduce: Callable[..., Result]) -> None:
     code, out, _ = reproduce("rtp-gap", *TINY, "--out", "here/there")
     assert 0 == code
@@ -52,7 +49,6 @@ def test_units_in_brackets_are_printed(reproduce: Callable[..., Result]) -> None
     assert Path("here/there/rtp-gap.json").exists()
 
 
-@needs_jit
 def test_without_matplotlib_numbers_are_still_written(
     reproduce: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 
 from fleet2d.paper import ltp_gap
 from fleet2d.paper.months import Request, cores, interval, run_all, silent
@@ -16,7 +15,6 @@ def doubled(number: int) -> int:
     return 2 * number
 
 
-@needs_jit
 def test_intervals_hold_the_true_mean_as_often_as_they_say() -> None:
     drawn = np.random.default_rng(5).exponential(1.0, (600, 40))
     held = sum(low <= 1.0 <= high for _, low, high in map(interval, drawn))
@@ -46,7 +44,6 @@ def test_what_goes_wrong_in_a_process_is_raised_here() -> None:
         run_all(doubled, [1, 13, 2, 3], Request(workers=2), silent)
 
 
-@needs_jit
 def test_months_are_the_same_whatever_the_number_of_processes() -> None:
     alone = run_all(ltp_gap.gaps, ONE_DAY, Request(workers=1), silent)
     assert alone == run_all(ltp_gap.gaps, ONE_DAY, Request(workers=2), silent)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 
 from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
@@ -33,7 +32,6 @@ def numbers_of(result: Result) -> dict[str, Any]:
     return {name: value for name, value in result.numbers.items() if name != "seconds"}
 
 
-@needs_jit
 @pytest.mark.parametrize("name", ["ltp-gap", "rtp-gap", "feedback"])
 def test_a_result_is_kept_and_drawn(found: dict[str, Result], name: str, tmp_path: Path) -> None:
     kept = json.loads(found[name].save(tmp_path).read_text(encoding="utf-8"))
@@ -44,12 +42,10 @@ def test_a_result_is_kept_and_drawn(found: dict[str, Result], name: str, tmp_pat
         assert all(len(table.columns) == len(row) for row in table.rows)
 
 
-@needs_jit
 def test_a_result_is_the_same_again(found: dict[str, Result]) -> None:
     assert numbers_of(found["ltp-gap"]) == numbers_of(reproduce("ltp-gap", TWO, silent))
 
 
-@needs_jit
 def test_gaps_are_of_every_room_and_day(found: dict[str, Result]) -> None:
     numbers = found["ltp-gap"].numbers
     assert 2 == len(numbers["gaps"])
@@ -63,7 +59,6 @@ def test_gaps_are_of_every_room_and_day(found: dict[str, Result]) -> None:
     )
 
 
-@needs_jit
 def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     found: dict[str, Result],
 ) -> None:
@@ -73,7 +68,6 @@ def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     assert told["hmm"]["over 4 h"][0] > 0.5
 
 
-@needs_jit
 def test_differences_are_paired_by_seed(found: dict[str, Result]) -> None:
     tv = found["feedback"].numbers["tv"]
     assert set(feedback.POLICIES) == set(tv)
@@ -134,7 +128,6 @@ def test_a_map_that_cannot_be_read_says_so() -> None:
         speed.rows(Request(map=Path("nowhere.yaml")), 30)
 
 
-@needs_jit
 def test_rows_are_measured_in_processes_of_their_own(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

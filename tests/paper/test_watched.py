@@ -3,7 +3,6 @@
 import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
-from tests.homes import needs_jit
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.paper.watched import LiveView, Watching, watch
@@ -24,7 +23,6 @@ def shows(frame: Frame, color: str) -> int:
     return int((np.abs(frame[..., :3] - wanted).max(axis=-1) < 6).sum())
 
 
-@needs_jit
 def test_a_frame_shows_everybody_at_home_and_nobody_away() -> None:
     simulation = at_hour(3)
     view = LiveView(simulation, width=800)
@@ -37,7 +35,6 @@ def test_a_frame_shows_everybody_at_home_and_nobody_away() -> None:
     assert 0 == shows(view.frame(), USER_COLORS[0])
 
 
-@needs_jit
 def test_a_frame_is_the_same_as_one_drawn_afresh() -> None:
     simulation = at_hour(6)
     view = LiveView(simulation, width=400)
@@ -47,7 +44,6 @@ def test_a_frame_is_the_same_as_one_drawn_afresh() -> None:
         assert np.array_equal(LiveView(simulation, width=400).frame(), frame)
 
 
-@needs_jit
 def test_watching_changes_nothing_in_the_run() -> None:
     plain = Simulation("bundled:base", "simulation.duration=2 h", seed=4).run()
     simulation = Simulation("bundled:base", "simulation.duration=2 h", seed=4)
@@ -58,7 +54,6 @@ def test_watching_changes_nothing_in_the_run() -> None:
     assert plain.digest == simulation.finish().digest
 
 
-@needs_jit
 def test_watching_counts_simulated_time_from_the_first_frame() -> None:
     found = watch(Watching("minute", 60, 10, from_hour=1))
     assert 600 == round(found["speedup"] * found["seconds"])

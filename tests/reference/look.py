@@ -1,6 +1,7 @@
 """A slow, obvious twin of the look kernel: cosines to sixty digits, and a look at every wall."""
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -9,11 +10,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from tests.reference.headings import DIGITS, alignment, cosine, sine
-from tests.reference.random import random_bits
+from tests.reference.motion import half_up
+from tests.reference.random import random_bell, random_below, random_bits
 from tests.reference.sight import visible
+
+from fleet2d.kernels import perception
 
 Int64 = npt.NDArray[np.int64]
 LOST, SEEN = 0, 1
+Method = Callable[[int, int, int], int]
+"""Camera, user and step, from the first one on, to points in view."""
 
 
 class Eye(NamedTuple):
@@ -48,6 +54,17 @@ class Body(NamedTuple):
     x: int
     y: int
     away: bool
+    heading: int = 0
+    posture: int = 0
+
+
+class Ghost(NamedTuple):
+    """Somebody who isn't there."""
+
+    x: int
+    y: int
+    heading: int
+    identity: int
 
 
 def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
@@ -79,11 +96,12 @@ def offset(forward: int, left: int, heading: int) -> tuple[int, int]:
     )
 
 
-def pose_of(eye: Eye, robot: Body, heading: int, moment_us: int) -> tuple[Body, int]:
+def pose_of(eye: Eye, robot: Body, moment_us: int) -> tuple[Body, int]:
     """Return where a camera is, and where it looks."""
-    dx, dy = offset(eye.forward, eye.left, heading)
+    dx, dy = offset(eye.forward, eye.left, robot.heading)
     turn = eye.pans[moment_us // eye.pan_us % len(eye.pans)] if eye.pans else 0
-    return Body(robot.x + dx, robot.y + dy, robot.away), (heading + eye.heading + turn) % 4096
+    heading = (robot.heading + eye.heading + turn) % 4096
+    return Body(robot.x + dx, robot.y + dy, robot.away), heading
 
 
 def body_points(eye: Eye, radius: int) -> list[tuple[int, int]]:
@@ -92,8 +110,136 @@ def body_points(eye: Eye, radius: int) -> list[tuple[int, int]]:
     return [(0, 0), *(offset(radius, 0, heading) for heading in around)]
 
 
+@dataclass
+class Errors:
+    """How one camera errs: its part of the tables, the streams of its draws, and what it remembers.
+
+    Tables are read by the kernels' own functions, which have tests of their own; what is drawn
+    when, and what is remembered of it, is told here.
+    """
+
+    tables: perception.ErrorTables
+    camera: int
+    start_us: int = 0
+
+    def __post_init__(self) -> None:
+        users = self.tables.keys.shape[1]
+        self.keys = self.tables.keys[self.camera].tolist()
+        self.ghost_keys = self.tables.ghost_keys[self.camera].tolist()
+        self.row = self.tables.table[self.camera].tolist()
+        self.draws: list[tuple[int, int] | None] = [None] * users  # step and value of the last one
+        self.tracks: list[tuple[int, int] | None] = [None] * users  # last step, and taken for whom
+
+    def _share(self, user: int, purpose: int, step: int) -> int:
+        return random_bits(self.keys[user][purpose], step) // 2**33
+
+    def _noise(self, key: int, counter: int, noise: int) -> int:
+        return half_up(Fraction(random_bell(key, counter) * noise, 2**16))
+
+    def notices(
+        self, u: int, now: int, step_us: int, heading: int, away: tuple[int, int], user: Body,
+        shown: int, chance: int,
+    ) -> bool:  # fmt: skip
+        """Return whether a user who is `away` from the camera is noticed."""
+        k = perception
+        last, value = self.draws[u], 0
+        lasts = False
+        if last is not None and self.row[k.AT_STAY] != 0:
+            share = self._share(u, k.UserDraw.ATTEND, now)
+            lasts = share < k.lasting(self.tables.table, self.camera, now - last[0])
+        if last is not None and lasts:
+            value = last[1]
+        else:
+            value = random_bits(self.keys[u][k.UserDraw.DETECT], now) // 2**11
+        self.draws[u] = now, value
+        minute = (self.start_us + now * step_us) // 60_000_000 % 1440
+        steady = k.steady_chance(
+            self.tables.table, self.camera, heading, *away, user.heading, user.posture, shown
+        )
+        return value < k.notice_chance(steady, self.row[k.AT_LIGHT + minute], chance)
+
+    def taken_for(self, u: int, now: int, away: tuple[int, int], patience: int) -> int:
+        """Return for whom a noticed user is taken; -1 for nobody known."""
+        k, before = perception, self.tracks[u]
+        if before is not None and self.row[k.KEEPS] == 1 and now - before[0] < patience:
+            identity = before[1]
+        else:
+            bin_ = k.distance_bin(self.tables.table, self.camera, *away)
+            right, mistaken = self.row[k.AT_RIGHT + bin_], self.row[k.AT_MISTAKEN + bin_]
+            draw, identity = self._share(u, k.UserDraw.IDENTIFY, now), -1
+            if draw < right:
+                identity = u
+            elif draw < right + mistaken:
+                other = self._share(u, k.UserDraw.MISTAKE, now)
+                whom = self.tables.whom[self.camera, u].tolist()
+                identity = next((i for i, end in enumerate(whom) if other < end), -1)
+        self.tracks[u] = now, identity
+        return identity
+
+    def perceived(self, u: int, now: int, away: tuple[int, int], user: Body) -> tuple[int, ...]:
+        """Return x and y beside where the user is, heading and posture, as perceived."""
+        k, table, c = perception, self.tables.table, self.camera
+        dx, dy = k.blurred(table, self.tables.keys, c, u, now, *away)
+        turn = self._noise(self.keys[u][k.UserDraw.HEADING], now, self.row[k.HEADING_NOISE])
+        posture = k.seeming(table, c, user.posture, self._share(u, k.UserDraw.POSTURE, now))
+        return dx - away[0], dy - away[1], (user.heading + turn) % 4096, posture
+
+    def ghosts(self, walls: Int64, eye: Eye, at: Body, heading: int, now: int) -> list[Ghost]:
+        """Return the false positives of a look."""
+        if not self.tables.haunted[self.camera]:
+            return []
+        of = dict(zip(perception.GhostDraw, self.ghost_keys, strict=True))
+        keys = {purpose: random_bits(key, now) for purpose, key in of.items()}
+        draw = random_bits(of[perception.GhostDraw.COUNT], now) // 2**33
+        found = []
+        for number in range(_outcome(self.tables.ghosts[self.camera].tolist(), draw)):
+            share = random_bits(keys[perception.GhostDraw.SOURCE], number) // 2**33
+            source = _outcome(self.tables.source[self.camera].tolist(), share)
+            key = random_bits(keys[perception.GhostDraw.PLACE], number)
+            place = self._place(walls, eye, at, heading, source, key)
+            if place is None:
+                continue
+            share = random_bits(keys[perception.GhostDraw.IDENTITY], number) // 2**33
+            who = _outcome(self.tables.looks_like[self.camera].tolist(), share)
+            faces = random_below(keys[perception.GhostDraw.HEADING], number, 4096)
+            found.append(Ghost(*place, faces, who if who < len(self.keys) else -1))
+        return found
+
+    def _place(
+        self, walls: Int64, eye: Eye, at: Body, heading: int, source: int, key: int
+    ) -> tuple[int, int] | None:
+        """Return where a false positive of a source appears, if it does."""
+        here = np.array([at.x, at.y])
+        if source > 0:
+            x, y, noise = self.tables.spot[self.camera, source].tolist()
+            dx, dy = x - at.x, y - at.y
+            if not _in_range(eye, dx, dy) or not in_wedge(heading, eye.half_angle, dx, dy):
+                return None
+            there = (x + self._noise(key, 0, noise), y + self._noise(key, 1, noise))
+            return there if visible(walls, here, np.array([there]))[0] else None
+        half = min(eye.half_angle, 4096)
+        for attempt in range(64):
+            part = random_below(key, 2 * attempt, 2**20)
+            reach = math.isqrt(eye.near**2 + (eye.far**2 - eye.near**2) * part // 2**20)
+            turned = 2 * heading + random_below(key, 2 * attempt + 1, 2 * half) - half
+            dx, dy = (
+                half_up(Fraction(reach * round(f(turned) * 2**30), 2**30)) for f in (cosine, sine)
+            )
+            there = (at.x + dx, at.y + dy)
+            if visible(walls, here, np.array([there]))[0]:
+                return there
+        return None
+
+
+def _outcome(sums: list[int], draw: int) -> int:
+    return next((i for i, end in enumerate(sums) if draw < end), len(sums))
+
+
 class Look(NamedTuple):
-    """What came of looking: (known at, camera, user, x, y), (step, identity, kind), looks."""
+    """What came of looking.
+
+    Sightings have the columns of the kernel's; events are (step, identity, kind).
+    """
 
     done: int
     sightings: list[tuple[int, ...]]
@@ -104,7 +250,7 @@ class Look(NamedTuple):
 def look(
     walls: Int64,
     eyes: list[Eye],
-    robot: list[tuple[Body, int]],
+    robot: list[Body],
     users: list[list[Body]],
     radii: list[int],
     keys: list[list[int]],
@@ -112,35 +258,71 @@ def look(
     first: int,
     known: list[Known],
     stops: tuple[bool, bool],
+    errors: Sequence[Errors | None] = (),
+    method: Method | None = None,
 ) -> Look:
     """Look at all users in each step, and tell what becomes known.
 
-    `robot` is its body and heading in each step, `users` a list of bodies for each user, `keys`
-    the streams of each camera's users.
+    Args:
+        walls: int64 (w, 4), pieces of wall.
+        eyes: The cameras.
+        robot: Where it is in each step.
+        users: Where each of them is in each step.
+        radii: Of the users.
+        keys: The streams of each camera's users, of one that doesn't err.
+        step_us: Length of a step.
+        first: The first step.
+        known: What is carried along for each identity; updated.
+        stops: Whether it ends when somebody is lost, and when somebody is seen.
+        errors: How each camera errs; None for one that doesn't.
+        method: How many points of a user a camera has in view at a step, instead of lines of sight.
     """
     sightings: list[tuple[int, ...]] = []
     events: list[tuple[int, int, int]] = []
     waiting: list[tuple[int, ...]] = []
     counts = [[[0, 0] for _ in users] for _ in eyes]
     patience = max(eye.patience for eye in eyes)
-    for j, (body, heading) in enumerate(robot):
+    for j, body in enumerate(robot):
         step, stop = first + j, False
         for c, eye in enumerate(eyes):
             if body.away or step % eye.period != 0:
                 continue
-            at, towards = pose_of(eye, body, heading, step * step_us)
+            at, towards = pose_of(eye, body, step * step_us)
+            errs = errors[c] if errors else None
             for u, user in enumerate(users):
-                if user[j].away or not _in_view(walls, eye, at, towards, user[j], radii[u]):
+                if user[j].away:
+                    continue
+                if method is None:
+                    shown = _points_in_view(walls, eye, at, towards, user[j], radii[u])
+                else:
+                    shown = method(c, u, j)
+                if shown == 0:
                     continue
                 counts[c][u][0] += 1
-                if random_bits(keys[c][u], step) // 2**11 < eye.chance:
+                away = user[j].x - at.x, user[j].y - at.y
+                truth = (user[j].x, user[j].y, user[j].heading, user[j].posture)
+                identity, seems = u, truth
+                if errs is None:
+                    noticed = random_bits(keys[c][u], step) // 2**11 < eye.chance
+                else:
+                    noticed = errs.notices(
+                        u, step, step_us, towards, away, user[j], shown, eye.chance
+                    )
+                if noticed and errs is not None:
+                    identity = errs.taken_for(u, step, away, patience)
+                    dx, dy, heading, posture = errs.perceived(u, step, away, user[j])
+                    seems = (user[j].x + dx, user[j].y + dy, heading, posture)
+                if noticed:
                     counts[c][u][1] += 1
-                    waiting.append((step + eye.latency, c, u, user[j].x, user[j].y))
+                    waiting.append((step + eye.latency, c, u, identity, *seems, *truth))
+            for ghost in errs.ghosts(walls, eye, at, towards, step) if errs else ():
+                seems = (ghost.x, ghost.y, ghost.heading, 0)
+                waiting.append((step + eye.latency, c, -1, ghost.identity, *seems, *seems))
         told = sorted((row for row in waiting if row[0] == step), key=lambda row: row[1])
         waiting = [row for row in waiting if row[0] > step]
         sightings += told
         for row in told:
-            known[row[2]].noticed = step
+            known[row[3]].noticed = step  # -1, somebody unknown, is the last one
         for identity, memory in enumerate(known):
             lately = memory.seen and step - memory.noticed < patience
             seen = memory.noticed == step or lately
@@ -154,14 +336,19 @@ def look(
     return Look(len(robot), sightings, events, counts)
 
 
-def _in_view(walls: Int64, eye: Eye, at: Body, heading: int, user: Body, radius: int) -> bool:
-    """Return whether a point of a user's body is in range, in the wedge, and behind no wall."""
+def _in_range(eye: Eye, dx: int, dy: int) -> bool:
+    return eye.near**2 <= dx * dx + dy * dy <= eye.far**2
+
+
+def _points_in_view(walls: Int64, eye: Eye, at: Body, heading: int, user: Body, radius: int) -> int:
+    """Return how many points of a body are in range, in the wedge, and behind no wall."""
+    count = 0
     for px, py in body_points(eye, radius):
         dx, dy = user.x + px - at.x, user.y + py - at.y
         if (
-            eye.near**2 <= dx * dx + dy * dy <= eye.far**2
+            _in_range(eye, dx, dy)
             and in_wedge(heading, eye.half_angle, dx, dy)
             and visible(walls, np.array([at.x, at.y]), np.array([[at.x + dx, at.y + dy]]))[0]
         ):
-            return True
-    return False
+            count += 1
+    return count

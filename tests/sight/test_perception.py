@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
-from tests.homes import needs_jit
 from tests.sight.watching import (
     PILLAR,
     SIDE_M,
@@ -24,8 +23,6 @@ from tests.sight.watching import (
 )
 
 from fleet2d.kernels.look import HEADING, IDENTITY, POSTURE, STEP, TRUE_X, TRUE_Y, USER, X, Y
-
-pytestmark = needs_jit
 
 N = 60_000
 RNG = np.random.default_rng(0)

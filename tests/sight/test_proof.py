@@ -7,11 +7,8 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 
 import fleet2d
-
-pytestmark = needs_jit
 
 PLANS = {
     "houseexpo/658e5214673c7a4e25b458e56bdb6144.json": 5,

@@ -17,7 +17,7 @@ from tests.homes import SUB, Home, home_of
 from fleet2d.floorplan.mesh import snap_polygon
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.region import region_outline, visible_region
-from fleet2d.kernels.sight import line_of_sight, scratch_for
+from fleet2d.kernels.sight import line_of_sight
 
 # A user's position is rounded by at most half a lattice unit on each axis.
 MARGIN_PX = 1
@@ -39,11 +39,8 @@ def lattice(x: float, y: float) -> tuple[int, int]:
 
 def area_px2(home: Home, x: int, y: int) -> float:
     """Return the area visible from a lattice point, in square pixels; 0 in a wall."""
-    wall, stack = scratch_for(home.mesh.vertices)
-    right = np.empty_like(wall)
-    pieces = visible_region(home.mesh, x, y, locate(home.mesh, x, y), right, wall, stack)
-    outline = np.empty((2 * pieces, 2))
-    return region_outline(home.mesh, x, y, right[:pieces], wall[:pieces], outline) / SUB**2
+    _, area = region_outline(home.mesh, x, y, *visible_region(home.mesh, x, y))
+    return area / SUB**2
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ import numpy.typing as npt
 import shapely
 from tests.homes import home_of
 
-from fleet2d.engine.buckets import new_memory
+from fleet2d.engine.cameras import new_memory
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels.look import SIGHTING, Crowd, Memory, Rule, SightEvents, look
+from fleet2d.kernels.look import Memory, Rule, look
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.perception import MOST_GHOSTS
+from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import Scene, error_tables, stack_lenses
@@ -89,26 +89,15 @@ class Watch:
         robot = (
             np.tile([SIDE_M / 2, SIDE_M / 2, 0.0], (steps, 1)) if self.robot is None else self.robot
         )
-        sightings = np.empty((3 * (count + 1) * steps + burst, SIGHTING), np.int64)
-        events = SightEvents(
-            *(np.empty((count + 1) * steps, dtype) for dtype in (np.int64, np.int32, np.int32))
-        )
-        posture = np.zeros((count, steps), np.int8) if self.posture is None else self.posture
-        none = np.zeros((count, steps), np.uint8)
-        done, found, _ = look(
-            self.walls,
-            stack_lenses([lens], [True], scene),
-            errors,
-            rule,
-            Poses(*_lattice(robot), none[0] if count else np.zeros(steps, np.uint8)),
-            Crowd(*_lattice(self.users), none, posture),
-            self.first,
-            self.memory,
-            sightings,
-            events,
-        )
+        posture = np.zeros((count + 1, steps), np.int8)
+        if self.posture is not None:
+            posture[1:] = self.posture
+        poses = _lattice(np.concatenate([robot[None], self.users]))
+        window = Window(self.first, *poses, np.zeros((count + 1, steps), np.uint8), posture)
+        lenses = stack_lenses([lens], [True], scene)
+        done, sightings, *_ = look(self.walls, lenses, errors, rule, window, 0, 1, self.memory)
         assert done == steps
-        return sightings[:found]
+        return sightings
 
 
 def _lattice(poses: Float64) -> list[Int64]:

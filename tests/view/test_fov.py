@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from tests.homes import needs_jit
 from tests.scenes import flat_path
 
 import fleet2d
@@ -15,8 +14,6 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.view.fov import Pose, cells_panel, draw_fov, draw_fov_alone, parse_pose, region_panel
-
-pytestmark = needs_jit
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from tests.homes import needs_jit
 from tests.scenes import flat_path, run, scenario
 
 import fleet2d
@@ -15,8 +14,6 @@ from fleet2d.errors import ArtifactError, InputError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.view.floorplan import floorplan_axes
 from fleet2d.view.layers import draw_layer, layer_on_axes
-
-pytestmark = needs_jit
 
 
 @pytest.fixture(scope="module")

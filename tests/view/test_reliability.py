@@ -5,13 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import run, scenario, table
 
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.view.reliability import draw_reliability, forecasts_of
-
-pytestmark = needs_jit
 
 
 @pytest.fixture(scope="module")

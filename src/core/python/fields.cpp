@@ -1,8 +1,101 @@
+#include "../fields.hpp"
+
 #include "arrays.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
+namespace {
 
-void bind_fields(nb::module_&) {}
+using Cell = std::pair<i64, i64>;
+
+GridCell grid_cell(Cell cell) { return {cell.first, cell.second}; }
+
+// The cell, which must be one of the grid.
+GridCell cell_of(View<const i32, 2> cost, Cell cell) {
+    require(is_inside(cost.shape, grid_cell(cell)), "there is no such cell");
+    return grid_cell(cell);
+}
+
+void check_costs(View<const i32, 2> cost) {
+    require(all_in_range(cost, -1, MOST_COST + 1), "costs must be in 0 to 1000, or -1 where no way leads");
+}
+
+}  // namespace
+
+void bind_fields(nb::module_& m) {
+    m.attr("MOST_COST") = MOST_COST;
+
+    m.def("squared_distance", &squared_distance, "mask"_a, Unlocked(),
+          R"(Return each cell's exact squared distance to the nearest cell that is not in `mask`.
+
+What lies outside the array counts for nothing: surround the mask by one line of False where the
+border is a wall.
+
+Args:
+    mask: Cells to measure, bool (rows, columns).
+
+Returns:
+    Squared distances in cells, int64 (rows, columns); 0 outside the mask, and
+    (rows + columns)² everywhere in a mask that has no outside.)");
+    m.def("walking_distance",
+          [](View<const bool, 2> mask, View<const i64, 2> goals) {
+              require(goals.shape[1] == 2, "goals must be (n, 2)");
+              return walking_distance(mask, goals);
+          },
+          "mask"_a, "goals"_a, Unlocked(),
+          R"(Return how far each cell is from the nearest goal, walking from cell to cell.
+
+A step to a side costs 5 and one across a corner 7, which is open only if both cells beside it
+are.
+
+Args:
+    mask: Cells that can be walked, bool (rows, columns).
+    goals: Goal cells, int64 (n, 2) as (row, column); those outside the mask count for nothing.
+
+Returns:
+    int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.)");
+    m.def("cost_distance",
+          [](View<const i32, 2> cost, Cell goal, Cell start) {
+              check_costs(cost);
+              return cost_distance(cost, cell_of(cost, goal), grid_cell(start));
+          },
+          "cost"_a, "goal"_a, "start"_a, Unlocked(),
+          R"(Return what the cheapest way from each cell to a goal costs, walking from cell to cell.
+
+A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
+are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
+
+Args:
+    cost: int32 (rows, columns), in percent of what a way costs besides: 100 counts double; from
+        0 to 1000, or -1 where no way leads.
+    goal: The goal's cell (row, column).
+    start: The cell to come from: what is farther away than it is not worked out. With one outside
+        the grid everything is.
+
+Returns:
+    int64 (rows, columns), in 1/1000 of a cell's side at no cost; -1 where no way is known.)");
+    m.def("step_cost",
+          [](View<const i32, 2> cost, i64 row, i64 column, i64 r, i64 c) {
+              return step_cost(cost, cell_of(cost, {row, column}), cell_of(cost, {r, c}));
+          },
+          "cost"_a, "row"_a, "column"_a, "r"_a, "c"_a,
+          "Return what a step between two neighboring cells costs, [1/1000 of a cell's side].");
+    m.def("descend",
+          [](View<const i32, 2> cost, View<const i64, 2> distance, Cell start) {
+              check_costs(cost);
+              require(cost.shape == distance.shape, "cost and distance must have one shape");
+              return descend(cost, distance, cell_of(cost, start));
+          },
+          "cost"_a, "distance"_a, "start"_a, Unlocked(),
+          R"(Return the cells of a cheapest way from a cell to the goal; ties: the first neighbor.
+
+Args:
+    cost: int32 (rows, columns), as for `cost_distance`.
+    distance: int64 (rows, columns), what `cost_distance` returned for the same costs.
+    start: The cell to start from (row, column).
+
+Returns:
+    int64 (n, 2) as (row, column); no cell if no way from the start is known.)");
+}
 
 }  // namespace fleet2d

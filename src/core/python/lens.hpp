@@ -8,7 +8,7 @@ namespace fleet2d {
 
 template <>
 struct border::Fields<Lenses> {
-    static constexpr auto name = nb::detail::const_name("tuple");
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
     static constexpr auto members = std::tuple(
         &Lenses::near_squared, &Lenses::far_squared, &Lenses::half_angle, &Lenses::chance, &Lenses::moves,
         &Lenses::forward, &Lenses::left, &Lenses::heading, &Lenses::pans, &Lenses::pan_count, &Lenses::pan_us,

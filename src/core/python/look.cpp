@@ -1,8 +1,154 @@
-#include "arrays.hpp"
+#include "../look.hpp"
+
+#include <nanobind/stl/optional.h>
+
+#include <cstddef>
+#include <cstring>
+
+#include "lens.hpp"
+#include "mesh.hpp"
+#include "perception.hpp"
 #include "subjects.hpp"
+#include "timelines.hpp"
 
 namespace fleet2d {
 
-void bind_look(nb::module_&) {}
+template <>
+struct border::Fields<Memory> {
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
+    static constexpr auto members = std::tuple(&Memory::noticed, &Memory::seen, &Memory::about, &Memory::backlog,
+                                               &Memory::waiting);
+};
+template <>
+struct border::Fields<Rule> {
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
+    static constexpr auto members = std::tuple(&Rule::patience, &Rule::step_us, &Rule::start_us, &Rule::burst,
+                                               &Rule::stop_lost, &Rule::stop_seen);
+};
+
+namespace {
+
+enum class SightingColumn : i64 {};
+
+constexpr i64 FARTHEST = 1 << 29;  // squares of distances stay inside 64 bits
+constexpr i64 LAST_STEP = i64{1} << 61;
+
+void check_window(const Window& window, Onlooker onlooker, i64 users) {
+    require(0 <= onlooker.body && onlooker.body < window.bodies(), "there is no such body");
+    require(0 <= onlooker.first_other && onlooker.first_other + users <= window.bodies(), "there are fewer others");
+    require(all_in_range(window.x, -FARTHEST, FARTHEST) && all_in_range(window.y, -FARTHEST, FARTHEST),
+            "bodies must be within 2**29 lattice units");
+    require(all_in_range(window.posture, 0, POSTURES), "a posture must be 0, 1 or 2");
+    require(0 <= window.first && window.end < LAST_STEP, "steps must be 0 or more");
+}
+
+Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
+    auto rows = Array<i64, 2>::empty({static_cast<i64>(sightings.size()), SIGHTING});
+    if (!sightings.empty()) std::memcpy(rows.data(), sightings.data(), sightings.size() * sizeof(Sighting));
+    return rows;
+}
+
+void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
+    require(memory.noticed.size() == users + 1 && memory.seen.size() == users + 1,
+            "noticed and seen must have one length, that of the users and one more");
+    require(all_in_range<i64>(memory.seen, 0, 2), "seen must be 0 or 1");
+    require(memory.about.shape == std::array{cameras, users, ABOUT}, "about must be (cameras, users, ABOUT)");
+    require(memory.backlog.size() == cameras && memory.backlog.shape[2] == SIGHTING,
+            "backlog must be (cameras, rows, SIGHTING)");
+    require(memory.waiting.shape == std::array{cameras, i64{2}}, "waiting must be (cameras, 2)");
+    const i64 rows = memory.backlog.shape[1];
+    for (i64 c = 0; c < cameras; ++c) {
+        const i64 burst = users + (errors.haunted[c] != 0 ? MOST_GHOSTS : 0);
+        require((lenses.latency[c] / lenses.period[c] + 1) * burst <= rows, "backlog must have room for all that waits");
+        for (i64 u = 0; u < users; ++u) {
+            const i64 identity = at(memory.about[c][u], About::TAKEN_FOR);
+            require(NOBODY <= identity && identity < users, "about must hold numbers of users, or NOBODY");
+        }
+        const i64 begin = memory.waiting(c, 0), length = memory.waiting(c, 1);
+        require(0 <= begin && begin <= rows && 0 <= length && length <= rows, "waiting must lie in the backlog");
+        for (i64 i = 0; i < length; ++i) {
+            const i64 identity = memory.backlog(c, (begin + i) % rows, offsetof(Sighting, identity) / sizeof(i64));
+            require(NOBODY <= identity && identity < users, "backlog must hold numbers of users, or NOBODY");
+        }
+    }
+}
+
+}  // namespace
+
+void bind_look(nb::module_& m) {
+    const auto column = [](std::size_t offset) { return static_cast<SightingColumn>(offset / sizeof(i64)); };
+    nb::enum_<SightingColumn>(m, "SightingColumn", nb::is_arithmetic(), R"(The columns of a row of sightings.
+
+Where a camera was wrong about a person, USER is NOBODY; where it didn't recognize one, IDENTITY
+is. X to POSTURE are as perceived.)")
+        .value("STEP", column(offsetof(Sighting, step)), "When it becomes known.")
+        .value("CAMERA", column(offsetof(Sighting, camera)))
+        .value("USER", column(offsetof(Sighting, user)))
+        .value("IDENTITY", column(offsetof(Sighting, identity)))
+        .value("X", column(offsetof(Sighting, x)), "Lattice units.")
+        .value("Y", column(offsetof(Sighting, y)))
+        .value("HEADING", column(offsetof(Sighting, heading)), "1/4096 turn.")
+        .value("POSTURE", column(offsetof(Sighting, posture)), "0 stands, 1 sits, 2 lies.")
+        .value("TRUE_X", column(offsetof(Sighting, true_x)))
+        .value("TRUE_Y", column(offsetof(Sighting, true_y)))
+        .value("TRUE_HEADING", column(offsetof(Sighting, true_heading)))
+        .value("TRUE_POSTURE", column(offsetof(Sighting, true_posture)));
+    m.attr("USER_LOST") = static_cast<i64>(SightEvent::LOST);
+    m.attr("USER_SEEN") = static_cast<i64>(SightEvent::SEEN);
+
+    m.def("look",
+          [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
+             i64 body, i64 first_other, const Memory& memory, std::optional<View<const u8, 3>> shown) {
+              check_lenses(lenses);
+              const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
+              require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
+              require(all_in_range(lenses.latency, 0, LAST_STEP), "latency must be 0 or more");
+              check_errors(errors, lenses.errs, users);
+              check_window(window, {body, first_other}, users);
+              check_memory(memory, lenses, errors, cameras, users);
+              const View<const u8, 3> given = shown.value_or(View<const u8, 3>());
+              if (shown) {
+                  require(given.shape == std::array{cameras, users, window.end - window.first},
+                          "shown must be (cameras, users, steps)");
+                  require(all_in_range(given, 0, MOST_SHOWN), "shown must be below MOST_SHOWN");
+              }
+              LookResult result;
+              {
+                  const nb::gil_scoped_release unlocked;
+                  result = look(walls, lenses, errors, rule, window, {body, first_other}, memory, given);
+              }
+              const i64 count = static_cast<i64>(result.events.size());
+              auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});
+              auto kind = Array<i64>::empty({count});
+              for (i64 i = 0; i < count; ++i) {
+                  const IdentityEvent& event = result.events[static_cast<std::size_t>(i)];
+                  step[i] = event.step, identity[i] = event.identity, kind[i] = static_cast<i64>(event.kind);
+              }
+              return std::tuple(result.steps, rows_of(result.sightings), std::move(step), std::move(identity),
+                                std::move(kind));
+          },
+          "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
+          "shown"_a = nb::none(), R"(Look at all others in the steps of a window, up to the first with an event that stops it.
+
+Args:
+    walls: The free space.
+    lenses: The cameras of a body.
+    errors: How they err.
+    rule: What holds for all of them.
+    window: How all bodies move.
+    body: Number of the body that has the cameras.
+    first_other: Number of the first of the others, who are as many as the lenses' users.
+    memory: What the body carries from span to span; updated.
+    shown: uint8 (cameras, users, steps), how many points of each are in view, where another method
+        decides that; None: lines of sight do.
+
+Returns:
+    The steps done (the stopping one included); what was perceived, int64 (n, SIGHTING), see
+    `SightingColumn`; and who came into view or was lost, in order of (step, identity): step, identity
+    and kind (USER_SEEN or USER_LOST), int64 (m,) each.
+
+Raises:
+    ValueError: Shapes don't agree, or a number is none of a user or camera.)");
+}
 
 }  // namespace fleet2d

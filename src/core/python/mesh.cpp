@@ -20,10 +20,10 @@ OwnedMesh::OwnedMesh(View<const i64, 2> vertices, View<const i32, 2> triangles, 
             const i64 other = neighbors(i, k);
             bool mutual = other == WALL;
             for (i64 j = 0; j < 3 && !mutual; ++j) {
-                mutual = triangles(other, j) == triangles(i, following_edge(k)) &&
+                mutual = neighbors(other, j) == i && triangles(other, j) == triangles(i, following_edge(k)) &&
                          triangles(other, following_edge(j)) == triangles(i, k);
             }
-            require(mutual, "a triangle and its neighbor must share an edge");
+            require(mutual, "a triangle and its neighbor must share an edge, and be each other's neighbor there");
         }
         require(orient(xy[0], xy[1], xy[2], xy[3], xy[4], xy[5]) > 0, "triangles must be counter-clockwise");
     }
@@ -31,7 +31,10 @@ OwnedMesh::OwnedMesh(View<const i64, 2> vertices, View<const i32, 2> triangles, 
     triangles_ = Array<i32, 2>::copy_of(triangles);
     neighbors_ = Array<i32, 2>::copy_of(neighbors);
     buckets_ = build_buckets(vertices_, triangles_);
-    mesh_ = {vertices_, triangles_, neighbors_, buckets_.start, buckets_.triangles, buckets_.columns, buckets_.rows};
+    mesh_ = {vertices_, triangles_, neighbors_, buckets_.start, buckets_.triangles, buckets_.columns, buckets_.rows,
+             {}};
+    beyond_ = build_beyond(mesh_);
+    mesh_.beyond = beyond_;
 }
 
 namespace {
@@ -88,7 +91,7 @@ Raises:
                  return OwnedMesh(self.mesh().vertices, self.mesh().triangles, neighbors);
              },
              "neighbors"_a, "Return the mesh with other walls: `neighbors` as for the class.")
-        .def("__getstate__", &arrays_of)
+        .def("__getstate__", &arrays_of, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
         .def("__setstate__", [](OwnedMesh& self, std::tuple<Vertices, Triangles, Triangles> state) {
             new (&self) OwnedMesh(std::get<0>(state), std::get<1>(state), std::get<2>(state));
         });

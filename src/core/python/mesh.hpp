@@ -19,6 +19,7 @@ private:
     Array<i32, 2> triangles_;
     Array<i32, 2> neighbors_;
     Buckets buckets_;
+    Array<Beyond> beyond_;
     Mesh mesh_;
 };
 

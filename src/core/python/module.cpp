@@ -28,4 +28,5 @@ NB_MODULE(_core, m) {
     bind_presence(m);
     bind_stays(m);
     bind_smoothing(m);
+    bind_timelines(m);
 }

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.log import Event
 from fleet2d.algorithms.log import Log as Log
 from fleet2d.algorithms.observations import Looks, Observations, Truth, truth
 from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.errors import ComponentError
+from fleet2d.events import Event
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,7 @@ class History:
             ComponentError: The asker is an algorithm.
         """
         self._check_metric("looks")
-        users = sum(path.startswith("users.") for path in self.log.paths)
-        return self.log.looks(self.first, self.end, users)
+        return self.log.looks(self.first, self.end, self.log.users)
 
     @cached_property
     def exposure(self) -> NDArray[np.int64]:
@@ -141,8 +140,7 @@ class History:
             ComponentError: The asker has no needs = {"evidence"}, or no period of whole minutes.
         """
         self._check_needs("evidence")
-        users = sum(path.startswith("users.") for path in self.log.paths)
-        return self.log.evidence(self.first, self.end, users)
+        return self.log.evidence(self.first, self.end, self.log.users)
 
     def _check_needs(self, what: str) -> None:
         if what not in self.needs:

@@ -1,9 +1,7 @@
 """What is kept of a run: motions, observations and events, as far back as somebody may ask."""
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass
-from itertools import takewhile
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,36 +18,13 @@ from fleet2d.algorithms.observations import (
 )
 from fleet2d.algorithms.patches import Patches
 from fleet2d.algorithms.poses import BodyPoses
-from fleet2d.entities.plan import Motion, State
 from fleet2d.errors import ComponentError
+from fleet2d.events import HOME, Event, EventKind
 from fleet2d.kernels.look import IDENTITY, STEP, X, Y
-from fleet2d.kernels.motion import Poses, empty_poses, paste_poses
+from fleet2d.kernels.timelines import Window
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
     from fleet2d.floorplan.home import Home
-
-
-HOME = ""  # the entity of events of the home itself
-SENSOR = "sensor"  # what is called when a sensor says something
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A motion followed from step `first` on, by a body that was at `start` then."""
-
-    first: int
-    start: State
-    motion: Motion
-
-
-class Event(NamedTuple):
-    """Something that a plan said happens: a row of the table of events."""
-
-    step: int
-    entity: str  # the name of the body
-    event: str
-    detail: str
 
 
 class SensorRow(NamedTuple):
@@ -61,50 +36,34 @@ class SensorRow(NamedTuple):
     activity: str
 
 
-class Sights(NamedTuple):
-    """Who came into view of the cameras of a body, and who was lost, in a span.
+class Motions(Protocol):
+    """How the bodies of a run move."""
 
-    Attributes:
-        entity: Name of the body.
-        events: What is called when somebody is lost, and when somebody is seen.
-        others: Names of those that it can see; behind them comes somebody unknown.
-        step: int64 (n,), in order.
-        user: int64 (n,), index of who.
-        kind: int64 (n,), index of the event.
-        end: One past the last step of the span.
-    """
-
-    entity: str
-    events: tuple[str, str]
-    others: Sequence[str]
-    step: NDArray[np.int64]
-    user: NDArray[np.int64]
-    kind: NDArray[np.int64]
-    end: int
-
-    def between(self, first: int, end: int) -> list[Event]:
-        """Return those of the steps from `first` to `end` - 1."""
-        here = slice(*np.searchsorted(self.step, (first, end)).tolist())
-        rows = zip(
-            *(column[here].tolist() for column in (self.step, self.user, self.kind)), strict=True
-        )
-        names = (*self.others, "")
-        return [Event(step, self.entity, self.events[kind], names[who]) for step, who, kind in rows]
+    def runs(self, row: int, first: int, end: int) -> Window:
+        """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
 
 
 class Log:
     """The motions and observations of a run, as far back as somebody may ask."""
 
-    def __init__(self, home: "Home", actors: "Sequence[Actor]") -> None:
+    def __init__(
+        self, home: "Home", paths: Mapping[str, str], motions: Motions, activities: Activities
+    ) -> None:
+        """Begin with nothing.
+
+        Args:
+            home: The home.
+            paths: Of each body by name, users first: "users.ana".
+            motions: How they move.
+            activities: What users do.
+        """
         self.home = home
-        self.index = {actor.name: i for i, actor in enumerate(actors)}
-        self.paths = [actor.path for actor in actors]
-        self.pieces: list[list[Piece]] = [[] for _ in actors]
+        self.index = {name: row for row, name in enumerate(paths)}
+        self.users = sum(path.startswith("users.") for path in paths.values())
+        self.activities = activities
+        self._motions = motions
         self._observations = Blocks()  # (n, OBSERVATION), by step
-        self._actors = actors
-        # Of plans that were replaced, with the step at which they were: no later than the event.
-        self._events: list[tuple[int, Event]] = []
-        self.sights: list[Sights] = []
+        self._events: list[Event] = []
         self.readings: list[SensorRow] = []
         self.cameras: list[tuple[int, str]] = []  # index of the robot, and name
         self._looks: dict[int, NDArray[np.int64]] = {}
@@ -115,82 +74,52 @@ class Log:
         self.patches: Patches | None = None  # that bins of evidence tell apart
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
-        self.activities = Activities(0, {})
-        self._traced: dict[tuple[str, int, int], BodyPoses] = {}
+        self._poses: dict[tuple[str, int, int], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
         """Drop what is only needed for steps earlier than `before`."""
-        self._traced.clear()
-        for pieces in self.pieces:
-            keep = max((i for i, piece in enumerate(pieces) if piece.first <= before), default=0)
-            del pieces[:keep]
+        self._poses.clear()
         self._observations.forget(before)
         self.readings = [row for row in self.readings if row.step >= before]
-        self._events = [(at, event) for at, event in self._events if event.step >= before]
-        self.sights = [sights for sights in self.sights if sights.end > before]
+        self._events = [event for event in self._events if event.step >= before]
         self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
         self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
         if self.bin_steps:
             self._bins.forget(before // self.bin_steps)
 
-    def tell(self, actor: "Actor", step: int) -> None:
-        """Keep what the plan of a body said happens up to `step`, at which it is replaced."""
-        if actor.plan.notes:
-            self._events += [(step, event) for event in _events(actor) if event.step <= step]
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Keep the events of bodies."""
+        self._events += [event for event in events if event.entity in self.index]
 
-    def next_note(self, step: int, names: Set[str]) -> int | None:
-        """Return the next step from `step` on at which a plan says one of these happens."""
-        notes = [event for actor in self._actors for event in _events(actor)]
-        notes += [event for _, event in self._told_from(step)]
-        steps = (event.step for event in notes if event.event in names and event.step >= step)
+    def next_event(self, step: int, kinds: Set[str]) -> int | None:
+        """Return the step of the first known event of these kinds from `step` on."""
+        steps = (e.step for e in self._events if e.event in kinds and e.step >= step)
         return min(steps, default=None)
-
-    def _told_from(self, step: int) -> list[tuple[int, Event]]:
-        """Return what plans that were replaced at `step` or later said."""
-        return list(takewhile(lambda item: item[0] >= step, reversed(self._events)))[::-1]
 
     def events(self, first: int, end: int) -> list[Event]:
         """Return what happened in the steps from `first` to `end` - 1, in order.
 
-        What plans said happens, and who came into view or was lost.
+        What plans note, and who came into view or was lost.
         """
-        going_on = [event for actor in self._actors for event in _events(actor)]
-        found = [event for _, event in self._told_from(first)] + going_on
-        found = [event for event in found if first <= event.step < end]
-        for sights in takewhile(lambda sights: sights.end > first, reversed(self.sights)):
-            found += sights.between(first, end)
         order = self.index
-        return sorted(found, key=lambda event: (event.step, order[event.entity]))
+        events = [event for event in self._events if first <= event.step < end]
+        return sorted(events, key=lambda e: (e.step, order[e.entity], e.rank))
 
     def happened(self, step: int) -> list[Event]:
         """Return what happened at one step, readings of sensors among it."""
-        said = [Event(step, HOME, SENSOR, "") for row in self.readings if row.step == step]
-        return self.events(step, step + 1) + said[:1]
+        events = self.events(step, step + 1)
+        if any(row.step == step for row in self.readings):
+            events.append(Event(step, HOME, EventKind.SENSOR, ""))
+        return events
 
     def poses(self, name: str, first: int, end: int) -> BodyPoses:
         """Return the poses of a body in the steps from `first` to `end` - 1."""
         key = (name, first, end)
-        if key not in self._traced:  # whoever is updated at the same time asks for the same
-            self._traced[key] = BodyPoses(self.home, self._trace(name, first, end))
-        return self._traced[key]
-
-    def _trace(self, name: str, first: int, end: int) -> Poses:
-        count = end - first
-        out = empty_poses(count)
-        pieces = self.pieces[self.index[name]]
-        for i, piece in enumerate(pieces):
-            stop = pieces[i + 1].first if i + 1 < len(pieces) else end
-            begin, stop = max(first, piece.first), min(end, stop)
-            if begin < stop:
-                here = slice(begin - first, stop - first)
-                if begin == piece.first:
-                    part = Poses(out.x[here], out.y[here], out.heading[here], out.away[here])
-                    piece.motion.trace(piece.first, piece.start, part)
-                    continue
-                part = empty_poses(stop - piece.first)
-                piece.motion.trace(piece.first, piece.start, part)
-                paste_poses(out, here.start, part, slice(begin - piece.first, None))
-        return out
+        if key not in self._poses:  # whoever is updated at the same time asks for the same
+            self._poses[key] = BodyPoses(
+                self.home, self._motions.runs(self.index[name], first, end)
+            )
+        return self._poses[key]
 
     def observe(self, rows: NDArray[np.int64]) -> None:
         """Keep what was perceived in a span: its observations (n, OBSERVATION), in order."""
@@ -283,9 +212,3 @@ def _known_at(
         f" for exposure and looks between those of {', '.join(map(str, sorted(sums)[-5:]))}, or for"
         " evidence"
     )
-
-
-def _events(actor: "Actor") -> list[Event]:
-    """Return what the plan of a body says happens."""
-    at = actor.clock.step_at_or_after
-    return [Event(at(n.time_us), actor.name, n.event, n.detail) for n in actor.plan.notes]

@@ -93,7 +93,6 @@ class NearestRooms:
         """Return the rooms of places [lattice units]; NOWHERE only in a home without rooms."""
         if self._rooms is None:
             self._rooms = self._plan.room_of_place
-        x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
         found: NDArray[np.int16] = rooms_at(self._rooms, x, y)
         while len(found) and found.min() == NOWHERE and self._plan.rooms:
             padded = np.pad(self._rooms, 1, constant_values=NOWHERE)

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.measure import count_rooms, rooms_at, sum_moves
+from fleet2d.kernels.measure import rooms_at, sum_moves
 from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.timelines import Window
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
@@ -20,23 +21,31 @@ Array = TypeVar("Array", bound=NDArray[Any])
 class BodyPoses:
     """Poses of one body, one entry per step; columns are worked out when they are asked for."""
 
-    def __init__(self, home: "Home", poses: Poses) -> None:
-        self._home, self._poses = home, poses
+    def __init__(self, home: "Home", runs: Window) -> None:
+        self._home, self._runs = home, runs
 
     def __len__(self) -> int:
         """Return the number of steps."""
-        return len(self._poses.x)
+        return self._runs.end - self._runs.first
+
+    @cached_property
+    def _lengths(self) -> NDArray[np.int64]:
+        """How many steps each run of equal pose has."""
+        return np.diff(self._runs.step, append=self._runs.end)
 
     @cached_property
     def xy(self) -> NDArray[np.float64]:
         """Positions (n, 2) [m]; where it left while it is away."""
         lattice = self._home.plan.lattice
-        return _shared(lattice.to_metres(np.stack([self._poses.x, self._poses.y], axis=-1)))
+        xy = lattice.to_metres(np.stack([self._runs.x, self._runs.y], axis=-1))
+        return _shared(np.repeat(xy, self._lengths, axis=0))
 
     def at(self, index: int) -> tuple[float, float]:
         """Return the position (x, y) [m] at one step; -1 is the last."""
-        point = self._poses.x[index], self._poses.y[index]
-        x, y = self._home.plan.lattice.to_metres(point).tolist()
+        runs = self._runs
+        step = runs.first + range(len(self))[index]
+        run = int(np.searchsorted(runs.step, step, side="right")) - 1
+        x, y = self._home.plan.lattice.to_metres((runs.x[run], runs.y[run])).tolist()
         return x, y
 
     @property
@@ -52,31 +61,40 @@ class BodyPoses:
     @cached_property
     def heading(self) -> NDArray[np.float64]:
         """Headings, counter-clockwise from +x, 0 to 2 pi [rad]."""
-        radians: NDArray[np.float64] = in_radians(self._poses.heading)
-        return _shared(radians)
+        radians: NDArray[np.float64] = in_radians(self._runs.heading)
+        return _shared(np.repeat(radians, self._lengths))
 
     @cached_property
     def away(self) -> NDArray[np.bool_]:
         """Whether it is out of the home."""
-        return _shared(self._poses.away.astype(bool))
+        return _shared(np.repeat(self._runs.away.astype(bool), self._lengths))
 
     @cached_property
     def room(self) -> NDArray[np.int16]:
         """Index of the room, NOWHERE while it is away."""
-        room = rooms_at(self._home.plan.room_of_place, self._poses.x, self._poses.y)
-        return _shared(np.where(self.away, np.int16(NOWHERE), room))
+        return _shared(np.repeat(self._rooms, self._lengths))
+
+    @cached_property
+    def _rooms(self) -> NDArray[np.int16]:
+        """Index of the room of each run."""
+        runs = self._runs
+        room = rooms_at(self._home.plan.room_of_place, runs.x, runs.y)
+        rooms: NDArray[np.int16] = np.where(runs.away != 0, np.int16(NOWHERE), room)
+        return rooms
 
     @cached_property
     def time_in_rooms(self) -> NDArray[np.int64]:
         """Number of steps in each room, and last away: int64 (rooms + 1,)."""
         counts = np.zeros(len(self._home.rooms) + 1, np.int64)
-        count_rooms(self._poses, self._home.plan.room_of_place, counts)
+        np.add.at(counts, self._rooms, self._lengths)  # NOWHERE is the last
         return _shared(counts)
 
     @cached_property
     def distance(self) -> float:
         """Length of the way from the first to the last step [m]."""
-        return float(sum_moves(self._poses)) / self._home.plan.lattice.units_per_m
+        runs = self._runs
+        moved = sum_moves(Poses(runs.x, runs.y, runs.heading, runs.away))
+        return moved / self._home.plan.lattice.units_per_m
 
 
 def _shared(array: Array) -> Array:

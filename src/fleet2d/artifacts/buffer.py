@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import deepcopy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,14 +49,11 @@ class TableBuffer:
         self._valid: dict[str, NDArray[np.bool_]] = {}
         self._names = frozenset(spec.names)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> TableBuffer:
-        """Copy the rows that wait, not the room kept free for more."""
-        twin = TableBuffer(self.spec, self.limit)
-        twin.words = deepcopy(self.words, memo)
-        twin.rows = twin._capacity = self.rows
-        twin._values = {name: kept[: self.rows].copy() for name, kept in self._values.items()}
-        twin._valid = {name: kept[: self.rows].copy() for name, kept in self._valid.items()}
-        return twin
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the room that is kept free for more rows."""
+        values = {name: kept[: self.rows] for name, kept in self._values.items()}
+        valid = {name: kept[: self.rows] for name, kept in self._valid.items()}
+        return {**self.__dict__, "_capacity": self.rows, "_values": values, "_valid": valid}
 
     @property
     def is_full(self) -> bool:

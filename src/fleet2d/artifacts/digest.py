@@ -30,13 +30,6 @@ class TableDigest:
         self.rows = 0
         self._columns = [_ColumnDigest(column) for column in spec.columns]
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> TableDigest:
-        """Copy the state of the hashes, which the copy module can't."""
-        twin = TableDigest(self.spec)
-        twin.rows = self.rows
-        twin._columns = [column.copy() for column in self._columns]
-        return twin
-
     def update(self, chunk: Chunk, rows: int) -> None:
         """Take in the next `rows` rows."""
         for column in self._columns:
@@ -71,12 +64,6 @@ class _ColumnDigest:
     def __init__(self, column: Column) -> None:
         self.name = column.name
         self._hashes = [hashlib.sha256() for _ in range(3)]
-
-    def copy(self) -> _ColumnDigest:
-        twin = object.__new__(_ColumnDigest)
-        twin.name = self.name
-        twin._hashes = [kept.copy() for kept in self._hashes]
-        return twin
 
     def update(self, chunk: ColumnChunk) -> None:
         for kept, values in zip(self._hashes, chunk, strict=True):

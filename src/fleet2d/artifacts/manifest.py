@@ -144,7 +144,7 @@ def versions() -> dict[str, str]:
     A package that is loaded is asked itself: searching the installed packages takes longer than
     simulating a day.
     """
-    found = {name: _version(name) for name in ("fleet2d", "numba", "numpy", "pyarrow", "shapely")}
+    found = {name: _version(name) for name in ("fleet2d", "numpy", "pyarrow", "shapely")}
     machine = os.uname().machine if hasattr(os, "uname") else "unknown"
     python = ".".join(map(str, sys.version_info[:3]))
     return {**found, "python": python, "platform": f"{sys.platform} {machine}"}

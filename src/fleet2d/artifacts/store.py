@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,10 +38,6 @@ class _Table:
     digest: TableDigest
     kept: list[tuple[Chunk, int]] = field(default_factory=list)
     file: ParquetTable | None = None
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> _Table:
-        """Copy what changes; chunks that are kept never do."""
-        return _Table(deepcopy(self.buffer, memo), deepcopy(self.digest, memo), list(self.kept))
 
 
 class RunStore:
@@ -88,21 +83,12 @@ class RunStore:
         for spec in specs:
             self.add_table(spec)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> RunStore:
-        """Branch a run that is stored in memory.
-
-        Raises:
-            ArtifactError: The run is stored in a directory, which can't be in two states.
-        """
-        if self.directory is not None:
-            raise ArtifactError(
-                f"a simulation that stores in {self.directory} can't be copied, for both would "
-                "write there: branch a simulation that stores in memory"
-            )
-        twin = RunStore(None, (), deepcopy(self.manifest, memo), flush_rows=self._flush_rows)
-        twin._tables = {name: deepcopy(table, memo) for name, table in self._tables.items()}
-        twin._digests = deepcopy(self._digests, memo)
-        return twin
+    def hash_again(self) -> None:
+        """Make the digests of a run in memory anew from its rows, which a file alone holds."""
+        for entry in self._tables.values():
+            entry.digest = TableDigest(entry.buffer.spec)
+            for chunk, rows in entry.kept:
+                entry.digest.update(chunk, rows)
 
     def check(self) -> None:
         """Say, without writing, that the directory can't be used: worth asking before set-up.

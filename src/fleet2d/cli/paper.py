@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fleet2d.cli.runs import announce_compilation
 from fleet2d.errors import InputError
 from fleet2d.paper.result import PAPER_COLUMN
 
@@ -53,7 +52,6 @@ def reproduce_paper(
     request = Request(quick, seeds, days, workers or cores(), real_map)
     make_directory(out)  # before hours of work
     pictures = _can_draw()
-    announce_compilation()
     for name in names:
         with _progress(name, show=sys.stderr.isatty()) as tell:
             found = reproduce(name, request, tell)

@@ -36,8 +36,6 @@ def run(
 ) -> None:
     """Simulate a scenario and store the run."""
     scenario, overrides = split(arguments)
-    if not quiet:
-        announce_compilation()
     from fleet2d.engine.simulation import Simulation
     from fleet2d.scenario.model import load_scenario
 
@@ -113,15 +111,6 @@ def _fresh_directory(name: str) -> Path:
             ) from error
         else:
             return directory
-
-
-def announce_compilation() -> None:
-    """Say that the kernels are compiled first, if they are."""
-    from fleet2d.kernels._jit import cache_directory
-
-    if not cache_directory().exists():
-        text = "compiling the kernels, once on this machine: up to a minute of this first run …"
-        typer.echo(text, err=True)
 
 
 def _run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":

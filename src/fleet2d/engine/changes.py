@@ -21,6 +21,7 @@ from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.plan import Track
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
+from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.arrangement import moved
 from fleet2d.floorplan.change import HomeChange
 from fleet2d.floorplan.gates import Segment
@@ -56,15 +57,6 @@ class Due(NamedTuple):
     door: int = -1
     opens_for: tuple[int, int] | None = None
     passed_us: int = 0
-
-
-class Happened(NamedTuple):
-    """A change that was made: a row of the events table."""
-
-    step: int
-    target: str | None
-    event: str
-    detail: str
 
 
 class Changes:
@@ -136,46 +128,46 @@ class Changes:
                 plan = (row, actor.planned_at)
                 self._put(step, None, actor.name, door, plan, moment)
 
-    def make(self, step: int, actors: Sequence[Actor]) -> list[Happened]:
+    def make(self, step: int, actors: Sequence[Actor]) -> list[Event]:
         """Make all changes that are due at a step; ask those anew whose way they cut.
 
         Raises:
             ComponentError: What an algorithm or a script asks for can't be.
         """
-        happened: list[Happened] = []
+        events: list[Event] = []
         while self._queue and self._queue[0].step <= step:
             due = heapq.heappop(self._queue)
             if due.change is not None:
-                happened += self._declared(due, due.change, step, actors)
+                events += self._declared(due, due.change, step, actors)
             elif due.opens_for is not None:
-                happened += self._open_for(due, step, actors)
+                events += self._open_for(due, step, actors)
             else:
-                happened += self._fall_shut(due, step, actors)
-        return happened
+                events += self._fall_shut(due, step, actors)
+        return events
 
     # What is due
 
     def _declared(
         self, due: Due, change: HomeChange, step: int, actors: Sequence[Actor]
-    ) -> list[Happened]:
+    ) -> list[Event]:
         verb, target = change.verb, change.target
         if verb == "room":
             room = self.home.plan.room(target)
             self.home.use_room_as(room, usual_type(str(change.type)))
-            return [Happened(step, None, "room_changed", f"{target}: {change.type}")]
+            return [Event(step, HOME, EventKind.ROOM_CHANGED, f"{target}: {change.type}")]
         if verb == "move":
             return self._move(due, change, step, actors)
         door = self.names.index(target)
         if verb in ("lock", "unlock"):
             self.home.set_lock(door, locked=verb == "lock")
             self._stop(step, actors, self._door_shape(door))
-            return [Happened(step, target, f"{verb}ed", due.by)]
+            return [Event(step, target, EventKind(f"{verb}ed"), due.by)]
         is_open = verb == "open"
         if is_open != (door in self.home.shut):
             return []
         return self._turn(door, is_open, due, step, actors)
 
-    def _open_for(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Happened]:
+    def _open_for(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Event]:
         row, planned_at = due.opens_for or (0, 0)
         if actors[row].planned_at != planned_at:
             return []
@@ -189,7 +181,7 @@ class Changes:
             return []
         return self._turn(door, True, due, step, actors)
 
-    def _fall_shut(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Happened]:
+    def _fall_shut(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Event]:
         """Shut a door behind the last who went through."""
         after = self.doors[self.names[due.door]].closes_after
         if after is None or due.door in self.home.shut:
@@ -200,7 +192,7 @@ class Changes:
 
     def _turn(
         self, door: int, is_open: bool, due: Due, step: int, actors: Sequence[Actor]
-    ) -> list[Happened]:
+    ) -> list[Event]:
         shape = self._door_shape(door)
         if not is_open and self._in_the_way(shape, actors):
             self._try_again(due, step)
@@ -212,11 +204,13 @@ class Changes:
             now = step * self.clock.step_us
             self._used_us[door] = max(self._used_us[door], now)
             self._put(self.clock.step_at_or_after(now + micros(after)), None, "", door)
-        return [Happened(step, self.names[door], "opened" if is_open else "shut", due.by)]
+        return [
+            Event(step, self.names[door], EventKind.OPENED if is_open else EventKind.SHUT, due.by)
+        ]
 
     def _move(
         self, due: Due, change: HomeChange, step: int, actors: Sequence[Actor]
-    ) -> list[Happened]:
+    ) -> list[Event]:
         plan = self.home.plan
         thing = next(o for o in self.home.objects if o.name == change.target)
         assert change.to is not None
@@ -229,7 +223,7 @@ class Changes:
         self.home.put(there)
         self._stop(step, actors, shape if solid else None)
         x, y = change.to
-        return [Happened(step, None, "moved", f"{thing.name} to ({x:g}, {y:g})")]
+        return [Event(step, HOME, EventKind.MOVED, f"{thing.name} to ({x:g}, {y:g})")]
 
     # Who is in the way
 
@@ -251,12 +245,12 @@ class Changes:
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
             if not isinstance(actor.motion, Track):
-                actor.ask_at = step
+                actor.ask(step)
             elif shape is not None and not self._passes(actor, shape):
                 zone = grown_shape(shape, actor.entity.radius * units)
                 way = _way_ahead(actor, step * self.clock.step_us)
                 if way is not None and way.intersects(zone):
-                    actor.ask_at = step
+                    actor.ask(step)
 
     def _passes(self, actor: Actor, shape: NDArray[np.float64]) -> bool:
         """Tell whether a body opens the door that a shape is."""

@@ -6,17 +6,19 @@ round people, if that would bring the bodies together. It is asked anew at that 
 moves, so it makes no difference where spans end.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING
+from fleet2d.events import Event
 from fleet2d.kernels.mesh import locate
-from fleet2d.kernels.motion import Poses, empty_poses
+from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import line_of_sight
 
 I64 = NDArray[np.int64]
@@ -26,10 +28,11 @@ class Clearance:
     """The robots of a run that give way.
 
     Attributes:
-        robots: Them, by their rows in a PoseBlock.
+        robots: The robots that give way, by their rows among the bodies.
     """
 
     def __init__(self, users: Sequence[Actor], robots: Sequence[Actor]) -> None:
+        self.taken = 0
         self._users = users
         self.robots = {
             len(users) + i: robot
@@ -37,31 +40,40 @@ class Clearance:
             if isinstance(robot.entity, Robot) and robot.entity.gives_way is not None and users
         }
 
-    def limit(self, block: PoseBlock, first: int, count: int) -> int:
-        """Return before which of `count` steps, but the first, a robot is to be asked anew."""
-        for row, robot in self.robots.items():
-            # The step after the span was traced, too.
-            poses, crowd = block.row(row, count + 1), slice(0, len(self._users))
-            met = self._first(
-                robot,
-                poses,
-                block.x[crowd, : count + 1],
-                block.y[crowd, : count + 1],
-                block.away[crowd, : count + 1],
-                first,
-                begin=1,
-            )
-            if met is not None:
-                count = met[0]
-        return count
+    @property
+    def waits(self) -> bool:
+        """Whether any robot gives way."""
+        return bool(self.robots)
 
-    def in_way(self, row: int, step: int) -> Actor | None:
-        """Return at whom a robot would drive in a step, with everybody where they are."""
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step at which a robot is to be asked anew: not the first of the span."""
+        first = self.taken
+        block = bodies.block(first, end + 1)  # a move leads to the step after
+        people = slice(0, len(self._users))
+        xs, ys, away = block.x[people], block.y[people], block.away[people]
+        for row, robot in self.robots.items():
+            met = self._first(robot, poses_of(block, row), xs, ys, away, first, begin=1)
+            if met is not None:
+                end = min(end, first + met[0])
+        return end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Go on to a step."""
+        self.taken = end
+        return ()
+
+    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
+        """Return nothing: it is asked at every decision."""
+        return ()
+
+    def in_way(self, bodies: Bodies, row: int) -> Actor | None:
+        """Return the person at whom a robot would drive next, with everybody where they are."""
         robot = self.robots.get(row)
         if robot is None:
             return None
-        poses = empty_poses(2)
-        robot.motion.trace(step, robot.state, poses)
+        step = bodies.step
+        columns = zip(bodies.pose_at(row, step), bodies.pose_at(row, step + 1), strict=True)
+        poses = Poses(*(np.array(column) for column in columns))
         if poses.x[0] == poses.x[1] and poses.y[0] == poses.y[1]:
             return None
         where = np.array([user.state for user in self._users], np.int64)

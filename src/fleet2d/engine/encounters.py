@@ -4,16 +4,17 @@ What happens follows from the poses alone, step by step, so it is the same howev
 spans. A span ends with the first encounter in it, and who it is about is asked again right after.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Attention, SightEvent
+from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
@@ -44,10 +45,10 @@ class Pair:
     """Somebody and a robot, and what is carried from span to span.
 
     Attributes:
-        user: Who.
-        user_row: Its row in a PoseBlock.
+        user: The person.
+        user_row: The person's row among the bodies.
         robot: The robot.
-        robot_row: Its row in a PoseBlock.
+        robot_row: Its row among the bodies.
         attention: What is taken notice of.
         near: Whether it would be noticed when it is near, and not as still there.
         coming: Likewise, when it drives up.
@@ -163,7 +164,8 @@ class Encounters:
     """All pairs of somebody who reacts to robots and a robot.
 
     Attributes:
-        pairs: Them.
+        pairs: The pairs.
+        taken: The step before which everything is taken in.
     """
 
     def __init__(self, users: Sequence[Actor], robots: Sequence[Actor]) -> None:
@@ -174,50 +176,66 @@ class Encounters:
             if user.attention is not None
             for robot_row, robot in self._robots
         ]
-        self._calls: list[tuple[int, int, str]] = []  # made as plans ended: step, row, whom
-        self._found: list[Happening] = []
+        self.taken = 0
+        self._calls: list[tuple[int, int, str]] = []  # made as plans ended: step, row, user
+        self._ahead: list[Happening] = []
+        self._last: list[tuple[int, Actor, SightEvent]] = []
+
+    @property
+    def waits(self) -> bool:
+        """Whether anybody reacts to robots."""
+        return bool(self.pairs)
 
     def before_plan(self, row: int, actor: Actor, step: int) -> None:
         """Keep the calls at `step` of a robot's plan that is about to be replaced."""
         if self.pairs:
             self._calls += [call for call in _calls(row, actor) if call[0] == step]
 
-    def limit(self, block: PoseBlock, first: int, count: int) -> int:
-        """Return after how many of `count` steps somebody reacts for the first time."""
-        if not self.pairs:
-            return count
-        self._found = [found for pair in self.pairs for found in pair.scan(block, count)]
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first at which somebody may react."""
+        first, block = self.taken, bodies.block(self.taken, end)
+        self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
         calls = self._calls + [call for row, robot in self._robots for call in _calls(row, robot)]
         self._calls = []
-        self._found += [
+        self._ahead += [
             Happening(step - first, "robot_calls", pair.robot, pair)
-            for step, row, whom in calls
-            if first <= step < first + count
+            for step, row, user in calls
+            if first <= step < end
             for pair in self.pairs
-            if pair.robot_row == row and whom in ("", pair.user.name) and pair.hears(step - first)
+            if pair.robot_row == row and user in ("", pair.user.name) and pair.hears(step - first)
         ]
-        return min((found.column + 1 for found in self._found), default=count)
+        return min((event.column + first + 1 for event in self._ahead), default=end)
 
-    def take(self, block: PoseBlock, first: int, count: int) -> list[tuple[int, Actor, SightEvent]]:
-        """Return what happens in the last of `count` steps to whom, if they react to it."""
-        taken = []
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Take over what the steps up to `end` - 1 leave behind."""
+        count = end - self.taken
+        self._last = []
+        if not self.pairs or not count:
+            return ()
+        block = bodies.block(self.taken, end)
         for pair in self.pairs:
-            found = [f for f in self._found if f.pair is pair and f.column == count - 1]
-            pair.pass_over(block, count, [f.event for f in found])
+            last = [e for e in self._ahead if e.pair is pair and e.column == count - 1]
+            pair.pass_over(block, count, [e.event for e in last])
             x, y = pair.user.home.plan.lattice.to_metres(pair.at).tolist()
-            for happening in found:
-                event = SightEvent(happening.event, happening.robot.name, x, y)
-                if pair.user.heeds(event, first + count - 1):
-                    taken.append((pair.user_row, pair.user, event))
-        return taken
+            self._last += [
+                (pair.user_row, pair.user, SightEvent(e.event, e.robot.name, x, y)) for e in last
+            ]
+        self.taken = end
+        return ()
+
+    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
+        """Yield what happened in the last step to whom, if they react to it."""
+        for row, user, event in self._last:
+            if user.heeds(event, self.taken - 1):
+                yield row, event
 
 
 def _calls(row: int, robot: Actor) -> list[tuple[int, int, str]]:
-    """Return the calls of a robot's plan: step, the robot's row, whom it calls."""
+    """Return the calls of a robot's plan: step, the robot's row, and the user it calls."""
     return [
         (robot.clock.step_at_or_after(note.time_us), row, note.detail)
         for note in robot.plan.notes
-        if note.event == "calls"
+        if note.event == EventKind.CALLS
     ]
 
 

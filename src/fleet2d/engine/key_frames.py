@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.ordering import in_order
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Track
@@ -27,7 +27,13 @@ class KeyFrames:
     """Gathers the key frames of a run."""
 
     def __init__(
-        self, store: RunStore, clock: Clock, home: Home, actors: Sequence[Actor], changes: bool
+        self,
+        store: RunStore,
+        clock: Clock,
+        home: Home,
+        actors: Sequence[Actor],
+        bodies: Bodies,
+        changes: bool,
     ) -> None:
         """Prepare to gather.
 
@@ -36,17 +42,19 @@ class KeyFrames:
             clock: Of the run.
             home: Of the run.
             actors: Users, then robots.
+            bodies: How they move.
             changes: Whether walls may change during the run.
         """
-        self._store, self._clock, self._home, self._actors = store, clock, home, actors
+        self._store, self._clock, self._home = store, clock, home
+        self._actors, self._bodies = actors, bodies
         # A random walk is rebuilt by walking it again between walls that haven't changed since;
         # where they may have, it is kept step by step.
         self._walk_kind = TRACK if changes else WALK
         self._walk_every = 1 if changes else max(1, WALK_KEY_US // clock.step_us)
-        # Breakpoints of the present plan already gathered; the plan before the first has none to
-        # tell.
+        # Breakpoints of the present plan already gathered; the plan before the first has none.
         self._emitted = [2] * len(actors)
-        self._told_until = [-1] * len(actors)
+        self._complete_until = [-1] * len(actors)  # where the plan before was followed to its end
+        self._walked = [1] * len(actors)  # the step before which a random walk is gathered
         self._blocks: list[NDArray[np.int64]] = []
         self._rows = 0
 
@@ -58,10 +66,11 @@ class KeyFrames:
     def end_plan(self, row: int, step: int) -> None:
         """Gather the end of the plan that is about to be replaced at `step`."""
         self.pass_by(row, step)
+        self._walk_on(row, step)
         self.break_off(row, step)
         motion = self._actors[row].motion
         track = motion.breakpoints if isinstance(motion, Track) else None
-        self._told_until[row] = (
+        self._complete_until[row] = (
             int(track.time[-1])
             if track is not None and self._emitted[row] == len(track.time)
             else -1
@@ -71,7 +80,8 @@ class KeyFrames:
         """Gather the beginning of the plan that was just made at `step`."""
         moment = step * self._clock.step_us
         # A plan that takes over just where the last one ended needs no key frame to begin.
-        self._emitted[row] = int(self._told_until[row] == moment and step > 0)
+        self._walked[row] = step + 1
+        self._emitted[row] = int(self._complete_until[row] == moment and step > 0)
         actor = self._actors[row]
         if not isinstance(actor.motion, Track):
             self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
@@ -102,17 +112,22 @@ class KeyFrames:
                 planned[:, 0] = step
                 self._blocks.append(planned)
 
-    def span(self, block: PoseBlock, first: int, count: int) -> None:
-        """Gather the states of random walks in a span."""
-        every = self._walk_every
-        for row, actor in enumerate(self._actors):
-            if isinstance(actor.motion, Track):
-                continue
-            for step in range(-(-first // every) * every, first + count, every):
-                if step != actor.planned_at:
-                    state = block.state(row, step - first)
-                    moment = step * self._clock.step_us
-                    self._blocks.append(_key(step, row, self._walk_kind, moment, state))
+    def take(self, end: int) -> None:
+        """Gather what everybody reached up to step `end` - 1."""
+        for row in range(len(self._actors)):
+            self.pass_by(row, end - 1)
+            self._walk_on(row, end)
+
+    def _walk_on(self, row: int, end: int) -> None:
+        """Gather the states of a random walk up to step `end` - 1."""
+        if isinstance(self._actors[row].motion, Track):
+            return
+        every, first = self._walk_every, self._walked[row]
+        for step in range(-(-first // every) * every, end, every):
+            moment = step * self._clock.step_us
+            key = _key(step, row, self._walk_kind, moment, self._bodies.pose_at(row, step))
+            self._blocks.append(key)
+        self._walked[row] = max(first, end)
 
     def store(self) -> None:
         """Hand everything gathered to the store."""

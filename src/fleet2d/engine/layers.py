@@ -1,9 +1,12 @@
 """The layers of a run: those that it keeps itself, and when each is stored."""
 
 from collections.abc import Sequence, Set
+from dataclasses import dataclass
 from datetime import timedelta
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import steps_of_bin
@@ -13,7 +16,7 @@ from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.component import Component
-from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.seen import SeenArea
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
@@ -55,6 +58,7 @@ class LayerBook:
         scenario: Scenario,
         home: Home,
         actors: Sequence[Actor],
+        bodies: Bodies,
         store: RunStore,
         clock: Clock,
     ) -> None:
@@ -63,7 +67,8 @@ class LayerBook:
         Args:
             scenario: What is simulated.
             home: Gets the layers.
-            actors: All bodies, in the order of their rows.
+            actors: Everybody, in the order of their rows.
+            bodies: How they move.
             store: Gets the tables.
             clock: The steps of the run.
 
@@ -84,24 +89,19 @@ class LayerBook:
         wanted = {*needed, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
         self._exposes = "exposure" in needed
         self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0
-        self._told_bins = 0
+        self._taken_bins = 0
         self._patches = patches_of(home.plan) if self._bin_steps else whole_rooms(home.plan)
-        self.areas = self._open_areas(scenario, actors, wanted) if wanted else []
+        self.areas = self._open_areas(scenario, actors, bodies, wanted) if wanted else []
         self._lay_seen(scenario, needed)
         self.next_due(0)
 
-    def span(self, block: PoseBlock, first: int, count: int) -> None:
-        """Take in what robots see in the steps from `first` to `first + count - 1`."""
-        for area in self.areas:
-            area.span(block, first, count)
-
     def expose(self, step: int, log: Log) -> None:
-        """Tell the log how much of each room each robot has had in view before `step`."""
+        """Add to the log how much of each room each robot has had in view before `step`."""
         if self._bin_steps:
             log.bin_steps, log.patches = self._bin_steps, self._patches
             taken = [area.take_bins(step) for area in self.areas]
-            count = step // self._bin_steps - self._told_bins
-            self._told_bins += count
+            count = step // self._bin_steps - self._taken_bins
+            self._taken_bins += count
             bins = np.zeros((count, self._robots, 2, len(self._patches.room)), np.int64)
             for area, rows in zip(self.areas, taken, strict=True):
                 bins[:, area.row - self._first_robot] = rows
@@ -131,7 +131,7 @@ class LayerBook:
                 self._put(layer, end - 1)
 
     def _open_areas(
-        self, scenario: Scenario, actors: Sequence[Actor], wanted: Set[str]
+        self, scenario: Scenario, actors: Sequence[Actor], bodies: Bodies, wanted: Set[str]
     ) -> list[SeenArea]:
         """Return what each robot with a camera has seen, before the first step."""
         every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
@@ -141,6 +141,7 @@ class LayerBook:
                 actor,
                 row,
                 self._patches,
+                bodies,
                 every=every,
                 keeps_last=keeps_last,
                 bin_steps=self._bin_steps,
@@ -158,7 +159,7 @@ class LayerBook:
             settings = _kept(cells, configured or LayerSettings(store=False))
             for area in self.areas:
                 self._home.layers.add_layer(
-                    f"{name}.{area.robot.name}", settings, getattr(area, name)
+                    f"{name}.{area.robot.name}", settings, _Cells(area, name)
                 )
 
     def _period(self, layer: Layer) -> int:
@@ -187,6 +188,18 @@ class LayerBook:
         steps = np.full(len(columns["row"]), step, np.int64)
         self._store.append(spec.name, step=steps, time=self._clock.times(steps), **columns)
         self._stored_at[layer.name] = step
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The values of a layer of what a robot has seen, worked out when they are asked for."""
+
+    area: SeenArea
+    name: str
+
+    def __call__(self) -> NDArray[Any]:
+        values: NDArray[Any] = getattr(self.area, self.name)()
+        return values
 
 
 def _kept(cells: LayerSettings, configured: LayerSettings) -> LayerSettings:

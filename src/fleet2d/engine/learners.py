@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.learned import load_learned, save_learned
-from fleet2d.algorithms.log import HOME, Event
 from fleet2d.algorithms.output import Outputs, to_columns
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.events import HOME, Event
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean

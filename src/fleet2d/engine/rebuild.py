@@ -11,7 +11,7 @@ from fleet2d.clock import Clock
 from fleet2d.engine.key_frames import KEY_KINDS, PLANNED, WALK
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander
-from fleet2d.entities.plan import State
+from fleet2d.entities.plan import Pose
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
@@ -158,14 +158,14 @@ def _trace(
 def _follow_track(
     keys: dict[str, Any], begin: int, end: int, stop: int, clock: Clock, stride: int, out: Poses
 ) -> None:
-    part = Breakpoints(*(np.ascontiguousarray(keys[n][begin:end]) for n in Breakpoints._fields))
+    part = Breakpoints(*(keys[name][begin:end] for name in Breakpoints._fields))
     first = -(-int(keys["step"][begin]) // stride)
     last = -(-stop // stride)
     if last > first:
         row = Poses(
             out.x[first:last], out.y[first:last], out.heading[first:last], out.away[first:last]
         )
-        trace_track(part, first * stride * clock.step_us, stride * clock.step_us, last - first, row)
+        trace_track(part, first * stride * clock.step_us, stride * clock.step_us, row)
 
 
 def _follow_walk(
@@ -178,9 +178,9 @@ def _follow_walk(
 ) -> None:
     home, actor, behavior = walker
     step = int(keys["step"][begin])
-    state = State(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
+    state = Pose(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
     row = empty_poses(stop - step + 1)
-    trace_meander(home.walls, actor.space.mesh, behavior.rule, step, np.array(state[:3]), row)
+    trace_meander(home.walls, actor.space.mesh, behavior.rule, step, state[:3], row)
     if begin + 1 < len(keys["x"]):  # where the walk came to, as it was stored
         found = (row.x[-1], row.y[-1], row.heading[-1])
         if found != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):

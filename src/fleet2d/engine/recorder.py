@@ -11,35 +11,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.activities import ROBOT, TOLD, Activities
+from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.log import SensorRow
-from fleet2d.algorithms.observations import (
-    OBSERVATION,
-    NearestRooms,
-    perceived,
-    truth,
-)
+from fleet2d.algorithms.observations import NearestRooms, perceived, truth
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import Eye, PoseBlock
-from fleet2d.engine.changes import Happened
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.key_frames import KeyFrames
 from fleet2d.engine.samples import Samples
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.tables import told_cameras
+from fleet2d.engine.tables import camera_names
 from fleet2d.entities.actor import Actor
+from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels.look import SIGHTING
-from fleet2d.kernels.look import STEP as STEP_COLUMN
 
+# Events whose detail is a user, which has a column of its own.
+OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 # Rows gathered before they go to the store.
 GATHERED = 1 << 15
 
 
-def activities_of(eyes: Sequence[Eye], users: int) -> Activities:
+def activities_of(cameras: Sequence[Cameras], users: int) -> Activities:
     """Return what users do, and what each camera takes it for: nothing known yet."""
-    senses = {(eye.index, c): sense for eye in eyes for c, sense in enumerate(eye.activity_senses)}
+    senses = {
+        (those.index, c): sense
+        for those in cameras
+        for c, sense in enumerate(those.activity_senses)
+    }
     return Activities(users, senses)
 
 
@@ -57,10 +57,11 @@ class Recorder:
         clock: Clock,
         home: Home,
         actors: Sequence[Actor],
+        bodies: Bodies,
         objects: Sequence[str] = (),
         *,
         changes: bool = False,
-        eyes: Sequence[Eye] = (),
+        cameras: Sequence[Cameras] = (),
         sensors: Sensors | None = None,
     ) -> None:
         """Prepare to record.
@@ -71,88 +72,72 @@ class Recorder:
             clock: Of the run.
             home: Of the run.
             actors: Users, then robots.
+            bodies: How they move.
             objects: The names of the home's objects.
             changes: Whether walls may change during the run.
-            eyes: The cameras.
+            cameras: Those of robots.
             sensors: The sensors of the home.
         """
-        self.store, self.clock, self.home, self.actors = store, clock, home, actors
+        self.store, self.clock, self.home, self.bodies = store, clock, home, bodies
         self._tables = set(store.names)
         self._samples = Samples(store, settings, clock, home)
-        self._keys = KeyFrames(store, clock, home, actors, changes)
-        users = sum(actor.path.startswith("users.") for actor in actors)
-        self.activities = activities_of(eyes, users)
-        self._object_rows = {name: len(actors) + i for i, name in enumerate(objects)}
-        self._notes_told = [0] * len(actors)
-        self._events: list[tuple[int, int, int, str, int, str]] = []
+        self._keys = KeyFrames(store, clock, home, actors, bodies, changes)
+        self.activities = activities_of(cameras, bodies.users)
+        names = [actor.name for actor in actors]
+        self._users = {name: row for row, name in enumerate(names[: bodies.users])}
+        self._rows = {name: row for row, name in enumerate([*names, *objects])} | {HOME: -1}
+        self._events: list[Event] = []
         self._observations: list[NDArray[np.int64]] = []
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(home.plan)
-        self._camera_codes = _codes_of(eyes)
+        self._camera_codes = _codes_of(cameras)
         self._gathered = 0  # observations and readings
         self.wall_s = 0.0
 
     def before_plan(self, row: int, step: int) -> None:
         """Gather the end of the plan that is about to be replaced at `step`."""
-        self._tell_notes(row, step)
         if "key_frames" in self._tables:
             self._keys.end_plan(row, step)
 
     def after_plan(self, row: int, step: int) -> None:
         """Gather the beginning of the plan that was just made at `step`."""
-        self._notes_told[row] = 0
-        self._tell_notes(row, step)
         if "key_frames" in self._tables:
             self._keys.begin_plan(row, step)
 
-    def changed(self, happened: Sequence[Happened]) -> None:
-        """Gather what changed in the home."""
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Gather events."""
         if "events" in self._tables:
-            for what in happened:
-                row = -1 if what.target is None else self._object_rows[what.target]
-                self._events.append((what.step, row, 2, what.event, -1, what.detail))
+            self._events += events
+        for event in events:
+            if event.event == EventKind.ACTIVITY and event.entity in self._users:
+                self.activities.begin(self._users[event.entity], event.step, event.detail)
 
-    def sensed(self, rows: Sequence[SensorRow]) -> None:
-        """Gather what the sensors said in a span."""
-        self._readings += rows
-        self._gathered += len(rows)
-
-    def span(
-        self,
-        block: PoseBlock,
-        first: int,
-        count: int,
-        eyes: Sequence[Eye],
-        gazes: Sequence[Eye] = (),
-    ) -> NDArray[np.int64] | None:
-        """Gather a span; return its observations, (n, OBSERVATION).
+    def take(
+        self, first: int, end: int, observations: NDArray[np.int64], readings: Sequence[SensorRow]
+    ) -> None:
+        """Gather the steps from `first` to `end` - 1.
 
         Args:
-            block: The poses of the span.
-            first: Its first step.
-            count: How many steps it has.
-            eyes: The cameras of robots.
-            gazes: Those of users, of which only the events are kept.
+            first: First step.
+            end: One past the last step.
+            observations: What robots perceived, (n, OBSERVATION), in order.
+            readings: What sensors reported, in order.
         """
-        for row in range(len(self.actors)):
-            self._tell_notes(row, first + count - 1)
-            if "key_frames" in self._tables:
-                self._keys.pass_by(row, first + count - 1)
-        self._samples.span(block, first, count)
+        self._samples.take(self.bodies, first, end)
         if "key_frames" in self._tables:
-            self._keys.span(block, first, count)
-        if "events" in self._tables:
-            self._tell_sights([*eyes, *gazes])
-        observations = self._observe(eyes) if eyes else None
-        waiting = self._gathered + self._samples.gathered + self._keys.gathered
-        if waiting + len(self._events) > GATHERED:
+            self._keys.take(end)
+        if "observations" in self._tables and len(observations):
+            self._observations.append(observations)
+        self._readings += readings
+        self._gathered += len(observations) + len(readings)
+        gathered = self._gathered + self._samples.gathered + self._keys.gathered
+        if gathered + len(self._events) > GATHERED:
             self.drain()
-        return observations
 
-    def end(self, step: int) -> None:
+    def end(self, step: int, rows: int) -> None:
         """Gather what is under way when the run ends before `step`, and hand over everything."""
         if "key_frames" in self._tables:
-            for row in range(len(self.actors)):
+            for row in range(rows):
                 # Not at the last step, whose rows may be with the store already: order would be
                 # lost.
                 self._keys.break_off(row, step)
@@ -168,54 +153,6 @@ class Recorder:
         self._store_readings()
         self._gathered = 0
         self.wall_s += time.perf_counter() - began
-
-    # Gathering
-
-    def _tell_notes(self, row: int, step: int) -> None:
-        """Gather the notes of the present plan up to a step."""
-        if not ("events" in self._tables or self.activities.are_told):
-            return
-        notes = self.actors[row].plan.notes
-        moment = step * self.clock.step_us
-        while self._notes_told[row] < len(notes) and notes[self._notes_told[row]].time_us <= moment:
-            note = notes[self._notes_told[row]]
-            at = self.clock.step_at_or_after(note.time_us)
-            if "events" in self._tables:
-                self._events.append((at, row, 0, note.event, -1, note.detail))
-            if note.event == TOLD and row < self.activities.users:
-                self.activities.begin(row, at, note.detail)
-            self._notes_told[row] += 1
-
-    def _observe(self, eyes: Sequence[Eye]) -> NDArray[np.int64]:
-        """Join the findings of all cameras, in order of step and robot."""
-        if not any(eye.found for eye in eyes):
-            return np.empty((0, OBSERVATION), np.int64)
-        rows = np.empty((sum(eye.found for eye in eyes), OBSERVATION), np.int64)
-        end = 0
-        for eye in eyes:
-            begin, end = end, end + eye.found
-            rows[begin:end, :SIGHTING] = eye.sightings[: eye.found]
-            rows[begin:end, ROBOT] = eye.index
-        if len(eyes) > 1:
-            rows = rows[np.argsort(rows[:, STEP_COLUMN], kind="stable")]
-        if "observations" in self._tables and len(rows):
-            self._observations.append(rows)
-            self._gathered += len(rows)
-        return rows
-
-    def _tell_sights(self, eyes: Sequence[Eye]) -> None:
-        """Gather who came into view of whom, and who was lost."""
-        for eye in eyes:
-            for i in range(eye.happened):
-                event = eye.event_names[eye.events.kind[i]]
-                who, detail = int(eye.events.user[i]), ""
-                if who == len(eye.others):
-                    who = -1  # somebody unknown
-                if event.startswith("robot"):
-                    who, detail = -1, eye.name_of(who)
-                self._events.append((int(eye.events.step[i]), eye.row, 1, event, who, detail))
-
-    # Storing
 
     def _store_observations(self) -> None:
         if not self._observations:
@@ -251,7 +188,7 @@ class Recorder:
     def _cameras(self, robot: NDArray[np.int32], camera: NDArray[np.int8]) -> NDArray[np.int32]:
         """Return the codes of cameras that are given by their index among their robot's."""
         codes = np.zeros(
-            (len(self.actors), 1 + max(map(len, self._camera_codes.values()))), np.int32
+            (len(self.bodies), 1 + max(map(len, self._camera_codes.values()))), np.int32
         )
         for index, names in self._camera_codes.items():
             codes[index, : len(names)] = names
@@ -261,18 +198,25 @@ class Recorder:
     def _store_events(self) -> None:
         if not self._events:
             return
-        rows = sorted(self._events, key=lambda row: row[:3])
+        rows, users = self._rows, self._users
+        events = sorted(self._events, key=lambda e: (e.step, rows[e.entity], e.rank))
         self._events = []
-        step, entity, _, event, user, detail = zip(*rows, strict=True)
-        columns: dict[str, Any] = self._when(np.array(step, np.int64))
-        if self.activities.users:
+        of_user = [event.event in OF_USERS for event in events]
+        columns: dict[str, Any] = self._when(np.array([event.step for event in events], np.int64))
+        if users:
+            user = [
+                users.get(event.detail, -1) if seen else -1
+                for event, seen in zip(events, of_user, strict=True)
+            ]
             columns["user"] = np.array(user, np.int32)
         self.store.append(
             "events",
             **columns,
-            entity=np.array(entity, np.int32),
-            event=list(event),
-            detail=list(detail),
+            entity=np.array([rows[event.entity] for event in events], np.int32),
+            event=[str(event.event) for event in events],
+            detail=[
+                "" if seen else event.detail for event, seen in zip(events, of_user, strict=True)
+            ],
         )
 
     def _store_readings(self) -> None:
@@ -294,7 +238,9 @@ class Recorder:
         return {"step": step, "time": self.clock.times(step)}
 
 
-def _codes_of(eyes: Sequence[Eye]) -> dict[int, list[int]]:
+def _codes_of(cameras: Sequence[Cameras]) -> dict[int, list[int]]:
     """Return the code of each camera of each robot; none where the run doesn't tell them apart."""
-    names = told_cameras(eyes)
-    return {eye.index: [names.index(name) for name in eye.cameras] for eye in eyes} if names else {}
+    names = camera_names(cameras)
+    if not names:
+        return {}
+    return {those.index: [names.index(name) for name in those.names] for those in cameras}

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.ordering import in_order
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
@@ -35,24 +35,24 @@ class Samples:
         self._blocks: list[NDArray[np.int64]] = []
         self.gathered = 0
 
-    def span(self, block: PoseBlock, first: int, count: int) -> None:
-        """Gather the samples of a span."""
-        if not self._every:
+    def take(self, bodies: Bodies, first: int, end: int) -> None:
+        """Gather the samples of the steps from `first` to `end` - 1."""
+        if not self._every or first >= end:
             return
-        steps = np.arange(-(-first // self._every) * self._every, first + count, self._every)
-        if not len(steps):
-            return
-        bodies = len(block.x)
-        rows = np.empty((len(steps), bodies, 6), np.int64)
+        steps = np.arange(-(-first // self._every) * self._every, end, self._every)
+        rows = np.empty((len(steps), len(bodies), 6), np.int64)
         rows[:, :, 0] = steps[:, None]
-        rows[:, :, 1] = np.arange(bodies)
-        columns = steps - first
-        rows[:, :, 2] = block.x[:, columns].T
-        rows[:, :, 3] = block.y[:, columns].T
-        rows[:, :, 4] = block.heading[:, columns].T
-        rows[:, :, 5] = block.away[:, columns].T
-        self._blocks.append(rows.reshape(-1, 6))
-        self.gathered += len(steps) * bodies
+        rows[:, :, 1] = np.arange(len(bodies))
+        if self._every == 1:
+            block = bodies.block(first, end)
+            rows[:, :, 2], rows[:, :, 3] = block.x.T, block.y.T
+            rows[:, :, 4], rows[:, :, 5] = block.heading.T, block.away.T
+        else:
+            for i, step in enumerate(steps.tolist()):
+                rows[i, :, 2:] = np.stack(bodies.poses(step), axis=-1)
+        if rows.size:
+            self._blocks.append(rows.reshape(-1, 6))
+            self.gathered += len(steps) * len(bodies)
 
     def store(self) -> None:
         """Hand everything gathered to the store."""

@@ -1,18 +1,22 @@
-"""The sensors of a run: what they say over each span, and beside what activity."""
+"""The sensors of a run: what they report, and beside what activity."""
 
-from collections.abc import Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
+from operator import itemgetter
 
 import numpy as np
 
 from fleet2d.algorithms.log import SensorRow
+from fleet2d.blame import blame
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import PoseBlock
-from fleet2d.entities.actor import Actor
+from fleet2d.engine.bodies import Bodies, PoseBlock
+from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.objects.contact_sensor import ContactSensor
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.objects.sensor import Memory, Sensor, SensorView, in_order
 from fleet2d.errors import ScenarioError
+from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.home import Home
 from fleet2d.problems import did_you_mean
 
@@ -22,6 +26,7 @@ class Sensors:
 
     Attributes:
         names: Their names, in the order of the scenario.
+        taken: The step before which the sensors were read.
         rooms: The room that each one's readings name.
         words: What each one calls its two states, on and off.
         on: Whether each is on at present.
@@ -33,9 +38,12 @@ class Sensors:
         doors: Sequence[str],
         home: Home,
         clock: Clock,
-        users: int,
+        users: Sequence[str],
     ) -> None:
-        self.clock, self.users = clock, users
+        self.home, self.users = home, len(users)
+        self.taken = 0
+        self.awaited = False  # whether an algorithm waits for readings
+        self._rows: list[SensorRow] = []
         self.sensors: list[Sensor] = []
         self.names: list[str] = []
         for name, thing in objects.items():
@@ -50,65 +58,80 @@ class Sensors:
         self.words = [sensor.words for sensor in self.sensors]
         self._memories = [Memory(sensor.hold_us() // clock.step_us) for sensor in self.sensors]
         self._before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self._activities = [""] * users
+        self._doing: dict[str, list[tuple[int, str]]] = {user: [] for user in users}
 
     @property
     def on(self) -> dict[str, bool]:
         """Whether each sensor is on at present."""
         return {name: memory.on for name, memory in zip(self.names, self._memories, strict=True)}
 
-    def span(
-        self, block: PoseBlock, first: int, count: int, home: Home, actors: Sequence[Actor]
-    ) -> list[SensorRow]:
-        """Return what the sensors say in a span, by step and sensor."""
-        if not self.sensors:
-            return []
-        view = self._view(block, first, count)
-        said = []
-        for number, (sensor, memory) in enumerate(zip(self.sensors, self._memories, strict=True)):
-            steps, users = sensor.sense(view, home)
-            said += [(number, reading) for reading in memory.read(steps, users, first + count)]
-        rows = [
-            SensorRow(
-                reading.step, number, reading.on, self._activity(actors, reading.user, reading.step)
-            )
-            for number, reading in in_order(said)
+    @property
+    def waits(self) -> bool:
+        """Whether readings end a span."""
+        return self.awaited and bool(self.sensors)
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first in which a sensor reports something."""
+        first, before = self.taken, self._before
+        with blame("objects", first):
+            view = self._view(bodies.block(first, end), first)
+            self._before = before
+            for sensor, memory in zip(self.sensors, self._memories, strict=True):
+                readings = copy(memory).read(*sensor.sense(view, self.home), end)
+                end = min([end, *(reading.step + 1 for reading in readings)])
+        return end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Read the sensors; `collect` hands over what they report."""
+        first, self.taken = self.taken, end
+        if not self.sensors or first == end:
+            return ()
+        with blame("objects", first):
+            view = self._view(bodies.block(first, end), first)
+            readings = []
+            for number, (sensor, memory) in enumerate(
+                zip(self.sensors, self._memories, strict=True)
+            ):
+                steps, users = sensor.sense(view, self.home)
+                readings += [(number, reading) for reading in memory.read(steps, users, end)]
+        self._rows += [
+            SensorRow(reading.step, number, reading.on, self._activity(reading.user, reading.step))
+            for number, reading in in_order(readings)
         ]
-        for user in range(self.users):
-            self._activities[user] = self._activity(actors, user, first + count - 1)
+        return ()
+
+    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
+        """Return nothing: no plan waits for a sensor."""
+        return ()
+
+    def collect(self) -> list[SensorRow]:
+        """Hand over what sensors reported since this was called last, by step and sensor."""
+        rows, self._rows = self._rows, []
         return rows
 
-    def limit(self, block: PoseBlock, first: int, count: int, home: Home) -> int:
-        """Return the steps of a span up to the first in which a sensor says something."""
-        before = self._before
-        view = self._view(block, first, count)
-        self._before = before
-        for sensor, memory in zip(self.sensors, self._memories, strict=True):
-            said = copy(memory).read(*sensor.sense(view, home), first + count)
-            count = min([count, *(reading.step - first + 1 for reading in said)])
-        return count
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Note what users do, for the readings to say."""
+        for event in events:
+            if event.event == EventKind.ACTIVITY and event.entity in self._doing:
+                self._doing[event.entity].append((event.step, event.detail))
 
-    def _view(self, block: PoseBlock, first: int, count: int) -> SensorView:
-        here = (block.x[:, :count], block.y[:, :count], block.away[:, :count] == 0)
+    def _view(self, block: PoseBlock, first: int) -> SensorView:
+        here = (block.x, block.y, block.away == 0)
         before = self._before or tuple(part[:, :1] for part in here)
         self._before = (here[0][:, -1:].copy(), here[1][:, -1:].copy(), here[2][:, -1:].copy())
         x, y, present = (np.concatenate(pair, axis=1) for pair in zip(before, here, strict=True))
         return SensorView(first, x, y, present, self.users)
 
-    def _activity(self, actors: Sequence[Actor], user: int, step: int) -> str:
-        """Return what a user is doing at a step, as its plan says; all users' if it is nobody's."""
+    def _activity(self, user: int, step: int) -> str:
+        """Return what a user is doing at a step, if known; of all users if it is nobody's."""
         if user >= self.users:
             return ""
         if user < 0:
-            doing = [self._activity(actors, one, step) for one in range(self.users)]
+            doing = [self._activity(one, step) for one in range(self.users)]
             return " and ".join(dict.fromkeys(text for text in doing if text))
-        told = self._activities[user]
-        for note in actors[user].plan.notes:
-            if note.time_us > step * self.clock.step_us:
-                break
-            if note.event == "activity":
-                told = note.detail
-        return told
+        begun = list(self._doing.values())[user]
+        at = bisect_right(begun, step, key=itemgetter(0))
+        return begun[at - 1][1] if at else ""
 
 
 def _door(name: str, of: str, doors: Sequence[str]) -> int:

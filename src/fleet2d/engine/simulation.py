@@ -1,5 +1,6 @@
 """The simulation: a run that scripts and the command line step, steer, look at and branch."""
 
+import io
 import operator
 import secrets
 import time
@@ -7,7 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 from pydantic import ValidationError
 
@@ -22,12 +23,15 @@ from fleet2d.engine.keeping import (
     describe_start,
     open_store,
 )
-from fleet2d.engine.loop import Loop
 from fleet2d.engine.pace import Pace
-from fleet2d.engine.world import set_up
+from fleet2d.engine.phases import PHASES, Span
+from fleet2d.engine.setup import set_up
+from fleet2d.engine.snapshot import copy_state, open_snapshot, read_state, write_snapshot
+from fleet2d.engine.state import State
 from fleet2d.entities.actor import Actor
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import ArtifactError, InputError, ScenarioError
 from fleet2d.floorplan.change import HomeChange
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario, load_scenario
@@ -40,7 +44,6 @@ class Simulation:
         scenario: What is simulated.
         seed: The seed, given or drawn.
         clock: Its steps.
-        home: Its home.
 
     Example:
         >>> import copy
@@ -72,9 +75,7 @@ class Simulation:
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
         self._store = RunStore(out)
         self._store.check()
-        self._world = set_up(self.scenario, self.clock, self.seed, self._store)
-        self.home = self._world.home
-        self._loop = Loop(self._world, self.clock, simulation.max_span)
+        self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         self._pace: Pace | None = None
         self._stopping = self._broken = False
         self._run: Run | None = None  # once it is finished
@@ -83,12 +84,105 @@ class Simulation:
         self._setup_s = time.perf_counter() - began
         self._simulate_s = self._save_s = 0.0
 
+    # Copies
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return a simulation that goes on by itself.
+
+        Raises:
+            ArtifactError: The run is stored in a directory, which can't be in two states.
+        """
+        if self.directory is not None:
+            raise ArtifactError(
+                f"a simulation that stores in {self.directory} can't be copied, for both would"
+                " write there: branch a simulation that stores in memory"
+            )
+        twin = self.__class__.__new__(self.__class__)
+        twin.__dict__.update(self.__dict__)
+        memo[id(self)] = twin
+        twin._take(copy_state(self._state, self._constants))
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a file or another process needs to go on."""
+        file = io.BytesIO()
+        self.save(file)
+        return {"saved": file.getvalue()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on where another process left off."""
+        self.__dict__.update(self.load(io.BytesIO(state["saved"])).__dict__)
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Write the simulation to a file, to be gone on with by `load`.
+
+        Raises:
+            ArtifactError: The run is stored in a directory, or a component keeps what can't be
+                written, such as an open file.
+
+        Example:
+            >>> import io
+            >>> simulation = Simulation(None, "simulation.duration=2 h", seed=4)
+            >>> simulation.advance(3600)
+            >>> file = io.BytesIO()
+            >>> simulation.save(file)
+            >>> _ = file.seek(0)
+            >>> Simulation.load(file).run().digest == simulation.run().digest
+            True
+        """
+        if self.directory is not None:
+            raise ArtifactError(
+                f"the simulation stores in {self.directory}: set artifacts.checkpoint, and go on"
+                " by `fleet2d resume`"
+            )
+        write_snapshot(path, self._state, self._constants, self._header())
+
+    @classmethod
+    def load(cls, path: str | Path | BinaryIO) -> Self:
+        """Return the simulation that `save` wrote, at the step where it was.
+
+        Raises:
+            ArtifactError: The file is damaged, or of another version of Fleet2D.
+        """
+        header, body = open_snapshot(path)
+        simulation = cls(header["scenario"], seed=header["seed"])
+        simulation._take(read_state(body, simulation._constants))
+        simulation._store.hash_again()
+        simulation._setup_s, simulation._simulate_s, simulation._save_s = header["wall_s"]
+        return simulation
+
+    def _take(self, state: State) -> None:
+        self._state, self._store = state, state.store
+
+    def _header(self) -> dict[str, Any]:
+        return {
+            "scenario": self.scenario.resolved(),
+            "seed": self.seed,
+            "wall_s": [self._setup_s, self._simulate_s, self._save_s],
+        }
+
+    @property
+    def _constants(self) -> dict[str, object]:
+        """What never changes during the run, by name."""
+        entities = {**self.scenario.users, **self.scenario.robots}
+        constants: dict[str, object] = {f"entity {name}": e for name, e in entities.items()}
+        constants |= {"clock": self.clock, "scenario": self.scenario, **self.home.constants}
+        constants |= {f"sight of {c.owner.name}": c.method for c in self._state.cameras if c.method}
+        if self.directory is not None:
+            constants["store"] = self._store
+        return constants
+
     # State
 
     @property
     def step(self) -> int:
         """The next step to simulate; 0 at first."""
-        return self._loop.step
+        return self._state.bodies.step
+
+    @property
+    def home(self) -> Home:
+        """The home, as it is at present."""
+        return self._state.home
 
     @property
     def time(self) -> datetime:
@@ -106,17 +200,18 @@ class Simulation:
 
         And of doors whether they are open and locked, of sensors whether they are on.
         """
-        bodies = {actor.name: self._state_of(actor) for actor in self._world.actors}
+        bodies = {actor.name: self._state_of(actor) for actor in self._state.actors}
         doors = {
             name: {"open": i not in self.home.shut, "locked": i in self.home.locked}
-            for i, name in enumerate(self._world.changes.names)
+            for i, name in enumerate(self._state.changes.names)
         }
-        return bodies | doors | {name: {"on": on} for name, on in self._world.sensors.on.items()}
+        self._state.settle(self.step)
+        return bodies | doors | {name: {"on": on} for name, on in self._state.sensors.on.items()}
 
     @property
     def actors(self) -> dict[str, Actor]:
         """Everybody in the run, by name: configuration, behaviors and plan."""
-        return {actor.name: actor for actor in self._world.actors}
+        return {actor.name: actor for actor in self._state.actors}
 
     @property
     def directory(self) -> Path | None:
@@ -126,14 +221,14 @@ class Simulation:
     @property
     def outputs(self) -> dict[str, Any]:
         """The newest output of each algorithm, by name."""
-        return dict(self._world.learners.outputs)
+        return dict(self._state.learners.outputs)
 
     @property
     def algorithms(self) -> dict[str, Algorithm]:
         """The algorithms in the run, by name: configuration, and what they have learned."""
         return {
             learner.name: learner.component
-            for learner in self._world.learners.all
+            for learner in self._state.learners.all
             if isinstance(learner.component, Algorithm)
         }
 
@@ -185,7 +280,8 @@ class Simulation:
             raise ScenarioError(
                 f"there is nobody named {name!r}{hint} There are: {', '.join(actors)}"
             )
-        actors[name].ask_at, actors[name].arbiter.wake_step = self.step, None
+        actors[name].ask(self.step)
+        actors[name].arbiter.wake_step = None
         self._steered()
 
     def change(self, change: HomeChange | None = None, /, **what: Any) -> None:
@@ -205,7 +301,7 @@ class Simulation:
             asked = HomeChange(**what) if change is None else change
         except ValidationError as error:
             raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
-        self._world.changes.ask(asked, self.step, "a script")
+        self._state.changes.ask(asked, self.step, "a script")
         self._steered()
 
     def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
@@ -236,19 +332,22 @@ class Simulation:
         began = time.perf_counter()
         # Where a component failed, asking the metrics could fail again, and lose what is stored.
         results: dict[str, Any] = {}
-        if self._world.log and status != "failed":
-            self._loop.count_looks(self._world.log)
+        state = self._state
+        if status != "failed":
+            state.settle(self.step)
+        if state.log and status != "failed":
+            state.count_looks()
             try:
-                results = self._world.learners.finish(self.step, self._world.log)
-                self._store.manifest.notes += self._world.learners.unheard()
+                results = state.learners.finish(self.step, state.log)
+                self._store.manifest.notes += self._state.learners.unheard()
             except BaseException as error:
                 self._fail(error)
                 raise
         self._simulate_s += time.perf_counter() - began
         began = time.perf_counter()
-        self._world.recorder.end(self.step)
+        state.recorder.end(self.step, len(state.actors))
         if status != "failed":
-            self._world.layers.finish(self.step)
+            self._state.layers.finish(self.step)
             self._keep_learned()
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
@@ -262,7 +361,7 @@ class Simulation:
     def _keep_learned(self) -> None:
         """Store what algorithms have learned; of one that can't be kept, the run says so."""
         if self._store.directory is not None and self.scenario.artifacts.learned:
-            notes = self._world.learners.remember(self._store.directory / LEARNED_NAME)
+            notes = self._state.learners.remember(self._store.directory / LEARNED_NAME)
             self._store.manifest.notes += notes
 
     def _steered(self) -> None:
@@ -277,7 +376,7 @@ class Simulation:
             raise InputError("the run is finished: set up a new Simulation to go on")
         if self._broken:
             raise InputError("the run broke off in the middle of a span and can't go on")
-        began, stored = time.perf_counter(), self._world.recorder.wall_s
+        began, stored = time.perf_counter(), self._state.recorder.wall_s
         self._set_pace()
         with deferred_interrupt(self._stop):
             try:
@@ -286,7 +385,7 @@ class Simulation:
                 self._broken = True
                 raise
             finally:
-                stored = self._world.recorder.wall_s - stored
+                stored = self._state.recorder.wall_s - stored
                 self._simulate_s += time.perf_counter() - began - stored
                 self._save_s += stored
         if self._stopping:
@@ -296,7 +395,9 @@ class Simulation:
     def _spans(self, end: int, on_progress: Callable[[Self], None] | None) -> None:
         told = time.perf_counter()
         while self.step < end and not self._stopping:
-            self._loop.span(self._slice(end))
+            span = Span(self.step, self._slice(end))
+            for phase in PHASES:
+                phase(self._state, span)
             if self._pace:
                 self._pace.hold(self.step * self.clock.step_us / 1e6, lambda: self._stopping)
             if on_progress and time.perf_counter() - told > 0.1:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.table import Column, TableSpec
-from fleet2d.engine.buckets import Eye
+from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.key_frames import KEY_KINDS
 from fleet2d.engine.sensors import Sensors
 from fleet2d.sight.perception import POSTURES
@@ -28,7 +28,7 @@ def table_specs(
     cameras: Sequence[str] = (),
     activities: bool = False,
 ) -> list[TableSpec]:
-    """Return the tables that a run with these settings stores; `cameras` are told_cameras()."""
+    """Return the tables that a run stores; `cameras` are from camera_names()."""
     entity = Column("entity", "category", categories=(*users, *robots))
     room = Column("room", "category", nullable=True, categories=tuple(rooms))
     away = Column("away", "bool", description="not at home; x and y are where it left")
@@ -43,24 +43,26 @@ def table_specs(
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=tuple(users))
-        whom = (user,) if users else ()
-        who = entity
+        seen = (user,) if users else ()
+        entities = entity
         if changes:
             what = "what did it, or what it happened to; none: the home itself"
             names = (*users, *robots, *objects)
-            who = Column("entity", "category", categories=names, nullable=True, description=what)
-        specs.append(TableSpec("events", (STEP, TIME, who, event, *whom, detail)))
+            entities = Column(
+                "entity", "category", categories=names, nullable=True, description=what
+            )
+        specs.append(TableSpec("events", (STEP, TIME, entities, event, *seen, detail)))
     return specs
 
 
-def told_cameras(eyes: Sequence[Eye]) -> tuple[str, ...]:
+def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
     """Return the names of all cameras if a run has to tell them apart, or from the truth.
 
     It does where a robot has several, or errs.
     """
-    if not any(eye.errs or len(eye.cameras) > 1 for eye in eyes):
+    if not any(those.errs or len(those.names) > 1 for those in cameras):
         return ()
-    return tuple(dict.fromkeys(name for eye in eyes for name in eye.cameras))
+    return tuple(dict.fromkeys(name for those in cameras for name in those.names))
 
 
 def _observation_table(

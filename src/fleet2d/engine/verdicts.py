@@ -49,10 +49,9 @@ def points_seen(
         [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
         np.int64,
     ).reshape(lenses.widest.shape)
-    # Of one layout, however many they are, so that the kernel is compiled once.
-    x, y = (np.ascontiguousarray(column) for column in (crowd.x, crowd.y))
-    away = np.ascontiguousarray(crowd.away)
-    asked, number = questions(lenses, widest, SLACK, robot, x, y, away, first, step_us)
+    asked, number = questions(
+        lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
+    )
     answers = np.zeros(len(asked) + 1, np.uint8)
     moved = asked[1:, : EYE_HEADING + 1] != asked[:-1, : EYE_HEADING + 1]
     moved[:, BODY] = False

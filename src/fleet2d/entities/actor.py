@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
-from fleet2d.entities.plan import Motion, Plan, State
+from fleet2d.entities.plan import Motion, Plan, Pose
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.objects import PlacedObject, Posture
@@ -32,6 +32,28 @@ from fleet2d.units import micros
 PAUSE = timedelta(minutes=1)
 # A shut door is in the way: wait this long, then ask again.
 AT_A_DOOR = timedelta(seconds=10)
+
+
+NEVER = 1 << 62
+"""The step of what never happens."""
+
+
+class Bodies(Protocol):
+    """All bodies of a run.
+
+    Attributes:
+        step: The present step.
+        ask_at: int64 (bodies,), the step at which each decides next; NEVER for never.
+    """
+
+    step: int
+    ask_at: NDArray[np.int64]
+
+    def pose(self, row: int) -> Pose:
+        """Return where a body is at the present step."""
+
+    def hold(self, row: int, pose: Pose) -> None:
+        """Let a body rest at a pose from the present step on."""
 
 
 class PlaceAt(NamedTuple):
@@ -54,12 +76,11 @@ class Actor:
         name: Its name in the scenario.
         path: Its path there, "users.ana"; names its random streams and errors.
         entity: Its configuration.
-        state: Where it is at the present step.
         plan: What it follows.
         motion: The motion of the plan.
         planned_at: The step at which it was last asked.
-        ask_at: The step at which it is asked again; None: never.
         notes: What of its scenario this home lacks, and what was left out for it.
+        row: Its row among the bodies of the run.
     """
 
     name: str
@@ -81,7 +102,8 @@ class Actor:
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set where it has cameras
         self.behaviors = [behavior.model_copy(deep=True) for behavior in self.entity.behaviors]
         with blame(self.path, None):
-            self.state = self._begin()
+            self._bodies: Bodies | None = None
+            self._state, self._state_step = self._begin(), 0
             battery = getattr(self.entity, "battery", None)
             self.charge = None if battery is None else Charge(battery, self)
             for behavior in self.behaviors:
@@ -98,7 +120,31 @@ class Actor:
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
-        self.ask_at: int | None = 0
+        self.row = 0
+
+    def join(self, bodies: Bodies, row: int) -> None:
+        """Take part in a run."""
+        self._bodies, self.row = bodies, row
+
+    @property
+    def state(self) -> Pose:
+        """Where it is at the present step."""
+        bodies = self._bodies
+        if bodies is not None and self._state_step != bodies.step:
+            self._state, self._state_step = bodies.pose(self.row), bodies.step
+        return self._state
+
+    @state.setter
+    def state(self, pose: Pose) -> None:
+        self._state = pose
+        if self._bodies is not None:
+            self._state_step = self._bodies.step
+            self._bodies.hold(self.row, pose)
+
+    def ask(self, step: int | None) -> None:
+        """Set the step at which it decides next; None: never."""
+        if self._bodies is not None:
+            self._bodies.ask_at[self.row] = NEVER if step is None else step
 
     @property
     def space(self) -> Space:
@@ -337,7 +383,7 @@ class Actor:
     def _watch(self, now: Situation, *, fresh: bool) -> None:
         """Set when it is asked again: the plan is over, or somebody may want to break in."""
         if self.charge is not None and self.charge.is_empty:
-            self.ask_at = None  # it stands there for good
+            self.ask(None)  # it stands there for good
             return
         self.arbiter.watch(now, self.plan, fresh=fresh)
         steps = [s for s in (self.plan.over_at, self.arbiter.wake_step) if s is not None]
@@ -345,7 +391,7 @@ class Actor:
             empty_us = self.charge.falls_to(0.0, self.motion)
             if empty_us is not None:
                 steps.append(max(self.clock.step_at_or_after(empty_us), now.step + 1))
-        self.ask_at = min(steps, default=None)
+        self.ask(min(steps, default=None))
 
     def _asked(self, behavior: Behavior, now: Situation) -> Plan | None:
         """Return a behavior's plan; where a shut door or a cost is in its way, wait a little."""
@@ -361,7 +407,7 @@ class Actor:
             self._blocked = told, self.clock.step_at_or_after(plan.time_us)
             return plan
 
-    def _begin(self) -> State:
+    def _begin(self) -> Pose:
         """Return the state at step 0."""
         place = self.entity.start
         if place is None:
@@ -381,8 +427,8 @@ class Actor:
             x, y = self.find(place, 0, "start")
         heading = self.entity.start_heading_deg
         if heading is None:
-            return State(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
-        return State(x, y, round(heading / 360 * TURN) % TURN, away)
+            return Pose(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
+        return Pose(x, y, round(heading / 360 * TURN) % TURN, away)
 
     def _has_any(self, names: RoomChoice | Point) -> bool:
         """Tell whether the largest part of its space has a room of these kinds."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import ceil
-from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,7 @@ from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.kernels.motion import (
-    Breakpoints,
-    Poses,
-    WalkRule,
-    time_route,
-    trace_meander,
-    trace_track,
-)
+from fleet2d.kernels.motion import Breakpoints, WalkRule, time_route
 from fleet2d.units import micros
 
 if TYPE_CHECKING:
@@ -33,7 +26,7 @@ I64 = NDArray[np.int64]
 Row = tuple[int, int, int, int, int]  # time, x, y, heading, away
 
 
-class State(NamedTuple):
+class Pose(NamedTuple):
     """Where a body is at one step: lattice units, 1/4096 turn, 1 = away."""
 
     x: int
@@ -42,27 +35,12 @@ class State(NamedTuple):
     away: int
 
 
-class Motion(Protocol):
-    """What the engine follows between two decisions."""
-
-    def trace(self, first: int, start: State, out: Poses) -> None:
-        """Write the poses of the steps from `first` on, where the body is at `start`."""
-
-
 @dataclass(frozen=True)
 class Track:
-    """A motion along breakpoints that are known in advance."""
+    """A motion known beforehand."""
 
     breakpoints: Breakpoints
     step_us: int
-
-    def __deepcopy__(self, memo: dict[int, object]) -> "Track":
-        """Return itself: it never changes."""
-        return self
-
-    def trace(self, first: int, start: State, out: Poses) -> None:
-        """Write the poses of the steps from `first` on."""
-        trace_track(self.breakpoints, first * self.step_us, self.step_us, len(out.x), out)
 
 
 @dataclass(frozen=True)
@@ -73,13 +51,8 @@ class Walk:
     space: Mesh
     rule: WalkRule
 
-    def __deepcopy__(self, memo: dict[int, object]) -> "Walk":
-        """Return itself: it never changes."""
-        return self
 
-    def trace(self, first: int, start: State, out: Poses) -> None:
-        """Write the poses of the steps from `first` on."""
-        trace_meander(self.walls, self.space, self.rule, first, np.array(start[:3]), out)
+Motion = Track | Walk
 
 
 class Note(NamedTuple):
@@ -167,12 +140,12 @@ class Plan:
         return self
 
     def _walk(self, route: I64) -> None:
-        actor, rows = self._actor, np.empty((2 * len(route), 4), np.int64)
-        count = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate, rows)
-        block = np.zeros((count - 1, 5), np.int64)
-        block[:, :4] = rows[1:count]
+        actor = self._actor
+        rows = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate)
+        block = np.zeros((len(rows) - 1, 5), np.int64)
+        block[:, :4] = rows[1:]
         self._rows.append(block)
-        self.time_us, self.x, self.y, self.heading = rows[count - 1].tolist()
+        self.time_us, self.x, self.y, self.heading = rows[-1].tolist()
 
     def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
         """Walk to an object and use it: step to one of its places, face and sit as one does there.
@@ -215,6 +188,12 @@ class Plan:
             return np.full(len(times_us), known[first])
         taken: NDArray[np.int8] = known[np.searchsorted(begins, times_us, side="right")]
         return taken
+
+    def posture_times(self) -> tuple[I64, NDArray[np.int8]]:
+        """Return when the body takes another posture [us], and the postures, one more."""
+        codes = [self._posture_before, *(code for _, code in self.postures)]
+        times = [time for time, _ in self.postures]
+        return np.array(times, np.int64), np.array(codes, np.int8)
 
     def _get_up(self) -> None:
         """Stand, and step off the object that one sits or lies on."""

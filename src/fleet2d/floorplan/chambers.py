@@ -11,9 +11,8 @@ from fleet2d.floorplan.doorways import Segment
 from fleet2d.floorplan.gates import Gates
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import build_mesh
-from fleet2d.kernels.cells import label_triangles
 from fleet2d.kernels.chambers import spread_labels
-from fleet2d.kernels.mesh import WALL, Mesh, rasterize_cells
+from fleet2d.kernels.mesh import WALL, Mesh, label_triangles, rasterize_cells
 
 MIN_CHAMBER_M2 = 0.8
 """What is smaller, such as the space within a thick wall, is no room."""

@@ -114,6 +114,7 @@ class CostedSpace(Space):
         self.__dict__.update(base.__dict__)
         cells = base.radius / base.plan.lattice.cell + 0.5  # up to the border of a cell
         near = squared_distance(np.ascontiguousarray(cost >= 0)) <= cells * cells
+        self._given = cost
         self.base, self.cost = base, np.where(near, NO_WAY, cost).astype(np.int32)
         self.route = lru_cache(ROUTES_KEPT)(self._find_route)
         self.cells = lru_cache(None)(self._find_cells)
@@ -130,6 +131,10 @@ class CostedSpace(Space):
         rank = np.empty(self.parts, np.int32)
         rank[np.argsort(-sizes, kind="stable")] = np.arange(self.parts, dtype=np.int32)
         self.part_of_cell = np.where(part >= 0, rank[part], np.int32(-1))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Make it anew from what it was made from."""
+        return CostedSpace, (self.base, self._given)
 
     def part_at(self, x: int, y: int) -> int:
         """Return the connected part of a lattice point; -1 where the body can't be or go."""

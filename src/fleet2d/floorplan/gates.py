@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.kernels.mesh import WALL, Mesh, build_buckets
+from fleet2d.kernels.mesh import WALL, Mesh
 
 Segment = tuple[tuple[int, int], tuple[int, int]]
 I64 = NDArray[np.int64]
@@ -55,7 +55,7 @@ class Gates:
         for gate in gates:
             for triangle, edge in self._sides[gate]:
                 neighbors[triangle, edge] = WALL
-        return self.mesh._replace(neighbors=neighbors)
+        return self.mesh.with_neighbors(neighbors)
 
 
 def _with_edges(
@@ -72,13 +72,11 @@ def _with_edges(
     neighbors = np.array(
         [[owner.get((t[(k + 1) % 3], t[k]), WALL) for k in range(3)] for t in corners], np.int32
     )
-    rows, columns = mesh.bucket_rows, mesh.bucket_columns
-    buckets = build_buckets(vertices, triangles, rows, columns)
     sides = [
         tuple((owner[edge], corners[owner[edge]].index(edge[0])) for edge in ((a, b), (b, a)))
         for a, b in ends
     ]
-    return Mesh(vertices, triangles, neighbors, *buckets, columns, rows), sides
+    return Mesh(vertices, triangles, neighbors), sides
 
 
 def _force_edge(

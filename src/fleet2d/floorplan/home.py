@@ -1,10 +1,8 @@
 """The home of a run: its floor plan, what stands in it now, and the space that bodies have."""
 
 from collections.abc import Collection, Sequence
-from copy import deepcopy
 from dataclasses import replace
 from functools import lru_cache
-from typing import Self
 
 import numpy as np
 import shapely
@@ -70,13 +68,10 @@ class Home:
         self._costs_version = 0
         self._costed: dict[Space, CostedSpace] = {}
 
-    def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        """Return a home that changes on its own; what it worked out so far is shared."""
-        twin = self.__class__.__new__(self.__class__)
-        twin.__dict__.update(self.__dict__)
-        memo[id(self)] = twin
-        twin.layers = deepcopy(self.layers, memo)
-        return twin
+    @property
+    def constants(self) -> dict[str, object]:
+        """What of it never changes during a run, by name."""
+        return {"plan": self.plan, "walls": self.plan.mesh, "shapes": self._shapes}
 
     @property
     def walls(self) -> Mesh:
@@ -231,12 +226,12 @@ class _Shapes:
         self.door_lines = door_lines
         self.walls = lru_cache(ARRANGEMENTS_KEPT)(self._find_walls)
         self._gates = lru_cache(ARRANGEMENTS_KEPT)(self._find_gates)
-        self._spaces = lru_cache(ARRANGEMENTS_KEPT)(self._find_space)
+        self.space_of = lru_cache(ARRANGEMENTS_KEPT)(self._find_space)
 
     def space(
         self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]
     ) -> Space:
-        return self._spaces(radius, frozenset(shut), _solid(objects))
+        return self.space_of(radius, frozenset(shut), _solid(objects))
 
     def _find_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
         if not self.door_lines:
@@ -263,13 +258,15 @@ class _Shapes:
     def _find_space(
         self, radius: float, shut: frozenset[int], solid: tuple[PlacedObject, ...]
     ) -> Space:
-        return Space(
+        space = Space(
             self.plan,
             radius,
             walls=self.walls(shut, _tall(solid)),
             obstacles=[lattice_footprint(self.plan, thing) for thing in solid],
             shut=[self.door_lines[door] for door in sorted(shut)],
         )
+        space.key = radius, shut, solid
+        return space
 
 
 def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:

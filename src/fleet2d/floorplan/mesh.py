@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.kernels.mesh import BUCKET, SUB, WALL, Mesh, build_buckets
+from fleet2d.kernels.mesh import SUB, WALL, Mesh
 
 GRID = 2
 """Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""
@@ -81,10 +81,10 @@ def build_mesh(
     rings = _rings(polygons, columns * SUB, rows * SUB)
     if corners:
         rings = _split_at(rings, np.array(corners, np.int64).reshape(-1, 2))
-    mesh = _meshed(rings, columns, rows)
+    mesh = _meshed(rings)
     if mesh is None:
         # A corner that touches the middle of another wall: make it a vertex of that wall, too.
-        mesh = _meshed(_split_at_touching_vertices(rings), columns, rows)
+        mesh = _meshed(_split_at_touching_vertices(rings))
     if mesh is None:
         raise FloorPlanError(
             "The free space can't be cut into triangles that end at its walls. Send the outlines "
@@ -177,7 +177,7 @@ def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]
     return [[split(ring) for ring in rings] for rings in polygons]
 
 
-def _meshed(polygons: list[list[Int64]], columns: int, rows: int) -> Mesh | None:
+def _meshed(polygons: list[list[Int64]]) -> Mesh | None:
     """Return the mesh, or None when the triangles don't fill just the space between the rings."""
     rings = [ring for rings in polygons for ring in rings]
     wall_starts = np.concatenate(rings)
@@ -195,10 +195,7 @@ def _meshed(polygons: list[list[Int64]], columns: int, rows: int) -> Mesh | None
     neighbors = _neighbors(triangles, len(keys), np.sort(walls, kind="stable"))
     if neighbors is None:
         return None
-    corner_ids: npt.NDArray[np.int32] = triangles.astype(np.int32)
-    bucket_rows, bucket_columns = rows * SUB // BUCKET + 1, columns * SUB // BUCKET + 1
-    buckets = build_buckets(vertices, corner_ids, bucket_rows, bucket_columns)
-    return Mesh(vertices, corner_ids, neighbors, *buckets, bucket_columns, bucket_rows)
+    return Mesh(vertices, triangles.astype(np.int32), neighbors)
 
 
 def _triangulated(polygons: list[list[Int64]]) -> Int64:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import shapely
@@ -13,10 +14,16 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.gates import Segment
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.cells import label_triangles
 from fleet2d.kernels.fields import walking_distance
-from fleet2d.kernels.mesh import SUB, Mesh, locate, rasterize_cells, strictly_inside
-from fleet2d.kernels.routes import Corners, RouteGraph, build_route_graph, find_route
+from fleet2d.kernels.mesh import (
+    SUB,
+    Mesh,
+    label_triangles,
+    locate,
+    rasterize_cells,
+    strictly_inside,
+)
+from fleet2d.kernels.routes import Corners, Routes
 from fleet2d.kernels.sight import line_of_sight
 
 # Snapping the shrunk walls and rounding a pose move it by less than this many lattice units.
@@ -71,6 +78,7 @@ class Space:
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
         self.radius = radius
+        self.key: tuple[Any, ...] = ()  # by which a home finds it again
         lattice = plan.lattice
         reach = radius * lattice.units_per_m
         blocks = [np.asarray(o.exterior.coords) for o in obstacles]
@@ -95,14 +103,10 @@ class Space:
         self._part_of_triangle = rank[part].astype(np.int32)
         self.parts = int(np.count_nonzero(sizes))
 
-    def __deepcopy__(self, memo: dict[int, object]) -> "Space":
-        """Return itself: what it holds never changes."""
-        return self
-
     @cached_property
-    def graph(self) -> RouteGraph:
+    def routes(self) -> Routes:
         """The corners of the space and the legs between them, built when first needed."""
-        return build_route_graph(self.mesh, self._corners())
+        return Routes(self.mesh, self._corners())
 
     def part_at(self, x: int, y: int) -> int:
         """Return the connected part of a lattice point strictly inside the space, else -1."""
@@ -136,17 +140,12 @@ class Space:
         """
         if not strictly_inside(self.mesh, *goal):
             return None
-        prefix: list[tuple[int, int]] = []
-        if not strictly_inside(self.mesh, *start):
-            inside = self._way_in(*start)
-            if inside is None:
-                return None
-            prefix, start = [start], inside
-        out = np.empty((len(self.graph.corners.vertex) + 2, 2), np.int64)
-        count = find_route(self.mesh, self.graph, *start, *goal, out)
-        if count == 0:
-            return None
-        return _shared(np.concatenate([np.array(prefix, np.int64).reshape(-1, 2), out[:count]]))
+        if strictly_inside(self.mesh, *start):
+            route = self.routes.find(*start, *goal)
+            return None if route is None else _shared(route)
+        inside = self._way_in(*start)
+        route = None if inside is None else self.routes.find(*inside, *goal)
+        return None if route is None else _shared(np.concatenate([[start], route]))
 
     def distance_field(self, places: I64) -> NDArray[np.float64]:
         """Return how far each cell is on foot from the nearest of some places.
@@ -215,14 +214,11 @@ class Space:
         ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
         walls_meeting = np.bincount(ids, minlength=len(vertices))
         vertex, first = np.unique(ids[reflex], return_index=True)
-        node_of_vertex = np.full(len(vertices), -1, np.int32)
-        node_of_vertex[vertex] = np.arange(len(vertex))
         return Corners(
-            node_of_vertex=node_of_vertex,
             vertex=vertex.astype(np.int64),
-            before=np.ascontiguousarray(p[reflex][first]),
-            after=np.ascontiguousarray(r[reflex][first]),
-            simple=(walls_meeting[vertex] == 1).astype(np.uint8),
+            before=p[reflex][first],
+            after=r[reflex][first],
+            simple=walls_meeting[vertex] == 1,
         )
 
 

@@ -177,11 +177,9 @@ class FixFollower:
 
     def _takes(self, i: int, j: int) -> int:
         """Return how long the body takes from one fix to another [us]."""
-        route = self._route(i, j)
-        rows = np.empty((2 * len(route), 4), np.int64)
-        actor = self.actor
-        count = time_route(route, 0, int(self.heading[i]), actor.speed, actor.turn_rate, rows)
-        return int(rows[count - 1, 0])
+        route, heading = self._route(i, j), int(self.heading[i])
+        rows = time_route(route, 0, heading, self.actor.speed, self.actor.turn_rate)
+        return int(rows[-1, 0])
 
     def _leg(self, plan: "Plan", i: int, j: int, leave_us: int) -> None:
         """Go from fix i, left at a moment, to fix j, at an even speed all the way."""

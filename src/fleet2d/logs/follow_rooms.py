@@ -168,9 +168,7 @@ class RoomFollower:
         route = self.actor.space.route((plan.x, plan.y), spot)
         if route is None:  # a door is shut at present: straight on, for the log knows better
             route = straight_way((plan.x, plan.y), spot)
-        rows = np.empty((2 * len(route), 4), np.int64)
-        count = time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate, rows)
-        return rows[:count]
+        return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(
         self, plan: "Plan", rows: I64, may_leave: int, arrive_us: int, before: Visit

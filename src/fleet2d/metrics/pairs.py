@@ -67,5 +67,5 @@ def in_sight(plan: "FloorPlan", pair: Pair, steps: NDArray[np.int64]) -> Bool:
     begins = np.flatnonzero(moved)
     for begin, end in zip(begins.tolist(), [*begins.tolist()[1:], len(places)], strict=False):
         x, y = one[begin].tolist()
-        seen[begin:end] = points_in_sight(plan.mesh, x, y, np.ascontiguousarray(other[[begin]]))[0]
+        seen[begin:end] = points_in_sight(plan.mesh, x, y, other[[begin]])[0]
     return seen

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.log import Event
 from fleet2d.component import register
+from fleet2d.events import Event
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean

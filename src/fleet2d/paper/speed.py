@@ -1,6 +1,6 @@
 """Section V.A: how long the paper's scenarios take, beside its own figures.
 
-Every row is a process of its own on one core, `fleet2d run …`, that loads the compiled kernels,
+Every row is a process of its own on one core, `fleet2d run …`, that
 stores the run, and builds whatever it needs of the home itself: set-up, simulating and saving
 count. Rows that are watched are a process of their own, too. The paper's figures are from its
 authors' machine: they tell the order of magnitude.
@@ -126,13 +126,11 @@ def reproduce(request: Request, tell: Tell) -> Result:
     with one_core():
         for number, row in enumerate(cases):
             tell(row.case, number, len(cases))
-            if row.watched is None and not request.quick:  # compiles what isn't compiled yet
-                run_once((*row.overrides, "simulation.duration.days=1"))
             measured.append(measure(row, runs))
         tell("rows", len(cases), len(cases))
     notes: tuple[str, ...] = NOTES
     if request.quick:
-        notes += ("quick: rows may have compiled kernels, and short runs are mostly set-up",)
+        notes += ("quick: short runs are mostly set-up",)
     if request.map is None:
         notes += ("a real-world map is left out: name one by --map (a ROS or a vacuum's map)",)
     table = Table(

@@ -1,7 +1,7 @@
 """Flashlight: the cells in view of a pose, kept by the poses that somebody takes."""
 
 from collections import OrderedDict
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +73,6 @@ class Flashlight(FieldOfView):
     def kept(self) -> tuple[int, int]:
         """The number of poses kept, and the memory that they take [bytes]."""
         return len(self._spots), self._taken
-
-    def __deepcopy__(self, memo: dict[int, object] | None = None) -> Self:
-        """Return itself: all that it keeps follows from the walls."""
-        return self
 
     def _spot(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Spot:
         if getattr(self, "_walls", None) is not home.walls:

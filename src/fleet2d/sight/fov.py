@@ -72,7 +72,7 @@ class FieldOfView(Component):
         """
         found = points_in_reach(x, y, heading, reach, points)
         if found.any():
-            found[found] = self.visible(home, x, y, np.ascontiguousarray(points[found]))
+            found[found] = self.visible(home, x, y, points[found])
         return found
 
     def cells(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:

@@ -8,13 +8,11 @@ import numpy.typing as npt
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels.mesh import Mesh, locate
+from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.region import region_contains_points, region_outline
 from fleet2d.kernels.region import visible_region as visible_region_fast
-from fleet2d.kernels.sight import scratch_for
 
 Float64 = npt.NDArray[np.float64]
-Int32 = npt.NDArray[np.int32]
 
 
 class Walled(Protocol):
@@ -64,23 +62,16 @@ class VisibleRegion:
         self._mesh, self._lattice = plan.mesh, plan.lattice
         eye = self._lattice.to_lattice((x, y))
         self.eye = (int(eye[0]), int(eye[1]))
-        wall, stack = scratch_for(self._mesh.vertices)
-        right = np.empty_like(wall)
-        triangle = locate(self._mesh, *self.eye)
-        pieces = visible_region_fast(self._mesh, *self.eye, triangle, right, wall, stack)
-        if pieces == 0:
+        self.right, self.wall = visible_region_fast(self._mesh, *self.eye)
+        if len(self.right) == 0:
             raise PlacementError(
                 f"({x:g}, {y:g}) m is in a wall or outside the home, so nothing is visible from "
                 "there. Choose a place in free space."
             )
-        self.right: Int32 = right[:pieces].copy()
-        self.wall: Int32 = wall[:pieces].copy()
 
     @cached_property
     def _outline(self) -> tuple[Float64, float]:
-        outline = np.empty((2 * len(self.right), 2))
-        area = region_outline(self._mesh, *self.eye, self.right, self.wall, outline)
-        return outline, area
+        return region_outline(self._mesh, *self.eye, self.right, self.wall)
 
     @property
     def area_m2(self) -> float:

@@ -25,19 +25,19 @@ from fleet2d.kernels.perception import (
     BEARING_NOISE,
     BINS,
     DOUBLINGS,
-    GHOST_PURPOSES,
     HEADING_NOISE,
     KEEPS,
     MINUTES,
     MOST_GHOSTS,
     ONE,
     POSTURES,
-    PURPOSES,
     RANGE_NOISE,
     RANGE_SHARE,
     SHIFT,
     TABLE,
     ErrorTables,
+    GhostDraw,
+    UserDraw,
 )
 from fleet2d.kernels.random import BELL_STD
 from fleet2d.problems import did_you_mean
@@ -139,8 +139,8 @@ def error_tables(
         source=np.full((cameras, sources), ONE, np.int64),
         spot=np.zeros((cameras, sources, 3), np.int64),
         looks_like=np.zeros((cameras, users + 1), np.int64),
-        keys=np.zeros((cameras, users, PURPOSES), np.uint64),
-        ghost_keys=np.zeros((cameras, GHOST_PURPOSES), np.uint64),
+        keys=np.zeros((cameras, users, len(UserDraw)), np.uint64),
+        ghost_keys=np.zeros((cameras, len(GhostDraw)), np.uint64),
     )
     for c, (lens, perception) in enumerate(zip(lenses, perceptions, strict=True)):
         if perception is not None:

@@ -12,10 +12,9 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.errors import ScenarioError
-from fleet2d.kernels.mesh import SUB, Mesh, locate, rasterize_cells
+from fleet2d.kernels.mesh import SUB, Mesh, rasterize_cells
 from fleet2d.kernels.region import region_contains_points, regions_of_cells, visible_region
-from fleet2d.kernels.seen import bench_for, cells_in_view, mark_spans
-from fleet2d.kernels.sight import scratch_for
+from fleet2d.kernels.seen import cells_in_view, mark_spans
 from fleet2d.problems import problem_at
 from fleet2d.sight.fov import I64, Bool, FieldOfView, Reach
 
@@ -83,10 +82,6 @@ class VisibilityPolygon(FieldOfView):
         """Return which cells have their centre in the region, cut by range and angle."""
         return filled_cells(home, x, y, heading, reach)
 
-    def __deepcopy__(self, memo: dict[int, object] | None = None) -> Self:
-        """Return itself: all that it keeps follows from the walls."""
-        return self
-
     def _region(self, home: "Home", x: int, y: int) -> Pieces:
         if getattr(self, "_walls", None) is not home.walls:
             self._face(home)
@@ -98,7 +93,7 @@ class VisibilityPolygon(FieldOfView):
                 if cell >= 0:
                     here = slice(start[cell], start[cell + 1])
                     return np.array(right[here]), np.array(wall[here])  # of a file: read only
-        found = self._visited.pop((x, y), None) or _region_of(home.walls, x, y)
+        found = self._visited.pop((x, y), None) or visible_region(home.walls, x, y)
         self._visited[x, y] = found
         if len(self._visited) > self.keep:
             self._visited.popitem(last=False)
@@ -118,17 +113,10 @@ class VisibilityPolygon(FieldOfView):
 def filled_cells(home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
     """Return the cells in view by filling the visible region: bool (rows, columns)."""
     lattice = home.plan.lattice
-    bench = bench_for(home.walls, lattice.rows, lattice.columns)
-    mask = np.zeros((lattice.rows, lattice.columns), np.bool_)
-    mark_spans(bench.spans, cells_in_view(home.walls, x, y, heading, reach, bench), mask)
+    grid = (lattice.rows, lattice.columns)
+    mask = np.zeros(grid, np.bool_)
+    mark_spans(cells_in_view(home.walls, x, y, heading, reach, *grid), mask)
     return mask
-
-
-def _region_of(walls: Mesh, x: int, y: int) -> Pieces:
-    wall, stack = scratch_for(walls.vertices)
-    right = np.empty_like(wall)
-    count = visible_region(walls, x, y, locate(walls, x, y), right, wall, stack)
-    return right[:count].copy(), wall[:count].copy()
 
 
 def _regions_of(home: "Home") -> Regions:

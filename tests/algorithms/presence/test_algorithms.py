@@ -5,14 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import digests, run, scenario, table
 
 import fleet2d
 from fleet2d.component import lookup
 from fleet2d.errors import Fleet2DError
-
-pytestmark = needs_jit
 
 ESTIMATORS = ["sighting_share", "exposure_ratio", "audit_only", "likelihood", "hmm", "fremen"]
 MODELS = ["last_seen", "long_term", "hour_of_week", "markov", "hmm", "semi_markov", "routine"]

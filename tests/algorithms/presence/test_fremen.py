@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from tests.algorithms.presence.worlds import DAY, MONDAY, bins_of, pieces
-from tests.homes import needs_jit
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.evidence import Evidence
@@ -26,7 +25,6 @@ def rhythmic(days: int, seed: int) -> Evidence:
     return Evidence(0, 1, watched, seen)
 
 
-@needs_jit
 @pytest.mark.parametrize("days", [1, 4])
 def test_forecasts_are_those_of_the_definition(days: int) -> None:
     found = rhythmic(days, days)
@@ -52,7 +50,6 @@ def test_forecasts_are_those_of_the_definition(days: int) -> None:
                 assert expected == pytest.approx(by_order[k, 0, room, m], abs=1e-6)
 
 
-@needs_jit
 def test_a_daily_rhythm_is_found_and_an_order_chosen_that_has_it() -> None:
     estimator = Fremen()
     estimator.begin(3, 1)

@@ -17,7 +17,6 @@ from tests.algorithms.presence.worlds import (
     shares_at_home,
     transitions,
 )
-from tests.homes import needs_jit
 
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.counts import joined
@@ -49,7 +48,6 @@ def learn(estimator, found, rooms: int, users: int = 1):
     return estimator.presence([f"u{i}" for i in range(users)], MONDAY)
 
 
-@needs_jit
 def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
     """60 days and independent looks: the model is right, so only sampling is left.
 
@@ -68,7 +66,6 @@ def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
         assert np.mean(where == 4) == pytest.approx(presence.away("u0"), abs=0.03)
 
 
-@needs_jit
 def test_sighting_share_collapses_under_hangout_and_likelihood_holds() -> None:
     """Robots that hang out where they saw somebody most: the rich get richer (6 runs of 30 days).
 
@@ -92,7 +89,6 @@ def test_sighting_share_collapses_under_hangout_and_likelihood_holds() -> None:
     assert (np.array(errors)[:, 0] > np.array(errors)[:, 2]).all()
 
 
-@needs_jit
 def test_exposure_ratio_is_biased_by_following_and_likelihood_holds() -> None:
     """Robots that stay while they see the person: rooms left at once are watched too little."""
     errors = []
@@ -131,7 +127,6 @@ def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between()
         assert all_looks > 2 * audited
 
 
-@needs_jit
 def test_independent_patrol_is_fair_to_all() -> None:
     for seed in range(2):
         where = person(30 * DAY, 5, seed)
@@ -147,7 +142,6 @@ def test_pieces_of_evidence_join_to_the_whole() -> None:
         assert np.array_equal(one, other)
 
 
-@needs_jit
 def test_intervals_hold_the_truth_as_often_as_stated_or_a_little_more() -> None:
     """Ten days of a patrol, 20 runs of 4 rooms and away: 90 % intervals hold 96 %.
 

@@ -14,7 +14,6 @@ from tests.algorithms.presence.worlds import (
     person,
     pieces,
 )
-from tests.homes import needs_jit
 
 from fleet2d.algorithms.presence.belief import Presence, Track
 from fleet2d.algorithms.presence.chain_model import (
@@ -153,7 +152,6 @@ def test_a_forecast_keeps_to_what_was_known_when_it_was_made() -> None:
     assert before.tolist() == now.at(soon).with_away("u0").tolist()
 
 
-@needs_jit
 def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
     """Log loss of the last 10 of 20 days of a Markov person, 4 runs; gaps are over 10 % of it."""
     scores = {cls: [] for cls in (LastSeen, LongTerm, MarkovDecay, Filter)}
@@ -198,7 +196,6 @@ def sleeper(days: int, seed: int) -> np.ndarray:
     return where
 
 
-@needs_jit
 def test_who_goes_by_the_hour_is_better_of_those_who_do() -> None:
     """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
     scores = {cls: [] for cls in (SemiMarkov, Routine)}

@@ -12,13 +12,10 @@ from tests.entities.robots.robots import (
     events,
     home_with,
 )
-from tests.homes import needs_jit
 from tests.scenes import digests, path, run
 
 import fleet2d
 from fleet2d.kernels.mesh import strictly_inside
-
-pytestmark = needs_jit
 
 PATROL = {"type": "patrol", "dwell": "5 min"}
 # Short, for the patrol charges a little each time that it stops in the charger's room.

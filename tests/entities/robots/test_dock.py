@@ -4,13 +4,10 @@ from typing import Any
 
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
-from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 BATTERY = {"driving": "30 min", "standing": "2 h", "charging": "20 min", "charger": [1.0, 3.0]}
 PATROL = {"type": "patrol", "rooms": ["kitchen", "bedroom", "bathroom"], "dwell": "3 min"}

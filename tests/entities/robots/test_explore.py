@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
-from tests.homes import needs_jit
 from tests.scenes import path
 
 import fleet2d
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 
 def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others() -> None:

@@ -13,7 +13,6 @@ from tests.entities.robots.robots import (
     home_with,
     names,
 )
-from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
@@ -22,8 +21,6 @@ from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import InputError
 from fleet2d.search.policies import exact, order_by
 from fleet2d.search.problem import SearchProblem, play
-
-pytestmark = needs_jit
 
 POLICIES = ["random", "nearest", "likeliest", "greedy", "exact", "receding"]
 OUT = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}

@@ -9,13 +9,10 @@ from tests.entities.robots.robots import (
     home_with,
     names,
 )
-from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 # She walks from the bathroom to the living room and on to the kitchen, again and again.
 WALKS = {

@@ -15,15 +15,12 @@ from tests.entities.robots.robots import (
     rooms,
 )
 from tests.entities.robots.test_find import told
-from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.robots.places import Places, fading
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 
 def hangout(**fields: Any) -> dict[str, Any]:

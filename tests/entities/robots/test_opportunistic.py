@@ -12,13 +12,10 @@ from tests.entities.robots.robots import (
     names,
     rooms,
 )
-from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 PATROL = {"type": "patrol", "rooms": ["kitchen", "bathroom", "bedroom"], "dwell": "2 min"}
 

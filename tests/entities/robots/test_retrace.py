@@ -9,14 +9,11 @@ import pytest
 from pyarrow.csv import read_csv
 from pyarrow.parquet import write_table
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
-from tests.homes import needs_jit
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.floorplan.valetudo import read_valetudo_path
-
-pytestmark = needs_jit
 
 MAP = "dreame_z10_named_rooms_and_paths.json"
 

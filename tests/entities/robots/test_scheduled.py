@@ -5,13 +5,10 @@ from typing import Any
 
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, rooms
-from tests.homes import needs_jit
 from tests.scenes import run
 
 import fleet2d
 from fleet2d.errors import InputError
-
-pytestmark = needs_jit
 
 VISITS = [
     {"at": "07:10", "place": "kitchen", "dwell": "5 min", "task": "sweep"},

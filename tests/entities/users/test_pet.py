@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import path, run, scenario
 
 from fleet2d.engine.simulation import Simulation
@@ -17,7 +16,6 @@ def cat(duration: str = "1 d", **fields: Any) -> dict[str, Any]:
     return scenario(duration, users={"rex": {"type": "pet", "radius": 0.1, **fields}})
 
 
-@needs_jit
 def test_it_sleeps_most_of_the_time_and_roams_through_its_rooms() -> None:
     stored = run(cat("4 d", rooms=ROOMS, start="kitchen"))
     poses = path(stored, "rex")

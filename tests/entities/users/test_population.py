@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from tests.homes import needs_jit
 from tests.routines.days import MONDAY
 from tests.scenes import run, scenario, table
 
@@ -31,7 +30,6 @@ def apart(counts: Counter[str], wanted: dict[str, float]) -> float:
     return sum(abs(counts[c] / total - share) for c, share in wanted.items()) / 2
 
 
-@needs_jit
 def test_shares_of_a_thousand_people_follow_the_survey_hour_by_hour() -> None:
     simulation = Simulation(scenario("5 min", users=users(1000, group="workers")))
     counts: dict[tuple[str, int], Counter[str]] = {}
@@ -94,7 +92,6 @@ def test_groups_are_drawn_by_their_shares() -> None:
         assert share == pytest.approx(drawn[name] / 400, abs=0.08)
 
 
-@needs_jit
 def test_people_of_the_survey_live_in_the_home() -> None:
     stored = run(scenario("3 d", users=users(3, group="at_home")))
     told = set(table(stored, "events", event="activity")["detail"])

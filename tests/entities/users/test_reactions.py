@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import OWN, digests, path, run, scenario, table
 
 import fleet2d
@@ -121,7 +120,6 @@ def family(**manners: Any) -> dict[str, Any]:
     }
 
 
-@needs_jit
 @pytest.mark.parametrize("span", [1, 7])
 def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
     lively = family(turns=1, steps_aside=1, leaves=1, comes=1, stops=0.5, patience="5 s")
@@ -131,7 +129,6 @@ def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
     assert digests(stored) == digests(run(lively, max_span=span))
 
 
-@needs_jit
 def test_who_never_reacts_lives_as_if_there_was_no_such_behavior() -> None:
     without = family()
     for user in without["users"].values():
@@ -139,7 +136,6 @@ def test_who_never_reacts_lives_as_if_there_was_no_such_behavior() -> None:
     assert digests(run(without)) == digests(run(family(**NEVER)))
 
 
-@needs_jit
 def test_a_run_can_branch_in_the_middle_of_a_reaction() -> None:
     content = family(turns=1, comes=1, looks="2 min")
     whole = run(content)

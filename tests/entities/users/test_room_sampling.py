@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.scenes import path, run, scenario
 
 from fleet2d.artifacts.reader import Run
@@ -26,7 +25,6 @@ def shares(stored: Run) -> dict[str, float]:
     return {**found, "away": float((rooms < 0).mean())}
 
 
-@needs_jit
 @pytest.mark.parametrize(
     ("dwell", "duration", "error"),
     [("30 min", "60 d", 0.03), ("5 min", "20 d", 0.02), ("1 min", "5 d", 0.02)],
@@ -40,7 +38,6 @@ def test_time_in_each_room_tends_to_its_share_ways_included(
         assert share == pytest.approx(realised[room], abs=error), room
 
 
-@needs_jit
 def test_the_error_shrinks_with_time() -> None:
     def error(duration: str) -> float:
         found = shares(sampled(duration, dwell="5 min"))
@@ -49,7 +46,6 @@ def test_the_error_shrinks_with_time() -> None:
     assert error("20 d") < error("12 h") / 2
 
 
-@needs_jit
 def test_stays_follow_the_law_of_dwell_times() -> None:
     stored = sampled(
         "30 d", dwell={"law": "fixed", "mean": "20 min"}, shares={"kitchen": 1, "bedroom": 1}

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.routines.days import MONDAY
 from tests.scenes import OWN, digests, path, run, scenario, table
 
@@ -64,7 +63,6 @@ def family(duration: str = "2 d", **household: Any) -> dict[str, Any]:
     return {**scenario(duration, users=users), **HOME}
 
 
-@needs_jit
 @pytest.mark.parametrize("name", bundled())
 def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name: str) -> None:
     stored = run(lives(name, "7 d"))
@@ -72,7 +70,6 @@ def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name: str) 
     assert {"sleep"} < told
 
 
-@needs_jit
 @pytest.mark.parametrize("span", [7, 1])
 def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
     content = family("45 min", away=[["2026-01-05T07:30", "2026-01-05T07:36"]])
@@ -87,7 +84,6 @@ def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-@needs_jit
 def test_a_life_does_not_depend_on_who_else_there_is() -> None:
     alone = lives()
     crowd = copy.deepcopy(alone)
@@ -98,7 +94,6 @@ def test_a_life_does_not_depend_on_who_else_there_is() -> None:
     assert (one.heading == other.heading).all()
 
 
-@needs_jit
 def test_two_seeds_give_different_lives_and_one_the_same() -> None:
     content = lives(duration="2 d")
     first, again = run(content), run(content)
@@ -107,7 +102,6 @@ def test_two_seeds_give_different_lives_and_one_the_same() -> None:
     assert (path(first, "ana").room != path(other, "ana").room).any()
 
 
-@needs_jit
 def test_a_run_can_branch_in_the_middle_of_an_activity() -> None:
     simulation = Simulation(family("1 d"))
     simulation.run_until(timedelta(hours=3, seconds=17))
@@ -142,7 +136,6 @@ def test_it_walks_at_the_pace_of_its_persona() -> None:
     assert 2.0 == pytest.approx(top_speed(fast), abs=0.08)
 
 
-@needs_jit
 def test_small_moves_can_be_switched_off() -> None:
     still, restless = (
         run(lives({"extends": "retired", "leisure": {"read": 1}}, "1 d", small_moves=moves))
@@ -158,14 +151,12 @@ def test_small_moves_can_be_switched_off() -> None:
     assert told[0] == told[1]
 
 
-@needs_jit
 def test_an_activity_is_done_at_its_furniture_in_its_posture() -> None:
     stored = run({**lives("works_from_home", "2 d"), **HOME})
     used = table(stored, "events", event="uses")["detail"]
     assert {"bed", "desk", "stove", "sofa"} <= {name.rpartition("_")[0] for name in used}
 
 
-@needs_jit
 def test_a_family_eats_at_one_time_at_places_of_its_own() -> None:
     calm = {"needs": None, "errands": None}
     members = {n: {"extends": persona, **calm} for n, persona in FAMILY["members"].items()}
@@ -182,7 +173,6 @@ def test_a_family_eats_at_one_time_at_places_of_its_own() -> None:
     assert 3 == len(spots)
 
 
-@needs_jit
 def test_a_couple_shares_a_bed_and_the_child_has_its_own() -> None:
     simulation = Simulation(family())
     beds = {n: a.behaviors[0].settings["sleep"].seats for n, a in simulation.actors.items()}
@@ -190,7 +180,6 @@ def test_a_couple_shares_a_bed_and_the_child_has_its_own() -> None:
     assert beds["ana"] != beds["ben"]
 
 
-@needs_jit
 def test_members_never_stand_where_another_does() -> None:
     stored = run(family("3 d"))
     paths = [path(stored, name) for name in FAMILY["members"]]
@@ -298,7 +287,6 @@ def test_it_begins_where_the_hour_suggests() -> None:
     assert datetime(2026, 1, 7).weekday() == 2
 
 
-@needs_jit
 def test_nobody_comes_into_the_bathroom_while_another_is_there() -> None:
     persona = {"extends": "works_outside", "activities": RESTLESS}
     members = dict.fromkeys(("ana", "ben", "cleo", "dan"), persona)
@@ -314,7 +302,6 @@ def test_nobody_comes_into_the_bathroom_while_another_is_there() -> None:
     assert max(np.diff(edges)[::2], default=0) < 30
 
 
-@needs_jit
 def test_a_plan_goes_on_over_midnight_without_telling_it_twice() -> None:
     stored = run(lives(duration="4 d"))
     told = table(stored, "events", entity="ana", event="activity")

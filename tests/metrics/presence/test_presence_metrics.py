@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.homes import needs_jit
 from tests.reference import presence as slow
 from tests.scenes import digests, run, scenario, table
 
@@ -16,8 +15,6 @@ from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.presence.occupancy import walking_distances
-
-pytestmark = needs_jit
 
 ROOMS = [
     f"{name}_0" for name in ("living_room", "kitchen", "bedroom", "bathroom", "storage", "unknown")

@@ -100,7 +100,7 @@ def ways_of(moments: Moments, layout: Layout, habits: Habits) -> Ways:
     trials = moments.moves + moments.rests + 1 / max(habits.restless, 1e-6)
     restless = (moments.moves + 1) / np.maximum(trials, 1)
     restless[-1] = 0.0  # away has no patches
-    first = np.searchsorted(layout.room, np.arange(places + 1)).astype(np.uint64)
+    first = np.searchsorted(layout.room, np.arange(places + 1)).astype(np.int64)
     return Ways(stay, follows, spread, np.minimum(restless, 1), first, habits.detection)
 
 

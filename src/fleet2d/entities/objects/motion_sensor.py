@@ -11,9 +11,7 @@ from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.headings import TURN, half_sine
-from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.region import region_contains_points, visible_region
-from fleet2d.kernels.sight import scratch_for
 from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
 
 
@@ -75,11 +73,7 @@ class MotionSensor(Sensor):
         x, y = self.eye
         if self.version != home.version:
             self.version, self.walls = home.version, home.walls
-            wall, stack = scratch_for(self.walls.vertices)
-            right = np.empty_like(wall)
-            at = locate(self.walls, x, y)
-            count = visible_region(self.walls, x, y, at, right, wall, stack)
-            self.region = right[:count].copy(), wall[:count].copy()
+            self.region = visible_region(self.walls, x, y)
         seen: Mask = region_contains_points(self.walls, x, y, *self.region, points)
         return seen & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
 

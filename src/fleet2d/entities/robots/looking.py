@@ -73,7 +73,7 @@ def seen_from(actor: "Actor", place: I64, goals: I64) -> NDArray[np.bool_]:
     near = ((goals - place) ** 2).sum(axis=1) <= sight_range(actor) ** 2
     shown = np.zeros(len(goals), np.bool_)
     x, y = int(place[0]), int(place[1])
-    shown[near] = points_in_sight(actor.home.walls, x, y, np.ascontiguousarray(goals[near]))
+    shown[near] = points_in_sight(actor.home.walls, x, y, goals[near])
     return shown
 
 

@@ -1,17 +1,14 @@
-"""The world of a run: its home, its bodies, and all that watches them, set up from a scenario."""
+"""Setting up a run from a scenario: its home, its bodies, and all that watches them."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
-
-import numpy as np
 
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.buckets import Eye, PoseBlock, open_eyes
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
@@ -19,59 +16,19 @@ from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.tables import sensor_table, table_specs, told_cameras
+from fleet2d.engine.state import InView, State
+from fleet2d.engine.tables import camera_names, sensor_table, table_specs
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home import Home
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 
 
-@dataclass
-class World:
-    """All that takes part in a run.
-
-    Attributes:
-        home: The home.
-        users: The people.
-        robots: The robots.
-        block: Everybody's poses in the present span, users first.
-        gazes: The cameras, or eyes, of users.
-        eyes: The cameras of robots.
-        encounters: Between robots and people who react to them.
-        clearance: What robots keep from people.
-        changes: Of the home.
-        sensors: Of the home.
-        recorder: Writes down what happens.
-        layers: What robots have seen, and what else the home is covered with.
-        learners: Algorithms and metrics.
-        log: What learners may ask for; None where there are no learners.
-    """
-
-    home: Home
-    users: list[Actor]
-    robots: list[Actor]
-    block: PoseBlock
-    gazes: list[Eye]
-    eyes: list[Eye]
-    encounters: Encounters
-    clearance: Clearance
-    changes: Changes
-    sensors: Sensors
-    recorder: Recorder
-    layers: LayerBook
-    learners: Learners
-    log: Log | None
-
-    @property
-    def actors(self) -> list[Actor]:
-        """Users, then robots."""
-        return [*self.users, *self.robots]
-
-
-def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> World:
-    """Set up what a scenario describes, and add the tables of the run to its store.
+def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> State:
+    """Return the state before the first step, and add the tables of the run to its store.
 
     Raises:
         InputError: The floor plan or a place in the scenario is wrong, or names what there isn't.
@@ -80,10 +37,12 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Worl
     users = _actors(scenario, "users", home, clock, seed)
     robots = _actors(scenario, "robots", home, clock, seed)
     actors = [*users, *robots]
-    block = PoseBlock(actors)
-    gazes, eyes = open_eyes(users, robots, block, scenario.sight.method.model_copy())
-    for eye in [*gazes, *eyes]:
-        eye.owner.in_view = partial(_in_view, eye)
+    bodies = Bodies(len(users), len(robots), clock.step_us)
+    for row, actor in enumerate(actors):
+        bodies.hold(row, actor.state)
+        actor.join(bodies, row)
+    method = scenario.sight.method.model_copy()
+    gazes, cameras = open_cameras(actors, len(users), method)
     _check_reads(scenario, actors)
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
     changes = Changes(scenario.objects, home, clock)
@@ -91,28 +50,47 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Worl
         with _placing(scenario, f"changes.{index}"):
             changes.declare(index, change)
     with _placing(scenario, "objects"):
-        sensors = Sensors(scenario.objects, changes.names, home, clock, len(users))
-    _add_tables(store, scenario, home, eyes, sensors)
+        sensors = Sensors(scenario.objects, changes.names, home, clock, list(scenario.users))
+    _add_tables(store, scenario, home, cameras, sensors)
     recorder = Recorder(
         store,
         scenario.artifacts,
         clock,
         home,
         actors,
+        bodies,
         list(scenario.objects),
         changes=_may_change(scenario),
-        eyes=eyes,
+        cameras=cameras,
         sensors=sensors,
     )
-    layers = LayerBook(scenario, home, actors, store, clock)
+    layers = LayerBook(scenario, home, actors, bodies, store, clock)
     learners = _learners(scenario, home, clock, seed, store)
-    for eye in [*gazes, *eyes]:
-        eye.awaited = learners.awaited
-    log = _log(home, actors, eyes, recorder) if learners.all else None
-    return World(
-        home, users, robots, block, gazes, eyes, encounters, clearance, changes, sensors, recorder,
-        layers, learners, log,
-    )  # fmt: skip
+    for those in [*gazes, *cameras]:
+        those.awaited = learners.awaited
+    sensors.awaited = EventKind.SENSOR in learners.awaited
+    log = _log(home, actors, bodies, cameras, recorder) if learners.all else None
+    state = State(
+        bodies=bodies,
+        actors=actors,
+        home=home,
+        changes=changes,
+        clearance=clearance,
+        encounters=encounters,
+        sensors=sensors,
+        gazes=gazes,
+        cameras=cameras,
+        layers=layers,
+        learners=learners,
+        log=log,
+        recorder=recorder,
+        store=store,
+        events=EventStream([recorder, sensors, *([] if log is None else [log])]),
+        max_span=scenario.simulation.max_span,
+    )
+    for those in [*gazes, *cameras]:
+        those.owner.in_view = InView(state, those)
+    return state
 
 
 def _furnished_home(scenario: Scenario) -> Home:
@@ -175,7 +153,7 @@ def _may_change(scenario: Scenario) -> bool:
 
 
 def _add_tables(
-    store: RunStore, scenario: Scenario, home: Home, eyes: list[Eye], sensors: Sensors
+    store: RunStore, scenario: Scenario, home: Home, cameras: list[Cameras], sensors: Sensors
 ) -> None:
     users, robots = list(scenario.users), list(scenario.robots)
     specs = table_specs(
@@ -185,8 +163,8 @@ def _add_tables(
         scenario.artifacts,
         list(scenario.objects),
         changes=_may_change(scenario),
-        cameras=told_cameras(eyes),
-        activities=activities_of(eyes, len(users)).are_told,
+        cameras=camera_names(cameras),
+        activities=activities_of(cameras, len(users)).are_told,
     )
     if sensors.names:
         specs.append(sensor_table(sensors))
@@ -206,17 +184,10 @@ def _learners(scenario: Scenario, home: Home, clock: Clock, seed: int, store: Ru
     )
 
 
-def _log(home: Home, actors: list[Actor], eyes: list[Eye], recorder: Recorder) -> Log:
-    log = Log(home, actors)
-    log.activities = recorder.activities
-    log.cameras = [(eye.index, name) for eye in eyes for name in eye.cameras]
+def _log(
+    home: Home, actors: list[Actor], bodies: Bodies, cameras: list[Cameras], recorder: Recorder
+) -> Log:
+    paths = {actor.name: actor.path for actor in actors}
+    log = Log(home, paths, bodies, recorder.activities)
+    log.cameras = [(those.index, name) for those in cameras for name in those.names]
     return log
-
-
-def _in_view(eye: Eye) -> dict[str, tuple[float, float]]:
-    """Return whom the cameras of a body have in view, and where each was perceived last [m]."""
-    lattice, found = eye.owner.home.plan.lattice, {}
-    for who in np.flatnonzero(eye.memory.seen).tolist():
-        x, y = lattice.to_metres(eye.perceived[who]).tolist()
-        found[eye.name_of(who)] = (x, y)
-    return found

@@ -1,0 +1,267 @@
+#include "fields.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+#include <queue>
+#include <vector>
+
+#include "lattice.hpp"
+
+namespace fleet2d {
+namespace {
+
+// Each cell's distance to the nearest cell of its column that is not in the mask, `endless` for none.
+Array<i64, 2> column_gaps(View<const bool, 2> mask, i64 endless) {
+    const auto [rows, columns] = mask.shape;
+    auto made = Array<i64, 2>::empty(mask.shape);
+    const View<i64, 2> gap = made;
+    for (i64 row = 0; row < rows; ++row) {
+        for (i64 column = 0; column < columns; ++column) {
+            const i64 below = row > 0 ? gap(row - 1, column) : endless;
+            gap(row, column) = mask(row, column) ? std::min(below + 1, endless) : 0;
+        }
+    }
+    for (i64 row = rows - 2; row >= 0; --row) {
+        for (i64 column = 0; column < columns; ++column) {
+            gap(row, column) = std::min(gap(row, column), gap(row + 1, column) + 1);
+        }
+    }
+    return made;
+}
+
+// The squared distances of the cells of a row, from the gaps of its columns: the lower envelope of
+// one parabola for each column.
+class Envelope {
+public:
+    explicit Envelope(i64 columns) : apex_(Array<i64>::empty({columns})), start_(Array<i64>::empty({columns})) {}
+
+    void measure(View<const i64> gap, i64 most, View<i64> squared) {
+        const i64 columns = gap.size();
+        i64 top = 0;
+        apex_[0] = start_[0] = 0;
+        for (i64 column = 1; column < columns; ++column) {
+            while (top >= 0 && height(gap, apex_[top], start_[top]) > height(gap, column, start_[top])) --top;
+            const i64 crossing = top < 0 ? 0 : first_below(gap, apex_[top], column);
+            if (crossing >= columns) continue;
+            ++top;
+            apex_[top] = column;
+            start_[top] = crossing;
+        }
+        for (i64 column = columns - 1; column >= 0; --column) {
+            squared[column] = std::min(height(gap, apex_[top], column), most);
+            if (column == start_[top]) --top;
+        }
+    }
+
+private:
+    // The height at a column of the parabola with its apex at another.
+    static i64 height(View<const i64> gap, i64 apex, i64 column) {
+        return (column - apex) * (column - apex) + gap[apex] * gap[apex];
+    }
+
+    // The first column at which the parabola of `right` is below that of `left`.
+    static i64 first_below(View<const i64> gap, i64 left, i64 right) {
+        const i64 rise = right * right - left * left + gap[right] * gap[right] - gap[left] * gap[left];
+        return 1 + floor_div(rise, 2 * (right - left));
+    }
+
+    Array<i64> apex_;   // columns whose parabolas form the envelope, from left to right
+    Array<i64> start_;  // first column at which each of them is the lowest
+};
+
+// A grid with a wall all round, so that no step leads out, and what is known of walking on it.
+// Cells are numbered row by row.
+class Walk {
+public:
+    explicit Walk(View<const bool, 2> mask)
+        : wide_(mask.shape[1] + 2),
+          state_(Array<State>::filled({(mask.shape[0] + 2) * wide_}, State::closed)),
+          distance_(Array<i32>::filled({(mask.shape[0] + 2) * wide_}, FAR)) {
+        for (i64 row = 0; row < mask.shape[0]; ++row) {
+            for (i64 column = 0; column < mask.shape[1]; ++column) {
+                if (mask(row, column)) state_[number({row, column})] = State::open;
+            }
+        }
+    }
+
+    void start_at(GridCell goal) { reach(number(goal), 0, straight_); }
+
+    // Settle the nearest cell that waits; false if none does.
+    bool settle() {
+        drop_settled(straight_);
+        drop_settled(across_);
+        if (straight_.empty() && across_.empty()) return false;
+        auto& nearest = is_first(straight_, across_) ? straight_ : across_;
+        const i64 cell = nearest.front();
+        nearest.pop();
+        state_[cell] = State::settled;
+        for (const i64 side : {i64{-1}, i64{1}, -wide_, wide_}) reach(cell + side, distance_[cell] + 5, straight_);
+        for (const i64 up : {-wide_, wide_}) {
+            for (const i64 side : {-1, 1}) {
+                const bool cuts_corner = is_closed(cell + up) || is_closed(cell + side);
+                if (!cuts_corner) reach(cell + up + side, distance_[cell] + 7, across_);
+            }
+        }
+        return true;
+    }
+
+    // As walking_distance has it.
+    i32 distance(GridCell cell) const {
+        const i32 known = distance_[number(cell)];
+        return known < FAR ? known : -1;
+    }
+
+private:
+    enum class State : u8 { closed, open, settled };
+    static constexpr i32 FAR = std::numeric_limits<i32>::max();
+
+    i64 number(GridCell cell) const { return (cell.row + 1) * wide_ + cell.column + 1; }
+    bool is_closed(i64 cell) const { return state_[cell] == State::closed; }
+
+    void reach(i64 cell, i32 distance, std::queue<i64>& waiting) {
+        if (state_[cell] == State::open && distance < distance_[cell]) {
+            distance_[cell] = distance;
+            waiting.push(cell);
+        }
+    }
+
+    void drop_settled(std::queue<i64>& waiting) {
+        while (!waiting.empty() && state_[waiting.front()] == State::settled) waiting.pop();
+    }
+
+    // Whether the nearest cell waits in the first of two queues, of which one may be empty.
+    bool is_first(const std::queue<i64>& one, const std::queue<i64>& other) const {
+        if (one.empty() || other.empty()) return other.empty();
+        return distance_[one.front()] <= distance_[other.front()];
+    }
+
+    i64 wide_;
+    Array<State> state_;
+    Array<i32> distance_;
+    std::queue<i64> straight_;  // cells that a step to a side leads to, by distance
+    std::queue<i64> across_;    // cells that a step across a corner leads to, by distance
+};
+
+// A power of two above the most that a step costs.
+constexpr i64 COST_BUCKETS = i64{1} << 14;
+static_assert(7 * (200 + 2 * MOST_COST) < COST_BUCKETS);
+
+// Cells that wait to be settled at some cost: all costs that wait differ by less than COST_BUCKETS.
+class CostQueue {
+public:
+    bool empty() const { return waiting_ == 0; }
+
+    void push(i64 cost, GridCell cell) {
+        buckets_[bucket_of(cost)].push_back(cell);
+        ++waiting_;
+    }
+
+    // One of the cells that wait at just this cost, the newest first.
+    std::optional<GridCell> pop(i64 cost) {
+        auto& bucket = buckets_[bucket_of(cost)];
+        if (bucket.empty()) return std::nullopt;
+        const GridCell cell = bucket.back();
+        bucket.pop_back();
+        --waiting_;
+        return cell;
+    }
+
+private:
+    static std::size_t bucket_of(i64 cost) { return static_cast<std::size_t>(cost & (COST_BUCKETS - 1)); }
+
+    std::vector<std::vector<GridCell>> buckets_{static_cast<std::size_t>(COST_BUCKETS)};
+    i64 waiting_ = 0;
+};
+
+// The steps to the eight neighbors, row by row.
+constexpr std::array<GridCell, 8> NEIGHBORS{{{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}, {0, 1}, {1, -1}, {1, 0}, {1, 1}}};
+
+// Whether a step leads to a neighboring cell that is open; across a corner, both cells beside it must be.
+bool is_open(View<const i32, 2> cost, GridCell from, GridCell to) {
+    return is_inside(cost.shape, to) && at(cost, to) >= 0 && cost(from.row, to.column) >= 0 &&
+           cost(to.row, from.column) >= 0;
+}
+
+}  // namespace
+
+Array<i64, 2> squared_distance(View<const bool, 2> mask) {
+    const auto [rows, columns] = mask.shape;
+    auto squared = Array<i64, 2>::empty(mask.shape);
+    if (columns == 0) return squared;
+    const i64 endless = rows + columns;
+    const auto gap = column_gaps(mask, endless);
+    Envelope envelope(columns);
+    for (i64 row = 0; row < rows; ++row) envelope.measure(gap[row], endless * endless, squared[row]);
+    return squared;
+}
+
+Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goals) {
+    Walk walk(mask);
+    for (i64 i = 0; i < goals.size(); ++i) {
+        const GridCell goal{goals(i, 0), goals(i, 1)};
+        if (is_inside(mask.shape, goal)) walk.start_at(goal);
+    }
+    while (walk.settle()) {
+    }
+    auto made = Array<i32, 2>::empty(mask.shape);
+    const View<i32, 2> distance = made;
+    for (i64 row = 0; row < mask.shape[0]; ++row) {
+        for (i64 column = 0; column < mask.shape[1]; ++column) distance(row, column) = walk.distance({row, column});
+    }
+    return made;
+}
+
+Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell start) {
+    auto made = Array<i64, 2>::filled(cost.shape, -1);
+    const View<i64, 2> distance = made;
+    if (at(cost, goal) < 0) return made;
+    CostQueue waiting;
+    at(distance, goal) = 0;
+    waiting.push(0, goal);
+    for (i64 now = 0; !waiting.empty(); ++now) {
+        while (const auto cell = waiting.pop(now)) {
+            if (at(distance, *cell) != now) continue;  // a cheaper way was found since
+            if (cell->row == start.row && cell->column == start.column) return made;
+            for (const GridCell step : NEIGHBORS) {
+                const GridCell beside = *cell + step;
+                if (!is_open(cost, *cell, beside)) continue;
+                const i64 there = now + step_cost(cost, *cell, beside);
+                if (at(distance, beside) < 0 || there < at(distance, beside)) {
+                    at(distance, beside) = there;
+                    waiting.push(there, beside);
+                }
+            }
+        }
+    }
+    return made;
+}
+
+Array<i64, 2> descend(View<const i32, 2> cost, View<const i64, 2> distance, GridCell start) {
+    const auto next_cell = [&](GridCell cell) -> std::optional<GridCell> {
+        for (const GridCell step : NEIGHBORS) {
+            const GridCell beside = cell + step;
+            if (!is_open(cost, cell, beside) || at(distance, beside) < 0) continue;
+            if (at(distance, beside) == at(distance, cell) - step_cost(cost, cell, beside)) return beside;
+        }
+        return std::nullopt;
+    };
+    if (at(distance, start) < 0) return Array<i64, 2>::empty({0, 2});
+    auto way = Array<i64, 2>::empty({64, 2});
+    i64 count = 0;
+    for (std::optional<GridCell> cell = start; cell.has_value(); cell = next_cell(*cell)) {
+        way.grow(count + 1, count);
+        way(count, 0) = cell->row;
+        way(count, 1) = cell->column;
+        ++count;
+        if (at(distance, *cell) == 0) {
+            way.truncate(count);
+            return way;
+        }
+    }
+    way.truncate(0);
+    return way;
+}
+
+}  // namespace fleet2d

@@ -1,0 +1,376 @@
+#include "look.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace fleet2d {
+namespace {
+
+constexpr i64 MINUTE_US = 60'000'000;
+constexpr i64 NEVER = -1;
+constexpr i64 UNKNOWN = -1;
+
+// Steps in which a camera has a user in view, and neither changes its pose.
+struct Interval {
+    i64 begin, end;  // steps; the last one is end - 1
+    i64 camera, user;
+    Pose eye;        // of the camera
+    i64 dx, dy;      // the user, from there [lattice units]
+    i64 faces;       // 1/4096 turn
+    i64 posture;
+    i64 shown;       // points of the body in view, above 0
+    i64 steady = UNKNOWN;  // steady_chance of all this, once that is known
+
+    bool comes_before(const Interval& other) const {
+        return camera != other.camera ? camera < other.camera : user < other.user;
+    }
+};
+
+Sighting read(View<const i64> row) {
+    Sighting sighting;
+    std::memcpy(&sighting, row.data, sizeof sighting);
+    return sighting;
+}
+
+void write(View<i64> row, const Sighting& sighting) { std::memcpy(row.data, &sighting, sizeof sighting); }
+
+// Finds the intervals in which somebody is in view.
+class Lookout {
+public:
+    Lookout(const Mesh& walls, const Lenses& lenses, const Rule& rule, const Window& window, Onlooker onlooker,
+            View<const u8, 3> shown)
+        : walls_(walls), lenses_(lenses), rule_(rule), window_(window), onlooker_(onlooker), shown_(shown) {}
+
+    // All intervals, in order of their first steps.
+    std::vector<Interval> intervals() {
+        const i64 cameras = lenses_.reach.shape[0], users = lenses_.reach.shape[1];
+        for (i64 camera = 0; camera < cameras; ++camera) {
+            for (i64 user = 0; user < users; ++user) compare(camera, user);
+        }
+        std::stable_sort(found_.begin(), found_.end(),
+                         [](const Interval& a, const Interval& b) { return a.begin < b.begin; });
+        return std::move(found_);
+    }
+
+private:
+    // Walk along the runs of both bodies at once.
+    void compare(i64 camera, i64 user) {
+        const i64 other = onlooker_.first_other + user;
+        i64 run = window_.start[onlooker_.body], other_run = window_.start[other];
+        i64 step = window_.first;
+        while (step < window_.end) {
+            const i64 run_end = window_.run_end(onlooker_.body, run);
+            const i64 other_end = window_.run_end(other, other_run);
+            const i64 end = std::min(run_end, other_end);
+            if (window_.away[run] == 0 && window_.away[other_run] == 0) look(camera, user, run, other_run, step, end);
+            step = end;
+            if (run_end == end) ++run;
+            if (other_end == end) ++other_run;
+        }
+    }
+
+    // Both rest from step `begin` to `end` - 1; only the camera may pan.
+    void look(i64 camera, i64 user, i64 run, i64 other_run, i64 begin, i64 end) {
+        const i64 period = lenses_.period[camera];
+        const Pose body{window_.x[run], window_.y[run], window_.heading[run]};
+        const Pose other{window_.x[other_run], window_.y[other_run], window_.heading[other_run]};
+        const i64 posture = window_.posture[other_run];
+        for (i64 step = next_multiple(begin, period); step < end;) {
+            i64 until = end;
+            Pose eye = body;
+            if (lenses_.moves[camera] != 0) {
+                const i64 moment = step * rule_.step_us;
+                eye = camera_pose(lenses_, camera, body, moment);
+                if (lenses_.pan_count[camera] > 0) {
+                    const i64 pan_us = lenses_.pan_us[camera];
+                    const i64 turns = (floor_div(moment, pan_us) + 1) * pan_us;
+                    until = std::min(end, -floor_div(-turns, rule_.step_us));
+                }
+            }
+            const i64 dx = other.x - eye.x, dy = other.y - eye.y;
+            Interval interval{step, until, camera, user, eye, dx, dy, other.heading, posture, 0};
+            if (shown_.size() > 0) {
+                split_by_method(interval);
+            } else {
+                interval.shown = points_shown(camera, user, eye, dx, dy);
+                if (interval.shown > 0) found_.push_back(interval);
+            }
+            step = next_multiple(until, period);
+        }
+    }
+
+    // Take over what another method says of each step.
+    void split_by_method(Interval interval) {
+        const i64 end = interval.end;
+        for (i64 step = interval.begin; step < end; ++step) {
+            const i64 shown = shown_(interval.camera, interval.user, step - window_.first);
+            const bool goes_on = step > interval.begin && shown == interval.shown;
+            if (!goes_on) {
+                interval.end = step;
+                if (step > interval.begin && interval.shown > 0) found_.push_back(interval);
+                interval.begin = step;
+                interval.shown = shown;
+            }
+        }
+        interval.end = end;
+        if (interval.shown > 0) found_.push_back(interval);
+    }
+
+    // How many points of a user's body are in view.
+    i64 points_shown(i64 camera, i64 user, const Pose& eye, i64 dx, i64 dy) {
+        if (dx * dx + dy * dy > lenses_.widest(camera, user)) return 0;
+        const i64 half_angle = lenses_.half_angle[camera];
+        if (!near_wedge(eye.heading, half_angle, dx, dy, lenses_.reach(camera, user))) return 0;
+        if (eye.x != located_.x || eye.y != located_.y || triangle_ == UNKNOWN) {
+            located_ = eye;
+            triangle_ = locate(walls_, eye.x, eye.y);
+        }
+        return points_in_view(walls_, lenses_, camera, user, eye, triangle_, dx, dy);
+    }
+
+    const Mesh& walls_;
+    const Lenses& lenses_;
+    const Rule& rule_;
+    const Window& window_;
+    const Onlooker onlooker_;
+    const View<const u8, 3> shown_;
+    std::vector<Interval> found_;
+    Pose located_{};             // the camera that was located last
+    i64 triangle_ = UNKNOWN - 1;  // that holds it
+};
+
+// Visits the steps at which something may be noticed, become known, or be lost.
+class Watch {
+public:
+    Watch(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
+          Onlooker onlooker, const Memory& memory, std::vector<Interval> intervals)
+        : walls_(walls), lenses_(lenses), errors_(errors), rule_(rule), window_(window), onlooker_(onlooker),
+          memory_(memory), intervals_(std::move(intervals)), cameras_(lenses.widest.shape[0]),
+          users_(lenses.widest.shape[1]) {
+        for (const i64 seen : memory.seen) identities_in_view_ += seen;
+        for (i64 c = 0; c < cameras_; ++c) {
+            is_prompt_ &= lenses.latency[c] == 0 && memory.waiting(c, 1) == 0;
+            is_haunted_ |= errors.haunted[c] != 0;
+        }
+        run_ = window.start[onlooker.body];
+    }
+
+    LookResult look() {
+        for (now_ = next_step(window_.first); now_ < window_.end; now_ = next_step(now_ + 1)) {
+            take_up();
+            const std::size_t before = result_.sightings.size();
+            std::size_t i = 0;
+            for (i64 c = 0; c < cameras_; ++c) {
+                const bool looks = now_ % lenses_.period[c] == 0;
+                for (; i < active_.size() && active_[i].camera == c; ++i) {
+                    if (looks) look_at(active_[i]);
+                }
+                if (looks && errors_.haunted[c] != 0) imagine(c);
+            }
+            if (!is_prompt_) deliver();
+            if (result_.sightings.size() > before || identities_in_view_ > 0) {
+                if (note_events()) {
+                    result_.steps = now_ + 1 - window_.first;
+                    return std::move(result_);
+                }
+            }
+        }
+        result_.steps = window_.end - window_.first;
+        return std::move(result_);
+    }
+
+private:
+    // The first step from `step` on at which anything can happen.
+    i64 next_step(i64 step) {
+        std::erase_if(active_, [step](const Interval& interval) { return interval.end <= step; });
+        if (!active_.empty() || is_haunted_) return step;
+        i64 next = next_interval_ < intervals_.size() ? intervals_[next_interval_].begin : window_.end;
+        for (i64 c = 0; c < cameras_; ++c) {
+            if (memory_.waiting(c, 1) > 0) next = std::min(next, read(memory_.backlog[c][memory_.waiting(c, 0) % memory_.backlog.shape[1]]).step);
+        }
+        if (identities_in_view_ > 0) {
+            for (i64 i = 0; i < memory_.seen.size(); ++i) {
+                if (memory_.seen[i] == 1) next = std::min(next, memory_.noticed[i] + rule_.patience);
+            }
+        }
+        return std::max(step, next);
+    }
+
+    // Take up the intervals that begin at the present step.
+    void take_up() {
+        for (; next_interval_ < intervals_.size() && intervals_[next_interval_].begin <= now_; ++next_interval_) {
+            const Interval& interval = intervals_[next_interval_];
+            const auto place = std::upper_bound(active_.begin(), active_.end(), interval,
+                                                [](const Interval& a, const Interval& b) { return a.comes_before(b); });
+            active_.insert(place, interval);
+        }
+    }
+
+    // Record a user in view, if noticed.
+    void look_at(Interval& target) {
+        const i64 camera = target.camera;
+        const View<i64> about = memory_.about[camera][target.user];
+        ++at(about, About::IN_VIEW);
+        const bool errs = lenses_.errs[camera] != 0;
+        if (errs ? !pays_attention(target) : !is_detected(camera, target.user)) return;
+        ++at(about, About::NOTICED);
+        const i64 x = target.eye.x + target.dx, y = target.eye.y + target.dy;
+        Sighting sighting{now_ + lenses_.latency[camera], camera, target.user, target.user, x, y, target.faces,
+                          target.posture, x, y, target.faces, target.posture};
+        if (errs) perceive(target, sighting);
+        record(camera, sighting);
+    }
+
+    // Whether a camera that doesn't err notices a user in view.
+    bool is_detected(i64 camera, i64 user) const {
+        return random_chance(stream(errors_.keys[camera][user], UserDraw::DETECT), now_) < lenses_.chance[camera];
+    }
+
+    // Whether a camera that errs notices a user in view.
+    bool pays_attention(Interval& target) const {
+        const i64 camera = target.camera;
+        const View<const i64> table = errors_.table[camera];
+        if (target.steady == UNKNOWN) {
+            target.steady = steady_chance(table, target.eye.heading, target.dx, target.dy, target.faces, target.posture,
+                                          target.shown);
+        }
+        const i64 minute = floor_mod(floor_div(rule_.start_us + now_ * rule_.step_us, MINUTE_US), MINUTES);
+        const i64 chance = notice_chance(target.steady, table[AT_LIGHT + minute], lenses_.chance[camera]);
+        return attention(table, errors_.keys[camera][target.user], memory_.about[camera][target.user], now_) < chance;
+    }
+
+    // Set what a noticed user is perceived as, in a sighting that holds the truth.
+    void perceive(const Interval& target, Sighting& sighting) const {
+        const i64 camera = target.camera;
+        const View<const i64> table = errors_.table[camera];
+        const View<const u64> keys = errors_.keys[camera][target.user];
+        sighting.identity = identify(table, errors_.whom[camera][target.user], keys,
+                                     memory_.about[camera][target.user], target.user, now_,
+                                     distance_bin(table, target.dx, target.dy), rule_.patience);
+        const Offset offset = blurred(table, keys, now_, target.dx, target.dy);
+        sighting.x += offset.dx - target.dx;
+        sighting.y += offset.dy - target.dy;
+        const i64 turn = random_noise(stream(keys, UserDraw::HEADING), now_, table[HEADING_NOISE]);
+        sighting.heading = (target.faces + turn) & (TURN - 1);
+        sighting.posture = seeming(table, target.posture, random_share(stream(keys, UserDraw::POSTURE), now_));
+    }
+
+    // Record the false positives of a look, each at its source if that is in view.
+    void imagine(i64 camera) {
+        while (window_.run_end(onlooker_.body, run_) <= now_) ++run_;
+        if (window_.away[run_] != 0) return;
+        Pose eye{window_.x[run_], window_.y[run_], window_.heading[run_]};
+        if (lenses_.moves[camera] != 0) eye = camera_pose(lenses_, camera, eye, now_ * rule_.step_us);
+        const View<const u64> keys = errors_.ghost_keys[camera];
+        const i64 draw = random_share(stream(keys, GhostDraw::COUNT), now_);
+        const i64 count = pick(errors_.ghosts[camera], draw);
+        if (count == 0) return;
+        const Sector sector{eye.x, eye.y, locate(walls_, eye.x, eye.y), eye.heading, lenses_.half_angle[camera],
+                            lenses_.near_squared[camera], lenses_.far_squared[camera]};
+        // The draws about ghost k of a look have counter k, in a stream of that look.
+        const auto key_of = [&](GhostDraw purpose) {
+            return random_bits(stream(keys, purpose), static_cast<u64>(now_));
+        };
+        for (i64 k = 0; k < count; ++k) {
+            const i64 source = pick(errors_.source[camera], random_share(key_of(GhostDraw::SOURCE), k));
+            const GhostPlace place =
+                place_of(sector, camera, source, random_bits(key_of(GhostDraw::PLACE), static_cast<u64>(k)));
+            if (!place.appears) continue;
+            const i64 person = pick(errors_.looks_like[camera], random_share(key_of(GhostDraw::IDENTITY), k));
+            const i64 heading = random_below(key_of(GhostDraw::HEADING), static_cast<u64>(k), TURN);
+            const i64 identity = person < users_ ? person : NOBODY;
+            record(camera, {now_ + lenses_.latency[camera], camera, NOBODY, identity, place.x, place.y, heading, 0,
+                            place.x, place.y, heading, 0});
+        }
+    }
+
+    // Source 0 is all that is in view; any other is a spot.
+    GhostPlace place_of(const Sector& sector, i64 camera, i64 source, u64 key) const {
+        if (source == 0) return ghost_anywhere(walls_, sector, key);
+        const View<const i64> spot = errors_.spot[camera][source];
+        const i64 dx = spot[0] - sector.x, dy = spot[1] - sector.y;
+        const i64 squared = dx * dx + dy * dy;
+        if (squared < sector.near_squared || squared > sector.far_squared ||
+            !in_wedge(sector.heading, sector.half_angle, dx, dy)) {
+            return {false, spot[0], spot[1]};
+        }
+        return ghost_at_spot(walls_, sector, spot, key);
+    }
+
+    // Put a sighting where it belongs. What is known at once needs no backlog, whose rows come in the same order.
+    void record(i64 camera, const Sighting& sighting) {
+        if (is_prompt_) {
+            publish(sighting);
+            return;
+        }
+        i64& length = memory_.waiting(camera, 1);
+        const View<i64, 2> ring = memory_.backlog[camera];
+        write(ring[(memory_.waiting(camera, 0) + length) % ring.size()], sighting);
+        ++length;
+    }
+
+    // Publish what is known by now of every camera's backlog.
+    void deliver() {
+        for (i64 c = 0; c < cameras_; ++c) {
+            i64 &begin = memory_.waiting(c, 0), &length = memory_.waiting(c, 1);
+            const View<i64, 2> ring = memory_.backlog[c];
+            while (length > 0) {
+                const Sighting sighting = read(ring[begin]);
+                if (sighting.step > now_) break;
+                publish(sighting);
+                begin = (begin + 1) % ring.size();
+                --length;
+            }
+        }
+    }
+
+    void publish(const Sighting& sighting) {
+        result_.sightings.push_back(sighting);
+        const i64 identity = sighting.identity == NOBODY ? memory_.noticed.size() - 1 : sighting.identity;
+        memory_.noticed[identity] = now_;
+    }
+
+    // Note an event for each identity that comes into view or is lost; whether one ends the span.
+    bool note_events() {
+        bool stops = false;
+        for (i64 i = 0; i < memory_.noticed.size(); ++i) {
+            const i64 noticed = memory_.noticed[i];
+            const bool was_seen = memory_.seen[i] == 1;
+            const bool is_seen = noticed == now_ || (was_seen && now_ - noticed < rule_.patience);
+            if (is_seen == was_seen) continue;
+            memory_.seen[i] = is_seen;
+            identities_in_view_ += is_seen ? 1 : -1;
+            result_.events.push_back({now_, i, is_seen ? SightEvent::SEEN : SightEvent::LOST});
+            stops |= is_seen ? rule_.stop_seen : rule_.stop_lost;
+        }
+        return stops;
+    }
+
+    const Mesh& walls_;
+    const Lenses& lenses_;
+    const ErrorTables& errors_;
+    const Rule& rule_;
+    const Window& window_;
+    const Onlooker onlooker_;
+    const Memory& memory_;
+    const std::vector<Interval> intervals_;  // in order of their first steps
+    std::size_t next_interval_ = 0;          // that is still to come
+    std::vector<Interval> active_;           // at the present step, in order of camera and user
+    const i64 cameras_, users_;
+    bool is_prompt_ = true;  // every sighting becomes known at once
+    bool is_haunted_ = false;
+    i64 identities_in_view_ = 0;
+    i64 run_ = 0;  // of the onlooker at the present step
+    i64 now_ = 0;
+    LookResult result_{};
+};
+
+}  // namespace
+
+LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule,
+                const Window& window, Onlooker onlooker, const Memory& memory, View<const u8, 3> shown) {
+    auto intervals = Lookout(walls, lenses, rule, window, onlooker, shown).intervals();
+    return Watch(walls, lenses, errors, rule, window, onlooker, memory, std::move(intervals)).look();
+}
+
+}  // namespace fleet2d

@@ -1,0 +1,81 @@
+// What the cameras of one body see of others over a span of steps, and what they make of it.
+#pragma once
+
+#include <vector>
+
+#include "lens.hpp"
+#include "perception.hpp"
+#include "timelines.hpp"
+
+namespace fleet2d {
+
+// One sighting, as it stands in a row of an array. Where a camera was wrong about a person, `user` is NOBODY;
+// where it didn't recognize one, `identity` is. What isn't true_ is as perceived.
+struct Sighting {
+    i64 step;    // when it becomes known
+    i64 camera;
+    i64 user;
+    i64 identity;
+    i64 x, y;  // lattice units
+    i64 heading;
+    i64 posture;
+    i64 true_x, true_y;
+    i64 true_heading;
+    i64 true_posture;
+};
+inline constexpr i64 SIGHTING = sizeof(Sighting) / sizeof(i64);  // columns of a row
+
+// What a robot carries from span to span. Identities are users, and last an unknown person.
+struct Memory {
+    View<i64> noticed;     // (identities,) last step at which one was noticed; -1: never
+    View<i64> seen;        // (identities,) 1 while one counts as seen
+    View<i64, 3> about;    // (cameras, users, ABOUT) see About
+    View<i64, 3> backlog;  // (cameras, rows, SIGHTING) a ring of what isn't known yet
+    View<i64, 2> waiting;  // (cameras, 2) its first row, and its length
+};
+
+enum class SightEvent : i32 {
+    LOST,  // an identity wasn't sighted for as long as the rule's patience
+    SEEN,  // an identity came into view
+};
+
+// An identity that comes into view, or is lost.
+struct IdentityEvent {
+    i64 step;
+    i64 identity;
+    SightEvent kind;
+};
+
+// What holds for all cameras of a robot.
+struct Rule {
+    i64 patience;    // steps without a sighting after which an identity counts as lost
+    i64 step_us;     // length of a step
+    i64 start_us;    // time of day at step 0
+    i64 burst;       // most sightings that become known in one step
+    bool stop_lost;  // whether an event SightEvent::LOST ends the span
+    bool stop_seen;  // whether an event SightEvent::SEEN ends the span
+};
+
+// Who looks at whom: bodies of a window, by number.
+struct Onlooker {
+    i64 body;         // that has the cameras
+    i64 first_other;  // of the others, whose number is that of the lenses' users
+};
+
+struct LookResult {
+    i64 steps;  // done, the one that stopped it included
+    std::vector<Sighting> sightings;
+    std::vector<IdentityEvent> events;  // in order of (step, identity)
+};
+
+// Look at all others in the steps of a window, up to the first one with an event that stops it.
+//
+// First the intervals of steps are found in which somebody is in view: between two steps at which a pose
+// changes, one verdict does for all. Only the steps in them, and those at which something may become known
+// or be lost, are visited then, in order, each with its own draws.
+//
+// `shown` holds (cameras, users, steps) the points in view, where another method decides that; else it is empty.
+LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule,
+                const Window& window, Onlooker onlooker, const Memory& memory, View<const u8, 3> shown);
+
+}  // namespace fleet2d

@@ -1,0 +1,67 @@
+// Forecasts of presence, sightings and resampled days: no logarithm, and one order of sums.
+//
+// BLAS and einsum add in an order that depends on the machine. These loops don't, so what is learned,
+// and where a robot goes because of it, is the same everywhere.
+#pragma once
+
+#include <utility>
+
+#include "lattice.hpp"
+#include "random.hpp"
+
+namespace fleet2d {
+
+// A chain's state probabilities some bins later, without evidence, (states,), by its transitions,
+// (states, states), from row to column.
+inline Array<f64> advance(View<const f64> probability, View<const f64, 2> transition, i64 bins) {
+    const i64 states = probability.size();
+    auto now = Array<f64>::copy_of(probability), later = Array<f64>::empty({states});
+    for (i64 bin = 0; bin < bins; ++bin) {
+        std::fill_n(later.data(), states, 0.0);
+        for (i64 i = 0; i < states; ++i) {
+            const f64 share = now[i];
+            const View<const f64> row = transition[i];
+            for (i64 j = 0; j < states; ++j) later[j] += share * row[j];
+        }
+        std::swap(now, later);
+    }
+    return now;
+}
+
+// Count the steps at which each user was perceived in each room, once however often.
+//
+// `step` (n,) is in order of time, from the beginning of the first bin; `user` (n,) is below 0 for
+// somebody unknown, `room` (n,) below 0 for none. `seen`, (bins, users + 1, rooms), is added to; its
+// last user is anybody.
+inline void count_sightings(View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps,
+                            View<i64, 3> seen) {
+    const i64 bins = seen.shape[0], anybody = seen.shape[1] - 1;
+    auto last = Array<i64, 2>::filled({anybody + 1, seen.shape[2]}, -1);  // step that was counted last
+    for (i64 i = 0; i < step.size(); ++i) {
+        const i64 at = step[i], where = room[i], bin = floor_div(at, bin_steps);
+        if (where < 0 || bin < 0 || bin >= bins) continue;
+        for (const i64 who : {user[i], anybody}) {
+            if (who < 0 || last(who, where) == at) continue;
+            last(who, where) = at;
+            ++seen(bin, who, where);
+        }
+    }
+}
+
+// Sums of days drawn with replacement, (replicates, values), each of as many as there are: `days` is
+// (days, values), `key` that of the stream of draws.
+inline Array<f64, 2> resampled(u64 key, View<const f64, 2> days, i64 replicates) {
+    const i64 count = days.shape[0], values = days.shape[1];
+    auto sums = Array<f64, 2>::zeros({replicates, values});
+    for (i64 b = 0; b < replicates; ++b) {
+        const u64 draws = random_bits(key, static_cast<u64>(b));
+        const View<f64> sum = sums[b];
+        for (i64 d = 0; d < count; ++d) {
+            const View<const f64> day = days[random_below(draws, static_cast<u64>(d), static_cast<u64>(count))];
+            for (i64 v = 0; v < values; ++v) sum[v] += day[v];
+        }
+    }
+    return sums;
+}
+
+}  // namespace fleet2d

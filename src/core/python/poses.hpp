@@ -1,0 +1,21 @@
+// Poses as Python holds them: the named tuple `fleet2d.kernels.motion.Poses`.
+#pragma once
+
+#include "../poses.hpp"
+#include "arrays.hpp"
+
+namespace fleet2d {
+
+template <>
+struct border::Fields<Poses> {
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
+    static constexpr auto members = std::tuple(&Poses::x, &Poses::y, &Poses::heading, &Poses::away);
+};
+
+inline void check_poses(const Poses& poses) {
+    const i64 steps = poses.x.size();
+    require(poses.y.size() == steps && poses.heading.size() == steps && poses.away.size() == steps,
+            "all arrays of poses must have one length");
+}
+
+}  // namespace fleet2d

@@ -1,0 +1,23 @@
+// What a camera sees, as Python holds it: the named tuple `fleet2d.kernels.seen.Reach`.
+#pragma once
+
+#include "../seen.hpp"
+#include "arrays.hpp"
+
+namespace fleet2d {
+
+template <>
+struct border::Fields<Reach> {
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
+    static constexpr auto members = std::tuple(&Reach::near_squared, &Reach::far_squared, &Reach::half_angle);
+};
+
+inline void check_reach(const Reach& reach) {
+    constexpr i64 limit = i64{1} << 52;
+    require(0 <= reach.near_squared && reach.near_squared < limit && 0 <= reach.far_squared &&
+                reach.far_squared < limit,
+            "near_squared and far_squared must be in 0 to 2**52 - 1");
+    require(reach.half_angle >= 0, "half_angle must be 0 or more");
+}
+
+}  // namespace fleet2d

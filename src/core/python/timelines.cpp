@@ -1,0 +1,302 @@
+#include "timelines.hpp"
+
+#include "mesh.hpp"
+#include "motion.hpp"
+#include "subjects.hpp"
+
+namespace fleet2d {
+namespace {
+
+template <class T>
+std::vector<T> copied(View<const T> values) {
+    return {values.begin(), values.end()};
+}
+
+template <class T>
+Array<T> array_of(const std::vector<T>& values) {
+    return Array<T>::copy_of({values.data(), {static_cast<i64>(values.size())}});
+}
+
+// Timelines, and the meshes that their random walks need.
+class OwnedTimelines {
+public:
+    OwnedTimelines(i64 bodies, i64 step_us) : timelines_(checked(bodies), step_us) {
+        require(0 < step_us && step_us <= LATEST, "step_us must be 1 or more");
+    }
+
+    void follow(i64 body, i64 step, const Breakpoints& track, View<const i64> posture_us, View<const i8> postures) {
+        check(body, step);
+        const i64 count = track.size();
+        require(count > 0 && track.x.size() == count && track.y.size() == count && track.heading.size() == count &&
+                    track.away.size() == count,
+                "all arrays of a track must have one length, 1 or more");
+        require(is_traceable(track), "a track's times must ascend, and its legs be short and its coordinates small");
+        require(postures.size() == posture_us.size() + 1, "postures must be one more than posture_us");
+        bool ascend = true;
+        for (i64 i = 1; i < posture_us.size(); ++i) ascend &= posture_us[i - 1] <= posture_us[i];
+        require(ascend, "posture_us must ascend");
+        auto piece = std::make_shared<TrackPiece>();
+        *piece = {copied(track.time),    copied(track.x),    copied(track.y),  copied(track.heading),
+                  copied(track.away), copied(posture_us), copied(postures)};
+        timelines_.put(body, {step, std::move(piece), nullptr});
+    }
+
+    void walk(i64 body, i64 step, nb::object walls, nb::object space, const WalkRule& rule, std::tuple<i64, i64, i64> start) {
+        check(body, step);
+        auto piece = std::make_shared<WalkPiece>();
+        piece->walls = nb::cast<Mesh>(walls);
+        piece->space = nb::cast<Mesh>(space);
+        piece->rule = rule;
+        check_walk(rule);
+        piece->drawn_from = step;
+        const auto [x, y, heading] = start;
+        for (const i64 value : {x, y, heading}) {
+            require(-(i64{1} << 29) < value && value < (i64{1} << 29), "start must be within 2**29 of 0");
+        }
+        piece->x.push_back(static_cast<i32>(x));
+        piece->y.push_back(static_cast<i32>(y));
+        piece->heading.push_back(static_cast<i32>(heading));
+        keep(walls);
+        keep(space);
+        timelines_.put(body, {step, nullptr, std::move(piece)});
+    }
+
+    std::tuple<i64, i64, i64, i64> pose(i64 body, i64 step) {
+        check_known(body, step);
+        const BodyPose pose = timelines_.pose(body, step);
+        return {pose.x, pose.y, pose.heading, pose.away};
+    }
+
+    std::tuple<Array<i64>, Array<i64>, Array<i64>, Array<u8>> poses(i64 step) {
+        const i64 count = timelines_.bodies();
+        auto x = Array<i64>::empty({count}), y = Array<i64>::empty({count}), heading = Array<i64>::empty({count});
+        auto away = Array<u8>::empty({count});
+        for (i64 body = 0; body < count; ++body) {
+            check_known(body, step);
+            const BodyPose pose = timelines_.pose(body, step);
+            x[body] = pose.x, y[body] = pose.y, heading[body] = pose.heading, away[body] = static_cast<u8>(pose.away);
+        }
+        return {std::move(x), std::move(y), std::move(heading), std::move(away)};
+    }
+
+    OwnedWindow window(i64 first, i64 end) { return window_of(0, timelines_.bodies(), first, end); }
+    OwnedWindow runs(i64 body, i64 first, i64 end) {
+        check(body, first);
+        return window_of(body, body + 1, first, end);
+    }
+
+    void forget(i64 before) { timelines_.forget(before); }
+
+    nb::tuple state() const {
+        nb::list bodies;
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            nb::list pieces;
+            for (const Piece& piece : timelines_.pieces(body)) pieces.append(state_of(piece));
+            bodies.append(pieces);
+        }
+        return nb::make_tuple(timelines_.bodies(), timelines_.step_us(), bodies);
+    }
+
+    void restore(nb::list bodies) {
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            for (nb::handle item : nb::cast<nb::list>(bodies[static_cast<std::size_t>(body)])) restore_piece(body, nb::cast<nb::tuple>(item));
+        }
+    }
+
+private:
+    static i64 checked(i64 bodies) {
+        require(0 <= bodies && bodies < (i64{1} << 31), "bodies must be 0 or more");
+        return bodies;
+    }
+    void check(i64 body, i64 step) const {
+        require(0 <= body && body < timelines_.bodies(), "there is no such body");
+        require(0 <= step && step <= LATEST / timelines_.step_us(), "step must be 0 or more, and its time at most 2**61 us");
+    }
+    void check_known(i64 body, i64 step) const {
+        check(body, step);
+        const auto& pieces = timelines_.pieces(body);
+        require(!pieces.empty() && pieces.front().first <= step, "the step is forgotten, or the body has no motion yet");
+        require(!pieces.front().walk || (pieces.size() > 1 && pieces[1].first <= step) || pieces.front().walk->drawn_from <= step,
+                "the step is forgotten");
+    }
+    static void check_walk(const WalkRule& rule) {
+        require(0 <= rule.stride && rule.stride < (i64{1} << 31), "stride must be in 0 to 2**31 - 1");
+        require(0 <= rule.sway && rule.sway < (i64{1} << 52), "sway must be in 0 to 2**52 - 1");
+        require(0 <= rule.turn_limit && rule.turn_limit < (i64{1} << 30), "turn_limit must be in 0 to 2**30 - 1");
+    }
+    OwnedWindow window_of(i64 first_body, i64 end_body, i64 first, i64 end) {
+        require(first <= end, "end must not be before first");
+        for (i64 body = first_body; body < end_body; ++body) {
+            check_known(body, first);
+            check(body, end);
+        }
+        return timelines_.window(first_body, end_body, first, end);
+    }
+    // Keep a mesh for as long as there are timelines; most walks share theirs.
+    void keep(nb::object mesh) {
+        for (const nb::object& kept : meshes_) {
+            if (kept.is(mesh)) return;
+        }
+        meshes_.push_back(std::move(mesh));
+    }
+    nb::object mesh_of(const Mesh& mesh) const {
+        for (const nb::object& kept : meshes_) {
+            if (nb::cast<Mesh>(kept).vertices.data == mesh.vertices.data) return kept;
+        }
+        return nb::none();
+    }
+    nb::tuple state_of(const Piece& piece) const {
+        if (piece.walk) {
+            const WalkPiece& walk = *piece.walk;
+            const auto rule = nb::make_tuple(walk.rule.key, walk.rule.stride, walk.rule.sway, walk.rule.turn_limit);
+            return nb::make_tuple(piece.first, mesh_of(walk.walls), mesh_of(walk.space), rule, walk.drawn_from,
+                                  array_of(walk.x), array_of(walk.y), array_of(walk.heading));
+        }
+        const TrackPiece& track = *piece.track;
+        const auto breakpoints = nb::make_tuple(array_of(track.time), array_of(track.x), array_of(track.y),
+                                                array_of(track.heading), array_of(track.away));
+        return nb::make_tuple(piece.first, breakpoints, array_of(track.posture_us), array_of(track.postures));
+    }
+    void restore_piece(i64 body, nb::tuple state) {
+        const i64 first = nb::cast<i64>(state[0]);
+        if (state.size() == 4) {
+            follow(body, first, nb::cast<Breakpoints>(state[1]), nb::cast<View<const i64>>(state[2]),
+                   nb::cast<View<const i8>>(state[3]));
+            return;
+        }
+        const auto x = nb::cast<View<const i32>>(state[5]), y = nb::cast<View<const i32>>(state[6]);
+        const auto heading = nb::cast<View<const i32>>(state[7]);
+        require(x.size() > 0 && x.size() == y.size() && x.size() == heading.size(), "a walk's poses must have one length");
+        walk(body, first, nb::borrow(state[1]), nb::borrow(state[2]), nb::cast<WalkRule>(state[3]), {x[0], y[0], heading[0]});
+        WalkPiece& walk = *timelines_.pieces(body).back().walk;
+        walk.drawn_from = nb::cast<i64>(state[4]);
+        walk.x = copied(x), walk.y = copied(y), walk.heading = copied(heading);
+    }
+
+    Timelines timelines_;
+    std::vector<nb::object> meshes_;
+};
+
+// The poses of one body at each of some steps.
+std::tuple<Array<i64>, Array<i64>, Array<i64>, Array<u8>, Array<i8>> dense(const Window& window, i64 body, i64 first, i64 end) {
+    require(0 <= body && body < window.bodies(), "there is no such body");
+    require(window.first <= first && first <= end && end <= window.end, "the steps must lie within the window");
+    const i64 count = end - first;
+    auto x = Array<i64>::empty({count}), y = Array<i64>::empty({count}), heading = Array<i64>::empty({count});
+    auto away = Array<u8>::empty({count});
+    auto posture = Array<i8>::empty({count});
+    for (i64 run = window.start[body]; run < window.start[body + 1]; ++run) {
+        const i64 from = std::max(first, window.step[run]), until = std::min(end, window.run_end(body, run));
+        for (i64 step = from; step < until; ++step) {
+            const i64 j = step - first;
+            x[j] = window.x[run], y[j] = window.y[run], heading[j] = window.heading[run];
+            away[j] = window.away[run], posture[j] = window.posture[run];
+        }
+    }
+    return {std::move(x), std::move(y), std::move(heading), std::move(away), std::move(posture)};
+}
+
+// The runs of bodies whose poses are given at each step.
+OwnedWindow window_of_poses(i64 first, View<const i64, 2> x, View<const i64, 2> y, View<const i64, 2> heading,
+                            View<const u8, 2> away, View<const i8, 2> posture) {
+    require(x.shape == y.shape && x.shape == heading.shape && x.shape == away.shape && x.shape == posture.shape,
+            "all arrays must be (bodies, steps)");
+    const i64 bodies = x.shape[0], steps = x.shape[1];
+    require(-LATEST < first && first < LATEST - steps, "first must be a step");
+    OwnedWindow window;
+    window.first = first;
+    window.end = first + steps;
+    window.start.push_back(0);
+    for (i64 body = 0; body < bodies; ++body) {
+        for (i64 j = 0; j < steps; ++j) {
+            const bool goes_on = j > 0 && x(body, j) == x(body, j - 1) && y(body, j) == y(body, j - 1) &&
+                                 heading(body, j) == heading(body, j - 1) && away(body, j) == away(body, j - 1) &&
+                                 posture(body, j) == posture(body, j - 1);
+            if (goes_on) continue;
+            window.step.push_back(first + j);
+            window.x.push_back(x(body, j));
+            window.y.push_back(y(body, j));
+            window.heading.push_back(heading(body, j));
+            window.away.push_back(away(body, j));
+            window.posture.push_back(posture(body, j));
+        }
+        window.start.push_back(static_cast<i64>(window.step.size()));
+    }
+    return window;
+}
+
+template <auto Member>
+auto column() {
+    return [](nb::handle self) { return border::borrowed(nb::cast<const OwnedWindow&>(self).view().*Member, self); };
+}
+
+}  // namespace
+
+void bind_timelines(nb::module_& m) {
+    nb::class_<OwnedWindow>(m, "Window", R"(The runs of equal pose of some bodies over consecutive steps.
+
+The runs of body b are number start[b] to start[b + 1] - 1. Each lasts until the next one of its body
+begins, the last one until `end`. Arrays are read-only.
+
+Args:
+    first: The first step.
+    x: int64 (bodies, steps), the pose of each body at each step, lattice units.
+    y: int64 (bodies, steps), lattice units.
+    heading: int64 (bodies, steps), 1/4096 turn.
+    away: uint8 (bodies, steps), not 0 while a body isn't at home.
+    posture: int8 (bodies, steps), number of the posture.)")
+        .def("__init__", [](OwnedWindow* self, i64 first, View<const i64, 2> x, View<const i64, 2> y, View<const i64, 2> heading,
+                             View<const u8, 2> away, View<const i8, 2> posture) {
+            new (self) OwnedWindow(window_of_poses(first, x, y, heading, away, posture));
+        }, "first"_a, "x"_a, "y"_a, "heading"_a, "away"_a, "posture"_a)
+        .def_ro("first", &OwnedWindow::first, "The first step.")
+        .def_ro("end", &OwnedWindow::end, "One past the last step.")
+        .def_prop_ro("start", column<&Window::start>(), nb::sig("def start(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (bodies + 1,), the first run of each body.")
+        .def_prop_ro("step", column<&Window::step>(), nb::sig("def step(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), the step at which each begins.")
+        .def_prop_ro("x", column<&Window::x>(), nb::sig("def x(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), lattice units.")
+        .def_prop_ro("y", column<&Window::y>(), nb::sig("def y(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), lattice units.")
+        .def_prop_ro("heading", column<&Window::heading>(), nb::sig("def heading(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), 1/4096 turn.")
+        .def_prop_ro("away", column<&Window::away>(), nb::sig("def away(self) -> numpy.typing.NDArray[numpy.uint8]"), "uint8 (runs,), not 0 while the body isn't at home.")
+        .def_prop_ro("posture", column<&Window::posture>(), nb::sig("def posture(self) -> numpy.typing.NDArray[numpy.int8]"), "int8 (runs,), number of the posture.")
+        .def("dense", [](const OwnedWindow& self, i64 body, i64 first, i64 end) { return dense(self.view(), body, first, end); },
+             "body"_a, "first"_a, "end"_a,
+             R"(Return the poses of a body at each of the steps from `first` to `end` - 1.
+
+Returns:
+    x, y, heading int64, away uint8 and posture int8, (steps,) each.)");
+
+    nb::class_<OwnedTimelines>(m, "Timelines", R"(How each body of a run moves, piece after piece.
+
+A piece begins at a step and holds until the next one of its body begins.
+
+Args:
+    bodies: How many bodies there are.
+    step_us: Length of a step.)")
+        .def(nb::init<i64, i64>(), "bodies"_a, "step_us"_a)
+        .def("follow", &OwnedTimelines::follow, "body"_a, "step"_a, "track"_a, "posture_us"_a, "postures"_a,
+             R"(Let a body follow a track from a step on, instead of what it would have done from then on.
+
+Args:
+    body: Number of the body.
+    step: The first step.
+    track: Breakpoints, whose times are since the start of the run.
+    posture_us: int64 (n,), when it takes another posture.
+    postures: int8 (n + 1,); number i holds before posture_us[i], the last one from then on.)")
+        .def("walk", &OwnedTimelines::walk, "body"_a, "step"_a, nb::arg("walls"), nb::arg("space"), "rule"_a, "start"_a,
+             nb::sig("def walk(self, body: int, step: int, walls: Mesh, space: Mesh, rule: tuple[typing.Any, ...], start: tuple[int, int, int]) -> None"),
+             "Let a body walk at random from a step on; see `trace_meander`.")
+        .def("pose", &OwnedTimelines::pose, "body"_a, "step"_a, "Return x, y, heading and away of a body at a step.")
+        .def("poses", &OwnedTimelines::poses, "step"_a, "Return x, y, heading and away of all bodies at a step, (bodies,) each.")
+        .def("window", &OwnedTimelines::window, "first"_a, "end"_a, Unlocked(),
+             "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")
+        .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a, Unlocked(),
+             "Return the runs of equal pose of one body in the steps from `first` to `end` - 1.")
+        .def("forget", &OwnedTimelines::forget, "before"_a, "Drop what is only needed for steps earlier than `before`.")
+        .def("__getstate__", &OwnedTimelines::state, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
+        .def("__setstate__", [](OwnedTimelines& self, nb::tuple state) {
+            new (&self) OwnedTimelines(nb::cast<i64>(state[0]), nb::cast<i64>(state[1]));
+            self.restore(nb::cast<nb::list>(state[2]));
+        }, nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
+}
+
+}  // namespace fleet2d

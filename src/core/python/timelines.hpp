@@ -1,0 +1,21 @@
+// Windows as Python holds them.
+#pragma once
+
+#include "../timelines.hpp"
+#include "arrays.hpp"
+
+namespace nanobind::detail {
+
+template <>
+struct type_caster<fleet2d::Window> {
+    NB_TYPE_CASTER(fleet2d::Window, const_name("Window"))
+
+    bool from_python(handle source, uint32_t, cleanup_list*) noexcept {
+        fleet2d::OwnedWindow* owned = nullptr;
+        if (!nb::try_cast(source, owned) || owned == nullptr) return false;
+        value = owned->view();
+        return true;
+    }
+};
+
+}  // namespace nanobind::detail

@@ -1,0 +1,43 @@
+// Shortest paths among walls: A* over the corners that a taut string can touch.
+//
+// A shortest path in a polygonal space bends only at its reflex corners (Lozano-Pérez and Wesley,
+// Communications of the ACM 22, 1979). The space is the free space shrunk by a body's radius, so a
+// path may touch its border. Which corners see each other is decided in integers; lengths are the only
+// floats (sums of correctly rounded square roots, the same on every machine).
+#pragma once
+
+#include "mesh.hpp"
+
+namespace fleet2d {
+
+// The reflex corners of a space: the nodes of its route graph.
+struct Corners {
+    View<const i64> vertex;     // (nodes,) the vertex of the mesh at each, ascending
+    View<const i64, 2> before;  // (nodes, 2) the vertex of the border before the corner [lattice units]
+    View<const i64, 2> after;   // (nodes, 2) and the one after it
+    View<const bool> simple;    // (nodes,) false where several walls meet: `before` and `after` say nothing
+};
+
+// Corners and the straight legs between them that a taut string can take. It owns its arrays.
+struct RouteGraph {
+    Array<i64> vertex;  // the corners, as in `Corners`
+    Array<i64, 2> before;
+    Array<i64, 2> after;
+    Array<bool> simple;
+    Array<i32> node_of_vertex;  // (vertices,), -1 = no corner
+    Array<i32> leg_start;       // (nodes + 1,) where the legs from each corner begin
+    Array<i32> leg_end;         // (legs,) the corner that each leads to, ascending for each corner
+    Array<f64> leg_length;      // (legs,) [lattice units]
+
+    Corners corners() const { return {vertex, before, after, simple}; }
+};
+
+// Connect all corners of a space that see each other along a taut leg.
+RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners);
+
+// The shortest path from `start` to `goal`, (points, 2); empty where there is none, or an end lies
+// outside the space. Both ends are strictly inside: a goal on the border is not seen by the last corner.
+// Ties go to the lower node: nodes are sorted by position, so the path depends on the walls only.
+Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
+
+}  // namespace fleet2d

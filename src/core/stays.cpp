@@ -1,0 +1,357 @@
+#include "stays.hpp"
+
+#include <vector>
+
+#include "lattice.hpp"
+
+namespace fleet2d {
+namespace {
+
+// A base to a whole power, by multiplications.
+f64 whole_power(f64 base, i64 exponent) {
+    f64 result = 1.0;
+    for (; exponent > 0; exponent >>= 1) {
+        if (exponent & 1) result *= base;
+        base *= base;
+    }
+    return result;
+}
+
+Transitions transitions_of(const Ways& ways, View<const i64> bins) {
+    std::vector<i64> lengths(bins.begin(), bins.end());
+    std::sort(lengths.begin(), lengths.end());
+    lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
+    const i64 count = static_cast<i64>(lengths.size()), nodes = ways.nodes(), columns = ways.follow.shape[1];
+    Transitions made{Array<i64>::empty({bins.size()}),         Array<f64, 2>::empty({count, nodes}),
+                     Array<f64, 2>::empty({count, nodes}),     Array<f64, 2>::empty({count, nodes}),
+                     Array<f64, 3>::empty({count, nodes, columns}), Array<f64>::empty({count})};
+    for (i64 t = 0; t < bins.size(); ++t) {
+        made.length[t] = std::lower_bound(lengths.begin(), lengths.end(), bins[t]) - lengths.begin();
+    }
+    for (i64 i = 0; i < count; ++i) {
+        const i64 length = lengths[static_cast<std::size_t>(i)];
+        for (i64 k = 0; k < nodes; ++k) {
+            const f64 kept = whole_power(ways.stay[k], length);
+            const f64 moved = 1.0 - whole_power(1.0 - ways.restless[k / ways.stages()], length);
+            made.over(i, k) = 1.0 - kept;
+            made.rest(i, k) = kept * (1.0 - moved);
+            made.hop(i, k) = kept * moved;
+            for (i64 j = 0; j < columns; ++j) made.leave(i, k, j) = (1.0 - kept) * ways.follow(k, j);
+        }
+        made.missed[i] = std::max(whole_power(1.0 - ways.detection, length), NEVER_SURE);
+    }
+    return made;
+}
+
+// Where the probability of a stage of stays in a room comes from.
+struct Flow {
+    f64 came;    // probability to have come to the room, or changed patch in it
+    f64 rest;    // share that rests of what was in the stage
+    f64 onward;  // share that comes on of what was in the stage before
+};
+
+// The probability of hidden states of a room that isn't visible; nullptr for `last` if there is no stage before.
+void flow_hidden(Flow flow, f64 likely, i64 patches, const f64* spread, const f64* was, const f64* last,
+                 f64* __restrict now) {
+    if (last == nullptr) {
+        for (i64 p = 0; p < patches; ++p) now[p] = (flow.came * spread[p] + flow.rest * was[p]) * likely;
+    } else {
+        for (i64 p = 0; p < patches; ++p) {
+            now[p] = (flow.came * spread[p] + (flow.rest * was[p] + flow.onward * last[p])) * likely;
+        }
+    }
+}
+
+// Goes through stretches from the first to the last.
+class ForwardPass {
+public:
+    ForwardPass(const Ways& ways, const Stretches& stretches, Filtered& filtered)
+        : ways_(ways), stretches_(stretches), filtered_(filtered), comers_(Array<f64>::empty({ways.rooms()})) {}
+
+    // Go from before a stretch to after it.
+    void step(i64 t) {
+        const f64 weight = stretches_.begin[t + 1] > stretches_.begin[t] ? FALSE_ALARM : 1.0;
+        filtered_.likely(t, 0) = weight * filtered_.transitions.missed[filtered_.transitions.length[t]];
+        filtered_.likely(t, 1) = weight;
+        count_comers(t);
+        for (i64 room = 0; room < ways_.rooms(); ++room) filtered_.visible(t + 1, room) = becomes_visible(t, room);
+        for (i64 stage = 0; stage < ways_.stages(); ++stage) predict(t, stage);
+        weigh_sightings(stretches_, t, filtered_.likely[t], filtered_.in_view[t + 1], filtered_.hidden[t + 1]);
+        sum_nodes(t + 1);
+        normalize(t);
+    }
+
+private:
+    // The probability to come to each room from a stage of a stay that is over.
+    void count_comers(i64 t) {
+        const View<const f64> mass = filtered_.mass[t];
+        const View<const f64> over = filtered_.transitions.over[filtered_.transitions.length[t]];
+        const View<f64> comers = comers_;
+        std::fill(comers.begin(), comers.end(), 0.0);
+        for (i64 k = 0; k < ways_.nodes(); ++k) {
+            const f64 leaving = mass[k] * over[k];
+            const View<const f64> follow = ways_.follow[k];
+            for (i64 room = 0; room < comers.size(); ++room) comers[room] += leaving * follow[room];
+        }
+    }
+
+    // Whether the person may be in view in a room after a stretch.
+    bool becomes_visible(i64 t, i64 room) const {
+        const auto [begin, end] = ways_.patches_of(room);
+        const View<const u8> shown = stretches_.shown[t];
+        for (i64 p = begin; p < end; ++p) {
+            if (shown[p] > 0) return true;
+        }
+        if (!filtered_.visible[t][room]) return false;
+        // The view has gone, and `in_view` with it; but the beginning may say what no view does.
+        const View<const bool> same = filtered_.same[t];
+        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+            const View<const f64> in_view = filtered_.in_view[t][stage];
+            for (i64 p = begin; p < end; ++p) {
+                if (same[p] && in_view[p] != 0.0) return true;
+            }
+        }
+        return false;
+    }
+
+    // The probability of the states of a stage after a stretch without sightings.
+    void predict(i64 t, i64 stage) {
+        const i64 length = filtered_.transitions.length[t];
+        const View<const f64> mass = filtered_.mass[t];
+        const View<const f64> rest = filtered_.transitions.rest[length], hop = filtered_.transitions.hop[length];
+        const View<const f64, 2> leave = filtered_.transitions.leave[length];
+        const View<const bool> before = filtered_.visible[t], after = filtered_.visible[t + 1];
+        const f64* was = filtered_.hidden[t][stage].data;
+        const f64* last = stage == 0 ? nullptr : filtered_.hidden[t][stage - 1].data;
+        f64* now = filtered_.hidden[t + 1][stage].data;
+        const f64 likely = filtered_.likely(t, 1);
+        for (i64 room = 0; room < ways_.rooms(); ++room) {
+            const auto [begin, end] = ways_.patches_of(room);
+            const i64 k = ways_.node(room, stage);
+            Flow flow{hop[k] * mass[k], rest[k], 0.0};
+            if (stage == 0) {
+                flow.came += comers_[room];
+            } else {
+                flow.onward = leave(k - 1, ways_.next_stage());
+            }
+            if (before[room] || after[room]) {
+                flow_visible(t, stage, room, flow);
+            } else {
+                flow_hidden(flow, likely, end - begin, ways_.spread.data + begin, was + begin,
+                            last == nullptr ? nullptr : last + begin, now + begin);
+            }
+        }
+    }
+
+    // The same in a room that is visible, or was.
+    void flow_visible(i64 t, i64 stage, i64 room, Flow flow) {
+        const i64 earlier = std::max(stage - 1, i64{0});  // with nothing to come on from it at the first stage
+        const View<const f64, 2> in_view = filtered_.in_view[t], hidden = filtered_.hidden[t];
+        const View<const f64> was_in_view = in_view[stage], was_hidden = hidden[stage];
+        const View<const f64> last_in_view = in_view[earlier], last_hidden = hidden[earlier];
+        const View<f64> now_in_view = filtered_.in_view[t + 1][stage], now_hidden = filtered_.hidden[t + 1][stage];
+        const View<const u8> view = stretches_.shown[t];
+        const View<const bool> same = filtered_.same[t];
+        const View<const f64> likely = filtered_.likely[t];
+        const auto [begin, end] = ways_.patches_of(room);
+        for (i64 p = begin; p < end; ++p) {
+            const f64 shown = part_in_view(view[p]);
+            const f64 stay_in_view = flow.rest * was_in_view[p] + flow.onward * last_in_view[p];
+            const f64 stay_hidden = flow.rest * was_hidden[p] + flow.onward * last_hidden[p];
+            const f64 drawn = flow.came * ways_.spread[p] + (same[p] ? 0.0 : stay_in_view + stay_hidden);
+            now_in_view[p] = (shown * drawn + (same[p] ? stay_in_view : 0.0)) * likely[0];
+            now_hidden[p] = ((1.0 - shown) * drawn + (same[p] ? stay_hidden : 0.0)) * likely[1];
+        }
+    }
+
+    // Sum the states of each node.
+    void sum_nodes(i64 t) {
+        const View<const bool> visible = filtered_.visible[t];
+        const View<f64> mass = filtered_.mass[t];
+        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+            const View<const f64> in_view = filtered_.in_view[t][stage], hidden = filtered_.hidden[t][stage];
+            for (i64 room = 0; room < ways_.rooms(); ++room) {
+                const auto [begin, end] = ways_.patches_of(room);
+                f64 sum = 0.0;
+                if (visible[room]) {
+                    for (i64 p = begin; p < end; ++p) sum += in_view[p] + hidden[p];
+                } else {
+                    for (i64 p = begin; p < end; ++p) sum += hidden[p];
+                }
+                mass[ways_.node(room, stage)] = sum;
+            }
+        }
+    }
+
+    // Let what is known after a stretch sum to one.
+    void normalize(i64 t) {
+        const View<const bool> visible = filtered_.visible[t + 1];
+        const View<f64> mass = filtered_.mass[t + 1];
+        f64 total = 0.0;
+        for (const f64 part : mass) total += part;
+        const f64 scale = 1.0 / total;
+        filtered_.scale[t] = scale;
+        for (f64& part : mass) part *= scale;
+        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+            for (f64& part : filtered_.hidden[t + 1][stage]) part *= scale;
+            const View<f64> in_view = filtered_.in_view[t + 1][stage];
+            for (i64 room = 0; room < ways_.rooms(); ++room) {
+                if (!visible[room]) continue;
+                const auto [begin, end] = ways_.patches_of(room);
+                for (f64& part : in_view.slice(begin, end)) part *= scale;
+            }
+        }
+    }
+
+    const Ways& ways_;
+    const Stretches& stretches_;
+    Filtered& filtered_;
+    Array<f64> comers_;  // (rooms,)
+};
+
+// What is known before the first stretch.
+void begin(const Ways& ways, View<const f64, 3> now, Filtered& filtered) {
+    for (i64 stage = 0; stage < ways.stages(); ++stage) {
+        const View<const f64> in_view = now[0][stage], hidden = now[1][stage];
+        std::copy(in_view.begin(), in_view.end(), filtered.in_view[0][stage].begin());
+        std::copy(hidden.begin(), hidden.end(), filtered.hidden[0][stage].begin());
+        for (i64 room = 0; room < ways.rooms(); ++room) {
+            const auto [begin, end] = ways.patches_of(room);
+            for (i64 p = begin; p < end; ++p) {
+                filtered.mass(0, ways.node(room, stage)) += in_view[p] + hidden[p];
+                filtered.visible(0, room) |= in_view[p] != 0.0;
+            }
+        }
+    }
+}
+
+// Write whether as much of each patch is in view as before.
+void compare_views(View<const u8, 2> shown, View<const i64> shown_before, View<bool, 2> same) {
+    for (i64 t = 0; t < same.size(); ++t) {
+        const View<const u8> now = shown[t];
+        const View<bool> row = same[t];
+        if (t == 0) {
+            for (i64 p = 0; p < row.size(); ++p) row[p] = now[p] == shown_before[p];
+        } else {
+            const View<const u8> before = shown[t - 1];
+            for (i64 p = 0; p < row.size(); ++p) row[p] = now[p] == before[p];
+        }
+    }
+}
+
+}  // namespace
+
+void weigh_sightings(const Stretches& stretches, i64 t, View<const f64> likely, View<f64, 2> in_view,
+                     View<f64, 2> hidden) {
+    for (i64 i = stretches.begin[t]; i < stretches.begin[t + 1]; ++i) {
+        const i64 p = stretches.patch[i];
+        const bool shown = stretches.shown(t, p) > 0;
+        const View<f64, 2> states = shown ? in_view : hidden;
+        const f64 factor = 1.0 + stretches.share[i] / likely[shown ? 0 : 1];
+        for (i64 stage = 0; stage < states.size(); ++stage) states(stage, p) *= factor;
+    }
+}
+
+Filtered filter_stays(const Ways& ways, const Stretches& stretches, View<const f64, 3> now, View<const i64> shown) {
+    const i64 count = stretches.size(), stages = ways.stages(), patches = ways.patches();
+    Filtered filtered;
+    filtered.transitions = transitions_of(ways, stretches.bins);
+    filtered.in_view = Array<f64, 3>::zeros({count + 1, stages, patches});
+    filtered.hidden = Array<f64, 3>::empty({count + 1, stages, patches});
+    filtered.visible = Array<bool, 2>::zeros({count + 1, ways.rooms()});
+    filtered.mass = Array<f64, 2>::zeros({count + 1, ways.nodes()});
+    filtered.likely = Array<f64, 2>::empty({count, 2});
+    filtered.scale = Array<f64>::empty({count});
+    filtered.same = Array<bool, 2>::empty({count, patches});
+    begin(ways, now, filtered);
+    compare_views(stretches.shown, shown, filtered.same);
+    ForwardPass pass(ways, stretches, filtered);
+    for (i64 t = 0; t < count; ++t) pass.step(t);
+    return filtered;
+}
+
+Array<f64, 2> follow(const Ways& ways, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {
+    const i64 count = stretches.size();
+    const Filtered filtered = filter_stays(ways, stretches, now, shown);
+    auto places = Array<f64, 2>::zeros({count, ways.rooms()});
+    for (i64 t = 0; t < count; ++t) {
+        const View<const f64> mass = filtered.mass[t + 1];
+        for (i64 k = 0; k < ways.nodes(); ++k) places(t, k / ways.stages()) += mass[k];
+    }
+    for (i64 stage = 0; stage < ways.stages(); ++stage) {
+        const View<const f64> in_view = filtered.in_view[count][stage], hidden = filtered.hidden[count][stage];
+        std::copy(in_view.begin(), in_view.end(), now[0][stage].begin());
+        std::copy(hidden.begin(), hidden.end(), now[1][stage].begin());
+    }
+    const View<const u8> last = stretches.shown[count - 1];
+    std::copy(last.begin(), last.end(), shown.begin());
+    return places;
+}
+
+namespace {
+
+// Where a user was perceived in a bin.
+struct Sighting {
+    i64 patches = 0;  // in how many patches
+    i64 patch = -1;   // in which, the last if there are several; -1: in none
+};
+
+Sighting sighting_of(View<const i64> seen) {
+    Sighting found;
+    i64 any = 0;
+    for (const i64 steps : seen) any |= steps;
+    if (any == 0) return found;
+    for (i64 p = 0; p < seen.size(); ++p) {
+        if (seen[p] > 0) found = {found.patches + 1, p};
+    }
+    return found;
+}
+
+}  // namespace
+
+OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, View<const i64, 2> seen, i64 longest) {
+    const i64 bins = shown.size(), patches = shown.shape[1];
+    std::vector<i64> opened;  // the first bin of each stretch, and the number of bins
+    i64 sightings = 0;
+    Sighting last;
+    for (i64 t = 0; t < bins; ++t) {
+        const Sighting now = sighting_of(seen[t]);
+        const bool alike = t > 0 && t - opened.back() < longest &&
+                           floor_div(minute[t], 60) == floor_div(minute[opened.back()], 60) && now.patches < 2 &&
+                           last.patches < 2 && now.patch == last.patch &&
+                           std::equal(shown[t].begin(), shown[t].end(), shown[t - 1].begin());
+        if (!alike) {
+            opened.push_back(t);
+            sightings += now.patches;
+        }
+        last = now;
+    }
+    const i64 count = static_cast<i64>(opened.size());
+    opened.push_back(bins);
+
+    OwnedStretches made{Array<i64>::empty({count}),
+                        Array<i64>::empty({count}),
+                        Array<u8, 2>::zeros({count, patches + 1}),
+                        Array<i64>::zeros({count + 1}),
+                        Array<i64>::empty({sightings}),
+                        Array<f64>::empty({sightings})};
+    i64 used = 0;
+    for (i64 i = 0; i < count; ++i) {
+        const i64 t = opened[static_cast<std::size_t>(i)];
+        made.bins[i] = opened[static_cast<std::size_t>(i) + 1] - t;
+        made.hour[i] = floor_div(minute[t], 60);
+        std::copy(shown[t].begin(), shown[t].end(), made.shown[i].begin());
+        f64 total = 0.0;
+        for (const i64 steps : seen[t]) total += static_cast<f64>(steps);
+        for (i64 p = 0; p < patches; ++p) {
+            if (seen(t, p) > 0) {
+                made.patch[used] = p;
+                made.share[used++] = static_cast<f64>(seen(t, p)) / total;
+            }
+        }
+        made.begin[i + 1] = used;
+    }
+    return made;
+}
+
+}  // namespace fleet2d

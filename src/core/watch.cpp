@@ -1,0 +1,242 @@
+#include "watch.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "seen.hpp"
+
+namespace fleet2d {
+namespace {
+
+constexpr i64 FAR_AWAY = i64{1} << 40;  // lattice units: nobody who is further out sees a home
+
+// What tells poses apart.
+struct Stance {
+    i64 x, y, heading;
+    i64 panned;  // how far the cameras are panned
+
+    bool operator==(const Stance&) const = default;
+};
+
+// One number for how far all cameras are panned.
+i64 panned_at(const Lenses& lenses, i64 moment_us) {
+    u64 number = 0;
+    for (i64 camera = 0; camera < lenses.pan_count.size(); ++camera) {
+        const i64 count = lenses.pan_count[camera];
+        if (count == 0) continue;
+        const i64 turn = floor_mod(floor_div(moment_us, lenses.pan_us[camera]), count);
+        number = number * static_cast<u64>(count) + static_cast<u64>(turn);
+    }
+    return static_cast<i64>(number);
+}
+
+// The slot that holds a pose, or the empty one that it would go to.
+i64 slot_of(const Glances& glances, const Stance& stance) {
+    u64 hash = static_cast<u64>(stance.x) * 0x9E3779B97F4A7C15;
+    hash ^= static_cast<u64>(stance.y) * 0xC2B2AE3D27D4EB4F;
+    hash ^= static_cast<u64>(stance.panned) * TURN + static_cast<u64>(stance.heading);
+    hash *= 0x165667B19E3779F9;
+    const i64 mask = glances.slots() - 1;
+    i64 slot = static_cast<i64>(hash >> 33) & mask;
+    for (i64 tried = 0; tried <= mask; ++tried, slot = (slot + 1) & mask) {
+        if (glances.last[slot] == NEVER) return slot;
+        const View<i64> pose = glances.pose[slot];
+        if (Stance{pose[0], pose[1], pose[2], pose[3]} == stance) return slot;
+    }
+    throw std::invalid_argument("more slots of glances are used than `used` says");
+}
+
+// The cells of a span.
+template <class T>
+View<T> cells_of(View<T, 2> grid, const Span& span) {
+    return grid[span.row].slice(span.first, span.last + 1);
+}
+
+// Add cells of one patch, -1 for none.
+void count_cells(i64 patch, i64 count, View<i32> cells) {
+    if (patch < 0) return;
+    if (patch >= cells.size()) throw std::invalid_argument("patch_of_cell must hold patches, or -1");
+    cells[patch] += static_cast<i32>(count);
+}
+
+// Finds the cells that a robot's cameras show.
+class Looker {
+public:
+    explicit Looker(const Watched& watched)
+        : watched_(watched),
+          finder_(watched.walls, watched.patch_of_cell.shape[0], watched.patch_of_cell.shape[1]) {}
+
+    // The cells that one camera shows from a pose of the robot; valid until the next call.
+    const std::vector<Span>& look(i64 camera, View<const i64> pose, i64 step) {
+        const Lenses& lenses = watched_.lenses;
+        const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FAR_AWAY, FAR_AWAY); };
+        const Pose robot{clamped(pose[0]), clamped(pose[1]), pose[2] & (TURN - 1)};
+        return finder_.cells_in_view(camera_pose(lenses, camera, robot, step * watched_.step_us),
+                                     {lenses.near_squared[camera], lenses.far_squared[camera],
+                                      lenses.half_angle[camera]});
+    }
+
+private:
+    const Watched& watched_;
+    CellFinder finder_;
+};
+
+void settle(const Watched& watched, const Glances& glances, View<i64, 2> seen, Looker& looker) {
+    for (i64 slot = 0; slot < glances.slots(); ++slot) {
+        const i64 step = glances.last[slot];
+        if (step == glances.settled[slot]) continue;
+        if (step < 0 || step > LAST_MOMENT / watched.step_us) throw std::invalid_argument("last must hold steps, or -1");
+        glances.settled[slot] = step;
+        for (i64 camera = 0; camera < watched.cameras(); ++camera) {
+            for (const Span& span : looker.look(camera, glances.pose[slot], step)) {
+                for (i64& last : cells_of(seen, span)) last = std::max(last, step);
+            }
+        }
+    }
+}
+
+// Takes in runs of equal pose one after the other. It holds the pose that the robot has, until it takes another one.
+class Watcher {
+public:
+    Watcher(const Watched& watched, const Glances& glances, const Record& record)
+        : watched_(watched), glances_(glances), record_(record), looker_(watched) {}
+
+    void watch(const Window& window, i64 body, i64 first, i64 end);
+
+private:
+    // Hold another pose.
+    void take(const Stance& stance, i64 step);
+
+    // Look from a new pose: mark what was never seen before, and count the cells of each patch.
+    void look_from(i64 slot, i64 step);
+    void mark(const Span& span, i64 step, View<i32> cells);
+
+    // Add what the held pose shows in the looks since it was taken or added; `bin` is a row of Record::binned.
+    void add_held(i64 bin);
+
+    const Watched& watched_;
+    const Glances& glances_;
+    const Record& record_;
+    Looker looker_;
+    Stance held_{};
+    i64 slot_ = -1;  // of the held pose; -1 for none
+    i64 looks_ = 0;  // that aren't added yet
+    i64 last_look_ = NEVER;
+};
+
+void Watcher::take(const Stance& stance, i64 step) {
+    if (2 * glances_.used[0] >= glances_.slots()) {
+        if (record_.keeps_last()) settle(watched_, glances_, record_.last, looker_);
+        std::fill(glances_.last.begin(), glances_.last.end(), NEVER);
+        std::fill(glances_.settled.begin(), glances_.settled.end(), NEVER);
+        glances_.used[0] = 0;
+    }
+    held_ = stance;
+    slot_ = slot_of(glances_, stance);
+    if (glances_.last[slot_] != NEVER) return;
+    const View<i64> pose = glances_.pose[slot_];
+    pose[0] = stance.x, pose[1] = stance.y, pose[2] = stance.heading, pose[3] = stance.panned;
+    look_from(slot_, step);
+    glances_.last[slot_] = glances_.settled[slot_] = step;
+    ++glances_.used[0];
+}
+
+void Watcher::look_from(i64 slot, i64 step) {
+    const View<i32> cells = glances_.cells[slot];
+    std::fill(cells.begin(), cells.end(), 0);
+    for (i64 camera = 0; camera < watched_.cameras(); ++camera) {
+        for (const Span& span : looker_.look(camera, glances_.pose[slot], step)) mark(span, step, cells);
+    }
+}
+
+void Watcher::mark(const Span& span, i64 step, View<i32> cells) {
+    for (i64& first : cells_of(record_.first, span)) first = first == NEVER ? step : first;
+    if (record_.keeps_last()) std::ranges::fill(cells_of(record_.last, span), step);
+    const View<const i16> patches = cells_of(watched_.patch_of_cell, span);
+    if (watched_.cameras() == 1) {
+        for (i64 i = 0, end = 0; i < patches.size(); i = end) {  // neighbours mostly belong to one patch
+            while (end < patches.size() && patches[end] == patches[i]) ++end;
+            count_cells(patches[i], end - i, cells);
+        }
+        return;
+    }
+    const View<i64> counted = cells_of(record_.counted, span);
+    for (i64 i = 0; i < patches.size(); ++i) {
+        if (counted[i] == step) continue;  // another camera shows it, too
+        counted[i] = step;
+        count_cells(patches[i], 1, cells);
+    }
+}
+
+void Watcher::add_held(i64 bin) {
+    if (slot_ < 0) return;
+    glances_.last[slot_] = last_look_;
+    const i64 steps = looks_ * watched_.every;
+    const View<i32> cells = glances_.cells[slot_];
+    for (i64 patch = 0; patch < record_.patches(); ++patch) record_.exposure[patch] += steps * cells[patch];
+    if (!record_.keeps_bins() || steps == 0) return;
+    const View<i64> binned = record_.binned[bin], most = record_.most[bin];
+    for (i64 patch = 0; patch < record_.patches(); ++patch) {
+        binned[patch] += steps * cells[patch];
+        most[patch] = std::max(most[patch], i64{cells[patch]});
+    }
+}
+
+void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
+    const i64 every = watched_.every, bin_steps = watched_.bin_steps;
+    const bool bins = record_.keeps_bins();
+    const bool pans = std::any_of(watched_.lenses.pan_count.begin(), watched_.lenses.pan_count.end(),
+                                  [](i64 headings) { return headings > 0; });
+    const i64 first_bin = floor_div(first, bin_steps);
+    i64 bin = 0, next_bin = (first_bin + 1) * bin_steps;
+    if (bins && first < end) {
+        const i64 reached = floor_div(end - 1, bin_steps) - first_bin + 1;
+        for (i64 row = 0; row < reached; ++row) {
+            std::fill(record_.binned[row].begin(), record_.binned[row].end(), 0);
+            std::fill(record_.most[row].begin(), record_.most[row].end(), 0);
+        }
+    }
+    for (i64 run = window.start[body]; run < window.start[body + 1]; ++run) {
+        const i64 begin = std::max(first, window.step[run]), stop = std::min(end, window.run_end(body, run));
+        if (window.away[run] != 0) {
+            add_held(bin);
+            slot_ = -1, looks_ = 0;
+            continue;
+        }
+        for (i64 step = next_multiple(begin, every); step < stop;) {
+            if (bins && step >= next_bin) {
+                add_held(bin);
+                looks_ = 0;
+                bin = floor_div(step, bin_steps) - first_bin;
+                next_bin = (first_bin + bin + 1) * bin_steps;
+            }
+            const i64 panned = pans ? panned_at(watched_.lenses, step * watched_.step_us) : 0;
+            const Stance stance{window.x[run], window.y[run], window.heading[run], panned};
+            if (slot_ < 0 || stance != held_) {
+                add_held(bin);
+                looks_ = 0;
+                take(stance, step);
+            }
+            const i64 until = pans ? step + 1 : bins ? std::min(stop, next_bin) : stop;
+            const i64 next = next_multiple(until, every);
+            looks_ += (next - step) / every;
+            last_look_ = next - every;
+            step = next;
+        }
+    }
+    add_held(bin);
+}
+
+}  // namespace
+
+void watch(const Watched& watched, const Window& window, i64 body, i64 first, i64 end, const Glances& glances,
+           const Record& record) {
+    Watcher(watched, glances, record).watch(window, body, first, end);
+}
+
+void settle(const Watched& watched, const Glances& glances, View<i64, 2> seen) {
+    Looker looker(watched);
+    settle(watched, glances, seen, looker);
+}
+
+}  // namespace fleet2d

@@ -1,0 +1,1116 @@
+"""
+The compiled core of Fleet2D: arrays and integers in, arrays and integers out.
+"""
+
+import enum
+from typing import Any, overload
+
+import numpy
+import numpy.typing
+
+
+SUB: int = 64
+
+CELL_CENTRE: int = 33
+
+BUCKET: int = 256
+
+OUTSIDE: int = -1
+
+WALL: int = -1
+
+class Mesh:
+    """
+    A triangulation of free space without extra points; it never changes.
+
+    It may have holes and several components.
+
+    Args:
+        vertices: int64 (n, 2), lattice units, sorted by (x, y), so numbers don't depend on the triangles.
+        triangles: int32 (t, 3), numbers of vertices, counter-clockwise.
+        neighbors: int32 (t, 3), the triangle across edge k (vertex k to vertex k + 1), -1 for a wall.
+
+    Raises:
+        ValueError: An array has another shape, or a number in it is none of a vertex or triangle.
+    """
+
+    def __init__(self, vertices: numpy.typing.NDArray[numpy.int64], triangles: numpy.typing.NDArray[numpy.int32], neighbors: numpy.typing.NDArray[numpy.int32]) -> None: ...
+
+    @property
+    def vertices(self) -> numpy.typing.NDArray[numpy.int64]:
+        """int64 (n, 2), lattice units, sorted by (x, y)."""
+
+    @property
+    def triangles(self) -> numpy.typing.NDArray[numpy.int32]:
+        """int32 (t, 3), numbers of vertices, counter-clockwise."""
+
+    @property
+    def neighbors(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        int32 (t, 3), the triangle across edge k (vertex k to vertex k + 1), -1 for a wall.
+        """
+
+    @property
+    def bucket_start(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        int32 (rows * columns + 1,), where each square bucket begins in `bucket_triangles`.
+        """
+
+    @property
+    def bucket_triangles(self) -> numpy.typing.NDArray[numpy.int32]:
+        """int32, the triangles that overlap each square bucket, ascending."""
+
+    @property
+    def bucket_columns(self) -> int:
+        """Number of buckets along x."""
+
+    @property
+    def bucket_rows(self) -> int:
+        """Number of buckets along y."""
+
+    def with_neighbors(self, neighbors: numpy.typing.NDArray[numpy.int32]) -> Mesh:
+        """Return the mesh with other walls: `neighbors` as for the class."""
+
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, arg: tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int32]], /) -> None: ...
+
+def locate(mesh: Mesh, x: int, y: int) -> int:
+    """
+    Return the lowest triangle that holds the point (borders included), or -1 outside.
+    """
+
+def orient(ax: int, ay: int, bx: int, by: int, cx: int, cy: int) -> int:
+    """
+    Return twice the signed area of (a, b, c): positive when c lies left of the line from a to b.
+    """
+
+def contains_triangle(mesh: Mesh, triangle: int, x: int, y: int) -> bool:
+    """Return whether the closed triangle holds the point."""
+
+def strictly_inside(mesh: Mesh, x: int, y: int) -> bool:
+    """Return whether the point lies in free space and on no wall."""
+
+def rasterize_cells(mesh: Mesh, rows: int, columns: int) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Return the triangle of every cell centre that lies strictly inside free space.
+
+    Returns:
+        int32 (rows, columns): the lowest triangle that holds the centre; -1 for a centre outside or
+        on a wall.
+    """
+
+def label_triangles(neighbors: numpy.typing.NDArray[numpy.int32]) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Number the connected parts of a mesh; returns each triangle's part, int32 (triangles,).
+    """
+
+TURN: int = 4096
+
+HALF_TURN: int = 2048
+
+QUARTER: int = 1024
+
+UNIT: int = 1073741824
+
+SINES: numpy.ndarray = ...
+
+def half_sine(half: int) -> int:
+    """Return UNIT * sine of `half` / 8192 of a turn."""
+
+def sine(heading: int) -> int:
+    """Return UNIT * sine of a heading (any integer)."""
+
+def cosine(heading: int) -> int:
+    """Return UNIT * cosine of a heading (any integer)."""
+
+def heading_of(dx: int, dy: int) -> int:
+    """
+    Return the heading nearest to the vector (dx, dy) [lattice units]; 0 for a null vector.
+    """
+
+def turn_between(start: int, end: int) -> int:
+    """
+    Return the shorter signed turn from `start` to `end`, in [-2048, 2047].
+    """
+
+BELL_MEAN: int = 1020
+
+BELL_STD: float = 209.0215299915
+
+def random_bits(key: int | numpy.uint64, counter: int | numpy.integer[Any]) -> int:
+    """
+    Return 64 random bits for `counter` (0 to 2**64 - 1) of the stream `key`.
+    """
+
+def random_below(key: int | numpy.uint64, counter: int | numpy.integer[Any], bound: int) -> int:
+    """
+    Return an integer in [0, bound), 0 < bound < 2**31, by multiply and shift.
+    """
+
+def random_uniform(key: int | numpy.uint64, counter: int | numpy.integer[Any]) -> float:
+    """Return a float in [0, 1), a multiple of 2**-53."""
+
+def random_bell(key: int | numpy.uint64, counter: int | numpy.integer[Any]) -> int:
+    """
+    Return a bell-shaped integer in [-1020, 1020], mean 0, standard deviation BELL_STD.
+
+    The sum of eight uniform bytes: close to normal (excess kurtosis -0.15), cut at 4.88 standard
+    deviations, and exact on every machine, which a logarithm or a cosine is not.
+    """
+
+def near_wedge(heading: int, half_angle: int, dx: int, dy: int, reach: int) -> bool:
+    """
+    Return whether anything within `reach` of (dx, dy) may lie in a wedge; exact at reach 0.
+    """
+
+def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
+    """
+    Return whether (dx, dy) lies within `half_angle` [1/8192 turn] of a heading, or on the border.
+    """
+
+def camera_pose(lenses: tuple[Any, ...], camera: int, x: int, y: int, heading: int, moment_us: int) -> tuple[int, int, int]:
+    """
+    Return where a camera is and where it looks; the offset is rounded to the lattice.
+    """
+
+def points_in_view(walls: Mesh, lenses: tuple[Any, ...], camera: int, user: int, x: int, y: int, heading: int, dx: int, dy: int) -> int:
+    """
+    Return how many points of a user's body are in view of a camera, the user's centre being at (dx, dy).
+    """
+
+@overload
+def line_of_sight(mesh: Mesh, qx: int, qy: int, triangle: int, px: int, py: int) -> bool:
+    """
+    Return whether p is visible from q: the segment between them touches no wall point.
+
+    A point outside or on a wall sees nothing and isn't seen.
+
+    Args:
+        mesh: Free space.
+        qx: Where the eye is, lattice units.
+        qy: Where the eye is, lattice units.
+        triangle: A triangle that holds q, from `locate`; -1 is allowed.
+        px: Where the looked-for point is, lattice units.
+        py: Where the looked-for point is, lattice units.
+    """
+
+@overload
+def line_of_sight(mesh: Mesh, qx: int, qy: int, px: int, py: int) -> bool:
+    """Return whether p is visible from q, wherever q is; see the other form."""
+
+def build_fans(mesh: Mesh) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int32]]:
+    """
+    List the triangles around each vertex.
+
+    Returns:
+        int32 (vertices + 1,), where the triangles of each vertex begin in the list; and the list,
+        int32, ascending for each vertex.
+    """
+
+def vertices_seen_from_point(mesh: Mesh, x: int, y: int) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Return the vertices that a straight way from a point leads to.
+
+    Between the point and the vertex the way touches no wall and no other vertex. A point on a wall
+    also sees the ends of that wall. A point at a vertex sees only that vertex.
+
+    Args:
+        mesh: Free space.
+        x: The point, lattice units.
+        y: The point, lattice units.
+
+    Returns:
+        int32 (n,), in no particular order, each once; none from a point outside.
+    """
+
+def vertices_seen_from_vertex(mesh: Mesh, vertex: int) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Return the vertices that a straight way from a vertex leads to.
+
+    Between the two the way touches no wall and no other vertex, or it runs along one wall.
+
+    Args:
+        mesh: Free space.
+        vertex: The vertex to start from.
+
+    Returns:
+        int32 (n,), in no particular order, each once.
+    """
+
+def see_each(mesh: Mesh, eyes: numpy.typing.NDArray[numpy.int64], places: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
+    """
+    Return for each pair whether the two see each other: what is on a wall sees nothing.
+
+    Fastest if pairs of the same eye follow each other.
+
+    Args:
+        mesh: Free space.
+        eyes: int64 (n, 2), lattice points.
+        places: int64 (n, 2), lattice points, one for each eye.
+
+    Returns:
+        bool (n,).
+    """
+
+def label_frames(labels: numpy.typing.NDArray[numpy.int32], count: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the smallest box of cells around each label.
+
+    Args:
+        labels: int32 (rows, columns), below `count`, -1 for none.
+        count: How many labels there are.
+
+    Returns:
+        First row, first column, last row and last column, plus one, int64 (count, 4); of a label
+        without cells first ones beyond the last.
+    """
+
+def fill_beside(labels: numpy.typing.NDArray[numpy.int16]) -> numpy.typing.NDArray[numpy.int16]:
+    """
+    Give cells without a label that of a cell that touches them.
+
+    First of one across a side, then of one across a corner; west before east, south before north.
+
+    Args:
+        labels: int16 (rows, columns), -1 for none.
+
+    Returns:
+        Labels, int16 (rows, columns).
+    """
+
+def spread_labels(labels: numpy.typing.NDArray[numpy.int32], mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Give every cell of a mask that has no label the nearest one, in steps across sides.
+
+    Of labels that are equally near the lowest is taken.
+
+    Args:
+        labels: int32 (rows, columns), -1 for none; those outside the mask count for nothing.
+        mask: Where labels may spread, bool (rows, columns).
+
+    Returns:
+        Labels, int32 (rows, columns); -1 outside the mask and where no way leads from a label.
+    """
+
+def label_parts(mask: numpy.typing.NDArray[numpy.bool_], diagonal: bool) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Number the connected parts of a mask in the order of their first pixels, row by row.
+
+    Args:
+        mask: bool (rows, columns).
+        diagonal: Whether pixels that share only a corner are connected.
+
+    Returns:
+        Each pixel's part, int32 (rows, columns); -1 outside the mask.
+    """
+
+def count_steps(start: numpy.typing.NDArray[numpy.bool_], mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Count the steps from pixel to pixel across sides, inside a mask, from the nearest start.
+
+    Args:
+        start: Where to start, bool (rows, columns); pixels outside the mask don't count.
+        mask: Where steps may lead, bool (rows, columns).
+
+    Returns:
+        Steps, int32 (rows, columns); 0 at the start, -1 where no way leads.
+    """
+
+def trace_rings(mask: numpy.typing.NDArray[numpy.bool_]) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int64]]:
+    """
+    Return the rings between a mask and what is not in it, along the sides of the pixels.
+
+    Rings have the mask on their left: outer ones run counter-clockwise, holes clockwise (x is the
+    column, y is the row). Where two pixels of the mask share only a corner, a ring turns right, so
+    each ring round one part (connected across sides) passes a point at most once.
+
+    Args:
+        mask: bool (rows, columns).
+
+    Returns:
+        The corners of all rings, int32 (n, 2) as (x, y), 0 to columns and 0 to rows; and where each
+        ring starts among them, int64 (rings + 1,).
+    """
+
+MOST_COST: int = 1000
+
+def squared_distance(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return each cell's exact squared distance to the nearest cell that is not in `mask`.
+
+    What lies outside the array counts for nothing: surround the mask by one line of False where the
+    border is a wall.
+
+    Args:
+        mask: Cells to measure, bool (rows, columns).
+
+    Returns:
+        Squared distances in cells, int64 (rows, columns); 0 outside the mask, and
+        (rows + columns)² everywhere in a mask that has no outside.
+    """
+
+def walking_distance(mask: numpy.typing.NDArray[numpy.bool_], goals: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Return how far each cell is from the nearest goal, walking from cell to cell.
+
+    A step to a side costs 5 and one across a corner 7, which is open only if both cells beside it
+    are.
+
+    Args:
+        mask: Cells that can be walked, bool (rows, columns).
+        goals: Goal cells, int64 (n, 2) as (row, column); those outside the mask count for nothing.
+
+    Returns:
+        int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.
+    """
+
+def cost_distance(cost: numpy.typing.NDArray[numpy.int32], goal: tuple[int, int], start: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return what the cheapest way from each cell to a goal costs, walking from cell to cell.
+
+    A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
+    are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
+
+    Args:
+        cost: int32 (rows, columns), in percent of what a way costs besides: 100 counts double; from
+            0 to 1000, or -1 where no way leads.
+        goal: The goal's cell (row, column).
+        start: The cell to come from: what is farther away than it is not worked out. With one outside
+            the grid everything is.
+
+    Returns:
+        int64 (rows, columns), in 1/1000 of a cell's side at no cost; -1 where no way is known.
+    """
+
+def step_cost(cost: numpy.typing.NDArray[numpy.int32], row: int, column: int, r: int, c: int) -> int:
+    """
+    Return what a step between two neighboring cells costs, [1/1000 of a cell's side].
+    """
+
+def descend(cost: numpy.typing.NDArray[numpy.int32], distance: numpy.typing.NDArray[numpy.int64], start: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the cells of a cheapest way from a cell to the goal; ties: the first neighbor.
+
+    Args:
+        cost: int32 (rows, columns), as for `cost_distance`.
+        distance: int64 (rows, columns), what `cost_distance` returned for the same costs.
+        start: The cell to start from (row, column).
+
+    Returns:
+        int64 (n, 2) as (row, column); no cell if no way from the start is known.
+    """
+
+def leg_cost(cost: numpy.typing.NDArray[numpy.int32], ax: int, ay: int, bx: int, by: int) -> float:
+    """
+    Return what a straight leg costs, [percent times lattice units]; infinite where none leads.
+
+    Each part of it counts by the cell that it runs through.
+
+    Args:
+        cost: int32 (rows, columns), -1 where no way leads.
+        ax: Where it begins, lattice units.
+        ay: Where it begins, lattice units.
+        bx: Where it ends, lattice units.
+        by: Where it ends, lattice units.
+    """
+
+def pull_taut(mesh: Mesh, cost: numpy.typing.NDArray[numpy.int32], way: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return a way with fewer corners: legs are joined while the joint one is clear and no dearer.
+
+    Args:
+        mesh: The space that the way must stay in.
+        cost: int32 (rows, columns), -1 where no way leads.
+        way: int64 (n, 2), lattice points; each leg lies in the space.
+
+    Returns:
+        int64 (m, 2), some of the points, the first and the last among them.
+    """
+
+def visible_region(mesh: Mesh, x: int, y: int) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int32]]:
+    """
+    Find everything that is visible from a point.
+
+    The pieces come counter-clockwise, the first is the one whose right border has the smallest angle in
+    [0, one turn) from the x axis.
+
+    Args:
+        mesh: Free space.
+        x: Where the eye is, lattice units.
+        y: Where the eye is, lattice units.
+
+    Returns:
+        `right` int32 (n,), the vertex on each piece's right border, and `wall` int32 (n,), the wall
+        edge, 3 * triangle + k, at which each piece ends; empty for an eye outside or on a wall.
+    """
+
+def region_contains(mesh: Mesh, x: int, y: int, right: numpy.typing.NDArray[numpy.int32], wall: numpy.typing.NDArray[numpy.int32], px: int, py: int) -> bool:
+    """
+    Return whether p is in the region of (x, y): the verdict of a line of sight.
+
+    Args:
+        mesh: Free space.
+        x: Where the eye is, lattice units.
+        y: Where the eye is, lattice units.
+        right: int32 (n,), the vertex on the right border of each of the region's pieces.
+        wall: int32 (n,), the wall edge of each piece.
+        px: The point, lattice units.
+        py: The point, lattice units.
+    """
+
+def region_contains_points(mesh: Mesh, x: int, y: int, right: numpy.typing.NDArray[numpy.int32], wall: numpy.typing.NDArray[numpy.int32], points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
+    """
+    Return which points are in the region of (x, y): bool (n,).
+
+    Args:
+        mesh: Free space.
+        x: Where the eye is, lattice units.
+        y: Where the eye is, lattice units.
+        right: int32 (pieces,), as from `visible_region`.
+        wall: int32 (pieces,).
+        points: int64 (n, 2), lattice units.
+    """
+
+def regions_of_cells(mesh: Mesh, cells: numpy.typing.NDArray[numpy.int64], cell_triangles: numpy.typing.NDArray[numpy.int32]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int32]]:
+    """
+    Find the regions visible from the centres of many cells.
+
+    Args:
+        mesh: Free space.
+        cells: int64 (n, 2), row and column of each cell.
+        cell_triangles: int32 (rows, columns), from `rasterize_cells`.
+
+    Returns:
+        `start` int64 (n + 1,), `right` int32, `wall` int32: the pieces of cell i are
+        `right[start[i]:start[i + 1]]` and `wall[start[i]:start[i + 1]]`, as from `visible_region`.
+    """
+
+def region_outline(mesh: Mesh, x: int, y: int, right: numpy.typing.NDArray[numpy.int32], wall: numpy.typing.NDArray[numpy.int32]) -> tuple[numpy.typing.NDArray[numpy.float64], float]:
+    """
+    Measure a region, and list the corners of its outline.
+
+    Args:
+        mesh: Free space.
+        x: Where the eye is, lattice units.
+        y: Where the eye is, lattice units.
+        right: int32 (n,), as from `visible_region`.
+        wall: int32 (n,).
+
+    Returns:
+        For each piece the ends of its wall, right before left, float64 (2 n, 2), lattice units; and
+        the area, square lattice units.
+    """
+
+def cells_in_view(mesh: Mesh, x: int, y: int, heading: int, reach: tuple[Any, ...], rows: int, columns: int) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Find the cells whose centre is in view: in range, within the angle, and in line of sight.
+
+    Args:
+        mesh: Free space.
+        x: Where the camera is, lattice units.
+        y: Where the camera is, lattice units.
+        heading: Where it looks, 1/4096 turn.
+        reach: How far and wide it sees, a `Reach`.
+        rows: Height of the grid of cells.
+        columns: Width of the grid.
+
+    Returns:
+        int32 (n, 3), row, first and last column of cells in view: none twice, in no particular order;
+        empty for a camera outside or on a wall.
+    """
+
+def mark_spans(spans: numpy.typing.NDArray[numpy.int32], mask: numpy.typing.NDArray[numpy.bool_]) -> None:
+    """
+    Set the cells of spans in a mask.
+
+    Args:
+        spans: int32 (n, 3), row, first and last column of each.
+        mask: Out: bool (rows, columns).
+    """
+
+NEVER: int = -1
+
+def watch(watched: tuple[Any, ...], window: Window, body: int, first: int, end: int, glances: tuple[Any, ...], record: tuple[Any, ...]) -> None:
+    """
+    Take in what a robot sees in the steps from `first` to `end` - 1.
+
+    Args:
+        watched: What it sees it with, and where, a `Watched`.
+        window: How bodies move.
+        body: Number of the robot among them.
+        first: The first step.
+        end: One past the last step.
+        glances: The poses kept so far, `Glances`; emptied when the table is half full.
+        record: What it has seen, a `Record`; `last` lags behind where a pose comes again: see `settle`.
+    """
+
+def settle(watched: tuple[Any, ...], glances: tuple[Any, ...], seen: numpy.typing.NDArray[numpy.int64]) -> None:
+    """
+    Bring the last step of each cell up to date with poses that were taken again.
+
+    Args:
+        watched: What the robot sees with, and where, a `Watched`.
+        glances: The poses kept so far, `Glances`.
+        seen: Out: int64 (rows, columns), the last step at which each cell was in view, -1 for never.
+    """
+
+def trace_track(track: tuple[Any, ...], begin: int, step: int, out: tuple[Any, ...]) -> None:
+    """
+    Write the poses of a track at times begin, begin + step, ... to `out`.
+
+    Args:
+        track: Breakpoints, in order of time; of two at one time the later one counts.
+        begin: Time of the first pose [us].
+        step: Time between two poses [us], 1 or more.
+        out: Poses, to be written to.
+
+    Raises:
+        ValueError: The times don't ascend, or a leg is so long that its interpolation leaves 64 bits.
+    """
+
+def time_route(route: numpy.typing.NDArray[numpy.int64], begin: int, heading: int, speed: float, turn_rate: float) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Turn a polyline into breakpoints: turn on the spot towards each leg, then walk it.
+
+    Args:
+        route: int64 (n, 2), lattice points.
+        begin: Time at route[0] [us].
+        heading: Heading at route[0] [1/4096 turn].
+        speed: Lattice units per second.
+        turn_rate: Headings per second.
+
+    Returns:
+        int64 (m, 4), rows (time, x, y, heading); the first is the start. A point twice in a row has one.
+    """
+
+def trace_meander(walls: Mesh, space: Mesh, rule: tuple[Any, ...], first: int, start: tuple[int, int, int], out: tuple[Any, ...]) -> None:
+    """
+    Walk at random from `start`, for as many steps as `out` has poses.
+
+    In each step the body turns by a bell-shaped random angle and goes one stride forward. If that
+    would leave `space`, the places its centre may be, it stays and turns by any angle within its
+    limit instead, all equally likely, so that it comes away from the wall.
+
+    Args:
+        walls: What the body can't walk through, as Mesh.
+        space: Where its centre may be, as Mesh.
+        rule: WalkRule.
+        first: The step of the first pose.
+        start: x, y [lattice units] and heading [1/4096 turn] at that step.
+        out: Poses, to be written to.
+    """
+
+def rooms_at(room_of_place: numpy.typing.NDArray[numpy.int16], x: numpy.typing.NDArray[numpy.int64], y: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int16]:
+    """
+    Return the room of each place; outside of the map that at its nearest border.
+
+    Args:
+        room_of_place: int16 (rows, columns), the room of each cell.
+        x: int64 (n,), lattice units.
+        y: int64 (n,), lattice units.
+
+    Returns:
+        int16 (n,).
+    """
+
+def count_rooms(poses: tuple[Any, ...], room_of_place: numpy.typing.NDArray[numpy.int16], counts: numpy.typing.NDArray[numpy.int64]) -> None:
+    """
+    Add the number of poses in each room to `counts`.
+
+    Args:
+        poses: Poses.
+        room_of_place: int16 (rows, columns), the room of each cell, -1 for none.
+        counts: int64 (rooms + 1,), to be added to; the last entry is away, or in no room.
+    """
+
+def sum_moves(poses: tuple[Any, ...]) -> float:
+    """
+    Return the summed length of the moves from pose to pose [lattice units].
+    """
+
+def points_in_sight(mesh: Mesh, x: int, y: int, points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
+    """
+    Return which of the points, int64 (n, 2), a line of sight leads to from (x, y): bool (n,).
+    """
+
+def points_in_reach(x: int, y: int, heading: int, reach: tuple[int, int, int], points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
+    """
+    Return which points are in range and within the angle, walls apart.
+
+    Args:
+        x: Where the camera is [lattice units].
+        y: Where the camera is [lattice units].
+        heading: Where it looks [1/4096 turn].
+        reach: Reach, how far and wide it sees.
+        points: int64 (n, 2).
+
+    Returns:
+        bool (n,).
+    """
+
+def questions(lenses: tuple[Any, ...], widest: numpy.typing.NDArray[numpy.int64], slack: int, robot: tuple[Any, ...], x: numpy.typing.NDArray[numpy.int64], y: numpy.typing.NDArray[numpy.int64], away: numpy.typing.NDArray[numpy.uint8], first: int, step_us: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32]]:
+    """
+    List who may be in view of which camera when: near enough, and not far beside the angle.
+
+    Args:
+        lenses: Lenses.
+        widest: int64 (cameras, bodies), the squared distance from which on nobody is in view.
+        slack: How far beside the angle somebody may be [lattice units].
+        robot: Poses of whoever has the cameras, n of them.
+        x: int64 (bodies, n), where the others are.
+        y: int64 (bodies, n).
+        away: uint8 (bodies, n), not 0 while one isn't at home.
+        first: The step of the first pose.
+        step_us: Length of a step.
+
+    Returns:
+        int64 (m, 7) by camera and body, and int32 (cameras, bodies, n): the number of the question that
+        each step asks, from 1 on; 0 for none. A question that is the one before is asked once.
+    """
+
+ONE: int = 2147483648
+
+POSTURES: int = 3
+
+MINUTES: int = 1440
+
+DOUBLINGS: int = 62
+
+MOST_GHOSTS: int = 20
+
+NOBODY: int = -1
+
+BINS: int = 512
+
+AT_DISTANCE: int = 0
+
+AT_BEARING: int = 512
+
+AT_FACING: int = 4608
+
+AT_POSTURE: int = 6657
+
+AT_SHOWN: int = 6660
+
+AT_LIGHT: int = 6694
+
+AT_STAY: int = 8134
+
+AT_RIGHT: int = 8196
+
+AT_MISTAKEN: int = 8708
+
+AT_SEEMS: int = 9220
+
+SHIFT: int = 9229
+
+KEEPS: int = 9230
+
+RANGE_NOISE: int = 9231
+
+RANGE_SHARE: int = 9232
+
+BEARING_NOISE: int = 9233
+
+HEADING_NOISE: int = 9234
+
+TABLE: int = 9235
+
+class UserDraw(enum.IntEnum):
+    """
+    What each draw about one user decides: the last axis of `ErrorTables.keys`.
+    """
+
+    DETECT = 0
+    """Whether a user in view is noticed."""
+
+    ATTEND = 1
+    """Whether the draw before still holds."""
+
+    IDENTIFY = 2
+    """Whether a user is recognized, mistaken for another one, or unknown."""
+
+    MISTAKE = 3
+    """For whom a user is mistaken."""
+
+    RANGE = 4
+    """Error of the distance."""
+
+    BEARING = 5
+    """Error of the direction from the camera."""
+
+    HEADING = 6
+    """Error of the user's heading."""
+
+    POSTURE = 7
+    """Which posture is perceived."""
+
+class GhostDraw(enum.IntEnum):
+    """
+    What each draw about false positives decides: the last axis of `ErrorTables.ghost_keys`.
+    """
+
+    COUNT = 0
+    """How many there are in a look."""
+
+    SOURCE = 1
+    """Which source one is of."""
+
+    PLACE = 2
+    """Where it is."""
+
+    IDENTITY = 3
+    """Whom it looks like."""
+
+    HEADING = 4
+    """Where it faces."""
+
+class About(enum.IntEnum):
+    """
+    What a camera carries along about one user: the last axis of `Memory.about`.
+    """
+
+    DRAW = 0
+    """The latest draw of UserDraw.DETECT [2**-53]."""
+
+    DRAW_STEP = 1
+    """The last step at which the user was in view; -1: never."""
+
+    TAKEN_FOR = 2
+    """For whom the user was taken last, or NOBODY."""
+
+    TRACK_STEP = 3
+    """The last step at which the user was noticed; -1: never."""
+
+    IN_VIEW = 4
+    """Looks at which the user was in view."""
+
+    NOTICED = 5
+    """Looks at which the user was noticed."""
+
+def random_share(key: int, counter: int) -> int:
+    """Return an integer in [0, ONE)."""
+
+def random_shares(key: int, counters: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+    """Return the integer in [0, ONE) of each counter, int64 (n,)."""
+
+def pick(cumulative: numpy.typing.NDArray[numpy.int64], draw: int) -> int:
+    """
+    Return the first outcome whose cumulative probability is above `draw`; their number if none.
+
+    Example:
+        >>> pick(np.array([ONE // 2, ONE]), ONE // 2)
+        1
+    """
+
+def length(dx: int, dy: int) -> int:
+    """Return how long (dx, dy) is [lattice units], rounded down."""
+
+def distance_bin(table: numpy.typing.NDArray[numpy.int64], camera: int, dx: int, dy: int) -> int:
+    """Return the bin of the parts by distance that (dx, dy) belongs to."""
+
+def lasting(table: numpy.typing.NDArray[numpy.int64], camera: int, steps: int) -> int:
+    """
+    Return the probability that attention outlasts so many steps, from that for 2**i steps.
+    """
+
+def steady_chance(table: numpy.typing.NDArray[numpy.int64], camera: int, heading: int, dx: int, dy: int, faces: int, posture: int, shown: int) -> int:
+    """
+    Return the product of all factors but light [2**-31] for a user at (dx, dy) from the camera.
+
+    Args:
+        table: The cameras' tables, int64 (cameras, TABLE).
+        camera: Which camera.
+        heading: Where it looks [1/4096 turn].
+        dx: Where the user is, from the camera [lattice units].
+        dy: The same.
+        faces: Where the user faces [1/4096 turn].
+        posture: 0 stands, 1 sits, 2 lies.
+        shown: How many points of the body are in view.
+    """
+
+def notice_chance(steady: int, light: int, chance: int) -> int:
+    """
+    Return the probability to notice [2**-53], from [2**-31], [2**-31] and the camera's own [2**-53].
+    """
+
+def turn_and_stretch(dx: int, dy: int, turn: int, distance: int, wanted: int) -> tuple[int, int]:
+    """
+    Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length `wanted`.
+    """
+
+def blurred(table: numpy.typing.NDArray[numpy.int64], keys: numpy.typing.NDArray[numpy.uint64], camera: int, user: int, now: int, dx: int, dy: int) -> tuple[int, int]:
+    """
+    Return where a user at (dx, dy) from the camera is perceived, from there.
+    """
+
+def seeming(table: numpy.typing.NDArray[numpy.int64], camera: int, posture: int, draw: int) -> int:
+    """Return the posture that a posture is taken for."""
+
+class SightingColumn(enum.IntEnum):
+    """
+    The columns of a row of sightings.
+
+    Where a camera was wrong about a person, USER is NOBODY; where it didn't recognize one, IDENTITY
+    is. X to POSTURE are as perceived.
+    """
+
+    STEP = 0
+    """When it becomes known."""
+
+    CAMERA = 1
+
+    USER = 2
+
+    IDENTITY = 3
+
+    X = 4
+    """Lattice units."""
+
+    Y = 5
+
+    HEADING = 6
+    """1/4096 turn."""
+
+    POSTURE = 7
+    """0 stands, 1 sits, 2 lies."""
+
+    TRUE_X = 8
+
+    TRUE_Y = 9
+
+    TRUE_HEADING = 10
+
+    TRUE_POSTURE = 11
+
+USER_LOST: int = 0
+
+USER_SEEN: int = 1
+
+def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint8] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+    """
+    Look at all others in the steps of a window, up to the first with an event that stops it.
+
+    Args:
+        walls: The free space.
+        lenses: The cameras of a body.
+        errors: How they err.
+        rule: What holds for all of them.
+        window: How all bodies move.
+        body: Number of the body that has the cameras.
+        first_other: Number of the first of the others, who are as many as the lenses' users.
+        memory: What the body carries from span to span; updated.
+        shown: uint8 (cameras, users, steps), how many points of each are in view, where another method
+            decides that; None: lines of sight do.
+
+    Returns:
+        The steps done (the stopping one included); what was perceived, int64 (n, SIGHTING), see
+        `SightingColumn`; and who came into view or was lost, in order of (step, identity): step, identity
+        and kind (USER_SEEN or USER_LOST), int64 (m,) each.
+
+    Raises:
+        ValueError: Shapes don't agree, or a number is none of a user or camera.
+    """
+
+class Routes:
+    """
+    Shortest paths in a space: its corners, and the straight legs between them.
+
+    Args:
+        mesh: The space.
+        corners: Corners, its reflex corners.
+
+    Raises:
+        ValueError: The corners have another shape, or are none of the mesh.
+    """
+
+    def __init__(self, mesh: Mesh, corners: tuple[Any, ...]) -> None: ...
+
+    def find(self, ax: int, ay: int, bx: int, by: int) -> numpy.typing.NDArray[numpy.int64] | None:
+        """
+        Return the shortest path from (ax, ay) to (bx, by), int64 (n, 2); None where there is none.
+
+        Both ends are strictly inside the space: a goal on its border is not seen by the last corner. Ties go
+        to the corner that is lower by (x, y), so the path depends on the walls only.
+        """
+
+    @property
+    def leg_start(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        int32 (corners + 1,), where the legs from each corner begin in `leg_end`.
+        """
+
+    @property
+    def leg_end(self) -> numpy.typing.NDArray[numpy.int32]:
+        """int32 (legs,), the corner that each leads to."""
+
+    @property
+    def leg_length(self) -> numpy.typing.NDArray[numpy.float64]:
+        """float64 (legs,) [lattice units]."""
+
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, arg: tuple[Mesh, tuple[Any, ...]], /) -> None: ...
+
+def distance(ax: int, ay: int, bx: int, by: int) -> float:
+    """Return the distance of two lattice points [lattice units]."""
+
+def advance(probability: numpy.typing.NDArray[numpy.float64], transition: numpy.typing.NDArray[numpy.float64], bins: int) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Return a chain's state probabilities some bins later, without evidence.
+
+    Args:
+        probability: float64 (states,), now.
+        transition: float64 (states, states), from row to column within a bin.
+        bins: How many bins.
+
+    Returns:
+        float64 (states,).
+    """
+
+def count_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, seen: numpy.typing.NDArray[numpy.int64]) -> None:
+    """
+    Count the steps at which each user was perceived in each room, once however often.
+
+    Args:
+        step: int64 (n,), in order of time, from the beginning of the first bin.
+        user: int64 (n,), below 0 for somebody unknown.
+        room: int64 (n,), below 0 for none.
+        bin_steps: Steps of a bin.
+        seen: int64 (bins, users + 1, rooms), to be added to; the last user is anybody.
+    """
+
+def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64], replicates: int) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sum days drawn with replacement.
+
+    Args:
+        key: Of the stream of draws.
+        days: float64 (days, values).
+        replicates: How many sums.
+
+    Returns:
+        float64 (replicates, values), each the sum of as many days as there are.
+    """
+
+WHOLE_PATCH: int = 255
+
+def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], seen: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]: ...
+
+def follow(ways: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]: ...
+
+def smooth(ways: tuple[Any, ...], stretches: tuple[Any, ...], dawn: numpy.typing.NDArray[numpy.float64], dusk: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
+
+class Window:
+    """
+    The runs of equal pose of some bodies over consecutive steps.
+
+    The runs of body b are number start[b] to start[b + 1] - 1. Each lasts until the next one of its body
+    begins, the last one until `end`. Arrays are read-only.
+
+    Args:
+        first: The first step.
+        x: int64 (bodies, steps), the pose of each body at each step, lattice units.
+        y: int64 (bodies, steps), lattice units.
+        heading: int64 (bodies, steps), 1/4096 turn.
+        away: uint8 (bodies, steps), not 0 while a body isn't at home.
+        posture: int8 (bodies, steps), number of the posture.
+    """
+
+    def __init__(self, first: int, x: numpy.typing.NDArray[numpy.int64], y: numpy.typing.NDArray[numpy.int64], heading: numpy.typing.NDArray[numpy.int64], away: numpy.typing.NDArray[numpy.uint8], posture: numpy.typing.NDArray[numpy.int8]) -> None: ...
+
+    @property
+    def first(self) -> int:
+        """The first step."""
+
+    @property
+    def end(self) -> int:
+        """One past the last step."""
+
+    @property
+    def start(self) -> numpy.typing.NDArray[numpy.int64]:
+        """int64 (bodies + 1,), the first run of each body."""
+
+    @property
+    def step(self) -> numpy.typing.NDArray[numpy.int64]:
+        """int64 (runs,), the step at which each begins."""
+
+    @property
+    def x(self) -> numpy.typing.NDArray[numpy.int64]:
+        """int64 (runs,), lattice units."""
+
+    @property
+    def y(self) -> numpy.typing.NDArray[numpy.int64]:
+        """int64 (runs,), lattice units."""
+
+    @property
+    def heading(self) -> numpy.typing.NDArray[numpy.int64]:
+        """int64 (runs,), 1/4096 turn."""
+
+    @property
+    def away(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """uint8 (runs,), not 0 while the body isn't at home."""
+
+    @property
+    def posture(self) -> numpy.typing.NDArray[numpy.int8]:
+        """int8 (runs,), number of the posture."""
+
+    def dense(self, body: int, first: int, end: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int8]]:
+        """
+        Return the poses of a body at each of the steps from `first` to `end` - 1.
+
+        Returns:
+            x, y, heading int64, away uint8 and posture int8, (steps,) each.
+        """
+
+class Timelines:
+    """
+    How each body of a run moves, piece after piece.
+
+    A piece begins at a step and holds until the next one of its body begins.
+
+    Args:
+        bodies: How many bodies there are.
+        step_us: Length of a step.
+    """
+
+    def __init__(self, bodies: int, step_us: int) -> None: ...
+
+    def follow(self, body: int, step: int, track: tuple[Any, ...], posture_us: numpy.typing.NDArray[numpy.int64], postures: numpy.typing.NDArray[numpy.int8]) -> None:
+        """
+        Let a body follow a track from a step on, instead of what it would have done from then on.
+
+        Args:
+            body: Number of the body.
+            step: The first step.
+            track: Breakpoints, whose times are since the start of the run.
+            posture_us: int64 (n,), when it takes another posture.
+            postures: int8 (n + 1,); number i holds before posture_us[i], the last one from then on.
+        """
+
+    def walk(self, body: int, step: int, walls: Mesh, space: Mesh, rule: tuple[Any, ...], start: tuple[int, int, int]) -> None:
+        """Let a body walk at random from a step on; see `trace_meander`."""
+
+    def pose(self, body: int, step: int) -> tuple[int, int, int, int]:
+        """Return x, y, heading and away of a body at a step."""
+
+    def poses(self, step: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8]]:
+        """Return x, y, heading and away of all bodies at a step, (bodies,) each."""
+
+    def window(self, first: int, end: int) -> Window:
+        """
+        Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.
+        """
+
+    def runs(self, body: int, first: int, end: int) -> Window:
+        """
+        Return the runs of equal pose of one body in the steps from `first` to `end` - 1.
+        """
+
+    def forget(self, before: int) -> None:
+        """Drop what is only needed for steps earlier than `before`."""
+
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None: ...

@@ -1,0 +1,136 @@
+"""The bodies of a run: where each is at the present step, how it goes on, and when it decides."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.entities.actor import NEVER
+from fleet2d.entities.plan import Plan, Pose, Walk
+from fleet2d.kernels.motion import Breakpoints, Poses
+from fleet2d.kernels.timelines import Timelines, Window
+
+I64 = NDArray[np.int64]
+STANDING = np.zeros(1, np.int8), np.zeros(0, np.int64)
+
+
+class PoseBlock(NamedTuple):
+    """The poses of all bodies at consecutive steps: row b is body b, column j is step first + j.
+
+    Attributes:
+        x: int64 (bodies, steps), lattice units.
+        y: int64 (bodies, steps), lattice units.
+        heading: int64 (bodies, steps), 1/4096 turn.
+        away: uint8 (bodies, steps), not 0 while a body isn't at home.
+        posture: int8 (bodies, steps), number of the posture.
+    """
+
+    x: I64
+    y: I64
+    heading: I64
+    away: NDArray[np.uint8]
+    posture: NDArray[np.int8]
+
+
+def poses_of(block: PoseBlock, row: int) -> Poses:
+    """Return the poses of one body, as views."""
+    return Poses(block.x[row], block.y[row], block.heading[row], block.away[row])
+
+
+class Bodies:
+    """All bodies of a run, users first, then robots.
+
+    Attributes:
+        step: The present step: decisions are made at it, poses beyond it may still change.
+        ask_at: int64 (bodies,), the step at which each body decides next; NEVER for never.
+        users: How many of the bodies are users.
+    """
+
+    def __init__(self, users: int, robots: int, step_us: int) -> None:
+        self.step = 0
+        self.users = users
+        self.ask_at = np.zeros(users + robots, np.int64)
+        self._step_us = step_us
+        self._timelines = Timelines(users + robots, step_us)
+        self._window: Window | None = None
+        self._block: tuple[int, int, PoseBlock] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of bodies."""
+        return len(self.ask_at)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out what follows from the timelines."""
+        return {**self.__dict__, "_window": None, "_block": None}
+
+    def pose(self, row: int) -> Pose:
+        """Return where a body is at the present step."""
+        return Pose(*self._timelines.pose(row, self.step))
+
+    def pose_at(self, row: int, step: int) -> Pose:
+        """Return where a body is at a step that isn't forgotten."""
+        return Pose(*self._timelines.pose(row, step))
+
+    def poses(self, step: int) -> tuple[I64, I64, I64, NDArray[np.uint8]]:
+        """Return x, y, heading and away of all bodies at a step, (bodies,) each."""
+        return self._timelines.poses(step)
+
+    def follow(self, row: int, plan: Plan) -> None:
+        """Let a body follow a plan from the present step on."""
+        motion = plan.finish()
+        if isinstance(motion, Walk):
+            x, y, heading, _ = plan.began[1]
+            self._timelines.walk(
+                row, self.step, motion.walls, motion.space, motion.rule, (x, y, heading)
+            )
+        else:
+            self._timelines.follow(row, self.step, motion.breakpoints, *plan.posture_times())
+        self._window = self._block = None
+
+    def hold(self, row: int, pose: Pose) -> None:
+        """Let a body rest at a pose from the present step on."""
+        moment = np.array([self.step * self._step_us], np.int64)
+        x, y, heading = (np.array([value], np.int64) for value in pose[:3])
+        track = Breakpoints(moment, x, y, heading, np.array([pose.away], np.uint8))
+        self._timelines.follow(row, self.step, track, *STANDING[::-1])
+        self._window = self._block = None
+
+    def window(self, first: int, end: int) -> Window:
+        """Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1."""
+        window = self._window
+        if window is None or (window.first, window.end) != (first, end):
+            window = self._window = self._timelines.window(first, end)
+        return window
+
+    def runs(self, row: int, first: int, end: int) -> Window:
+        """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
+        return self._timelines.runs(row, first, end)
+
+    def block(self, first: int, end: int) -> PoseBlock:
+        """Return the poses of all bodies at each of the steps from `first` to `end` - 1."""
+        if self._block is None or self._block[:2] != (first, end):
+            window = self.window(first, end)
+            rows = [window.dense(row, first, end) for row in range(len(self))]
+            columns = (np.array(column) for column in zip(*rows, strict=True))
+            block = PoseBlock(*columns) if rows else PoseBlock(*_none(end - first))
+            self._block = first, end, block
+        return self._block[2]
+
+    def next_decision(self) -> int:
+        """Return the step at which the next body decides, NEVER for none."""
+        return int(self.ask_at.min(initial=NEVER))
+
+    def due(self, step: int) -> Sequence[int]:
+        """Return the rows of the bodies that decide at a step."""
+        rows: list[int] = np.flatnonzero(self.ask_at <= step).tolist()
+        return rows
+
+    def forget(self, before: int) -> None:
+        """Drop what is only needed for steps earlier than `before`."""
+        self._timelines.forget(before)
+
+
+def _none(steps: int) -> list[NDArray[Any]]:
+    """Return the columns of a block without bodies."""
+    return [np.zeros((0, steps), t) for t in (np.int64, np.int64, np.int64, np.uint8, np.int8)]

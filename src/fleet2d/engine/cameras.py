@@ -1,0 +1,331 @@
+"""The cameras of a body in a run: what they carry from span to span, and what they find."""
+
+from collections.abc import Iterator, Sequence, Set
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.activities import ActivitySense
+from fleet2d.blame import blame
+from fleet2d.engine.bodies import Bodies, poses_of
+from fleet2d.engine.verdicts import points_seen
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import SightEvent
+from fleet2d.errors import ScenarioError
+from fleet2d.events import Event
+from fleet2d.kernels.look import (
+    IDENTITY,
+    SIGHTING,
+    USER_LOST,
+    USER_SEEN,
+    Crowd,
+    Memory,
+    Rule,
+    X,
+    Y,
+    look,
+)
+from fleet2d.kernels.perception import MOST_GHOSTS, About, GhostDraw, UserDraw
+from fleet2d.sight.fov import FieldOfView
+from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.perception import Perception
+from fleet2d.sight.tables import Scene, error_tables, is_perfect, stack_lenses
+from fleet2d.streams import stream_key
+
+# The name of the random stream of each draw.
+USER_STREAMS = {
+    UserDraw.DETECT: "detect",
+    UserDraw.ATTEND: "attend",
+    UserDraw.IDENTIFY: "identify",
+    UserDraw.MISTAKE: "whom",
+    UserDraw.RANGE: "range",
+    UserDraw.BEARING: "bearing",
+    UserDraw.HEADING: "heading",
+    UserDraw.POSTURE: "posture",
+}
+GHOST_STREAMS = {
+    GhostDraw.COUNT: "how many",
+    GhostDraw.SOURCE: "which",
+    GhostDraw.PLACE: "where",
+    GhostDraw.IDENTITY: "looks like",
+    GhostDraw.HEADING: "faces",
+}
+
+I64 = NDArray[np.int64]
+NOTHING: I64 = np.zeros((0, SIGHTING), np.int64)
+
+
+class Cameras:
+    """The cameras of one body. Robots look at users; a user who has a camera looks at robots.
+
+    Attributes:
+        owner: Whose cameras.
+        row: The owner's row among the bodies.
+        index: Its index among the robots, or among the users.
+        others: Who can be seen.
+        names: Names of the cameras.
+        errs: Whether what is perceived can differ from the truth.
+        activity_senses: How each camera tells activities.
+        method: What tells who is in view; None: lines of sight.
+        memory: All that is carried along.
+        perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
+        awaited: Events that algorithms wait for: they end a span, too.
+        taken: The step before which it has looked.
+    """
+
+    def __init__(
+        self, row: int, actors: Sequence[Actor], users: int, method: FieldOfView | None = None
+    ) -> None:
+        """Switch on the cameras of one body.
+
+        Args:
+            row: Its row among the bodies.
+            actors: Everybody, users first.
+            users: How many of them are users.
+            method: What tells who is in view; None: lines of sight.
+
+        Raises:
+            ScenarioError: A period is no multiple of the step, or somebody unknown is named.
+        """
+        self.owner, self.row = actors[row], row
+        # Lines of sight are compiled into the look.
+        self.method = None if isinstance(method, LineOfSight) else method
+        is_robot = row >= users
+        self.index = row - users if is_robot else row
+        self._first = 0 if is_robot else users
+        self.others = actors[:users] if is_robot else actors[users:]
+        self._set_up()
+        self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
+        self.awaited: Set[str] = frozenset()
+        self.taken = 0
+        self._sightings: list[I64] = []  # not collected yet
+        self._ahead: _Look | None = None
+
+    def _set_up(self) -> None:
+        owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
+        cameras = owner.entity.eyes
+        self.names = tuple(cameras)
+        try:
+            lenses = [
+                camera.lens(lattice.units_per_m, clock.step_us) for camera in cameras.values()
+            ]
+        except ValueError as error:
+            raise ScenarioError(f"{owner.path}: {error}") from None
+        common = getattr(owner.entity, "perception", None)  # users see what is there
+        perceptions = [camera.perception or common for camera in cameras.values()]
+        wrong = [not is_perfect(perception) for perception in perceptions]
+        self.errs = any(wrong)
+        scene = Scene(
+            [other.name for other in self.others],
+            [other.entity.radius * lattice.units_per_m for other in self.others],
+            lattice,
+            clock.step_us,
+            owner.path,
+        )
+        self.lenses = stack_lenses(lenses, wrong, scene)
+        self.errors = error_tables(
+            lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], scene
+        )
+        self._draw_streams()
+        self._sense_activities(perceptions)
+        count = len(self.others)
+        bursts = count + MOST_GHOSTS * self.errors.haunted
+        midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
+        since_midnight = clock.start - midnight
+        self.rule = Rule(
+            patience=max(lens.patience for lens in lenses),
+            step_us=clock.step_us,
+            start_us=since_midnight.seconds * 10**6 + since_midnight.microseconds,
+            burst=int(bursts.sum()),
+            stop_lost=False,
+            stop_seen=False,
+        )
+        looks = self.lenses.latency // self.lenses.period + 2
+        self.memory = new_memory(len(lenses), count, int((looks * bursts).max()))
+
+    def _draw_streams(self) -> None:
+        """Give every draw a stream of its own, by name: a user more leaves the others' alone."""
+        owner, errors = self.owner, self.errors
+        for c, camera in enumerate(self.names):
+            of = "" if len(self.names) == 1 and camera == "camera" else f"{camera}: "
+            for u, other in enumerate(self.others):
+                for draw in UserDraw if self.errs else (UserDraw.DETECT,):
+                    name = f"{of}{USER_STREAMS[draw]} {other.name}"
+                    errors.keys[c, u, draw.value] = stream_key(owner.seed, owner.path, name)
+            for ghost_draw, purpose in GHOST_STREAMS.items():
+                name = f"{of}{purpose}, false positives"
+                errors.ghost_keys[c, ghost_draw.value] = stream_key(owner.seed, owner.path, name)
+
+    def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
+        """Note which cameras perceive activities, and for what they take them."""
+        self.activity_senses: list[ActivitySense] = []
+        for c, (name, perception) in enumerate(zip(self.names, perceptions, strict=True)):
+            keys = [
+                stream_key(self.owner.seed, self.owner.path, f"{name}: activity {other.name}")
+                for other in self.others
+            ]
+            confusion = perception.attributes.activity if perception else None
+            latency = int(self.lenses.latency[c])
+            sense = ActivitySense(latency, np.array(keys, np.uint64), confusion)
+            self.activity_senses.append(sense)
+
+    @property
+    def event_names(self) -> tuple[str, str]:
+        """The kinds of event when somebody is lost, and when somebody is seen."""
+        return self.owner.entity.sight_events
+
+    @property
+    def stops(self) -> tuple[bool, bool]:
+        """Whether its owner's plan ends when somebody is lost, and when somebody is seen."""
+        interrupts, names = self.owner.plan.interrupts, self.event_names
+        return names[USER_LOST] in interrupts, names[USER_SEEN] in interrupts
+
+    @property
+    def ends(self) -> tuple[bool, bool]:
+        """Whether a span ends when somebody is lost, and when somebody is seen."""
+        lost, seen = self.stops
+        names = self.event_names
+        return lost or names[USER_LOST] in self.awaited, seen or names[USER_SEEN] in self.awaited
+
+    @property
+    def waits(self) -> bool:
+        """Whether an event of its own ends the present span."""
+        return any(self.ends)
+
+    @property
+    def counts(self) -> I64:
+        """How often each camera had each user in view and noticed: (cameras, users, 2)."""
+        counts: I64 = self.memory.about[..., [About.IN_VIEW.value, About.NOTICED.value]]
+        return counts
+
+    @property
+    def in_view(self) -> dict[str, tuple[float, float]]:
+        """Whom it has in view, and where each was perceived last [m], as far as it has looked."""
+        lattice, in_view = self.owner.home.plan.lattice, {}
+        for identity in np.flatnonzero(self.memory.seen).tolist():
+            x, y = lattice.to_metres(self.perceived[identity]).tolist()
+            in_view[self.name_of(identity)] = (x, y)
+        return in_view
+
+    def name_of(self, identity: int) -> str:
+        """Return the name of an identity; that of somebody unknown is empty."""
+        return self.others[identity].name if identity < len(self.others) else ""
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first event that ends the span, `end` if there is none."""
+        if not self.waits or end <= self.taken:
+            return end
+        self._ahead = self._look(bodies, end)
+        return self._ahead.end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Look in the steps from `taken` to `end` - 1; return who came into view, and who left.
+
+        A camera that looked further ahead before another one ended the span looks again at less.
+        """
+        found, self._ahead = self._ahead, None
+        if found is not None and found.end != end:
+            for array, before in zip(self.memory, found.memory_before, strict=True):
+                array[:] = before
+            found = None
+        if found is None:
+            found = self._look(bodies, end, stop=False)
+        self.taken = end
+        if len(found.sightings):
+            self._sightings.append(found.sightings)
+        identity = found.sightings[:, IDENTITY]  # -1, somebody unknown, is the last row
+        self.perceived[identity, 0] = found.sightings[:, X]
+        self.perceived[identity, 1] = found.sightings[:, Y]
+        names, entity = self.event_names, self.owner.name
+        return [
+            Event(step, entity, names[kind], self.name_of(identity))
+            for step, identity, kind in found.events
+        ]
+
+    def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
+        """Yield those of its last step's events that end its owner's plan."""
+        stops = {name for name, stop in zip(self.event_names, self.stops, strict=True) if stop}
+        lattice = self.owner.home.plan.lattice
+        index = {other.name: i for i, other in enumerate(self.others)}
+        for event in events:
+            if event.step == self.taken - 1 and event.event in stops:
+                place = self.perceived[index.get(event.detail, len(index))]
+                x, y = lattice.to_metres(place).tolist()
+                yield self.row, SightEvent(event.event, event.detail, x, y)
+
+    def collect(self) -> I64:
+        """Hand over what was perceived since this was called last, int64 (n, SIGHTING)."""
+        blocks, self._sightings = self._sightings, []
+        return np.concatenate([NOTHING, *blocks])
+
+    def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
+        before = [array.copy() for array in self.memory] if stop else []
+        lost, seen = self.ends if stop else (False, False)
+        home, window, shown = self.owner.home, bodies.window(self.taken, end), None
+        if self.method is not None:
+            block = bodies.block(self.taken, end)
+            others = slice(self._first, self._first + len(self.others))
+            crowd = Crowd(
+                block.x[others],
+                block.y[others],
+                block.heading[others],
+                block.away[others],
+                block.posture[others],
+            )
+            poses = poses_of(block, self.row)
+            step_us = self.owner.clock.step_us
+            with blame("sight.method", self.taken):
+                shown = points_seen(
+                    self.method, home, self.lenses, poses, crowd, self.taken, step_us
+                )
+        done, sightings, step, identity, kind = look(
+            home.walls,
+            self.lenses,
+            self.errors,
+            self.rule._replace(stop_lost=lost, stop_seen=seen),
+            window,
+            self.row,
+            self._first,
+            self.memory,
+            shown,
+        )
+        events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
+        return _Look(self.taken + done, sightings, events, before)
+
+
+class _Look(NamedTuple):
+    """What cameras found up to before step `end`, and what they carried before."""
+
+    end: int
+    sightings: I64
+    events: list[tuple[int, int, int]]
+    memory_before: list[I64]
+
+
+def open_cameras(
+    actors: Sequence[Actor], users: int, method: FieldOfView
+) -> tuple[list[Cameras], list[Cameras]]:
+    """Return the cameras of users and those of robots, if there is anybody to be seen."""
+    if not 0 < users < len(actors):
+        return [], []
+    with blame("sight.method", None):
+        method.start(actors[0].home)
+    cameras = [
+        Cameras(row, actors, users, method) for row, actor in enumerate(actors) if actor.entity.eyes
+    ]
+    return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
+
+
+def new_memory(cameras: int, users: int, backlog: int) -> Memory:
+    """Return the memory of a robot that has seen nobody."""
+    never = -1
+    about = np.zeros((cameras, users, len(About)), np.int64)
+    about[..., [About.DRAW_STEP.value, About.TRACK_STEP.value]] = never
+    return Memory(
+        noticed=np.full(users + 1, never, np.int64),
+        seen=np.zeros(users + 1, np.int64),
+        about=about,
+        backlog=np.zeros((cameras, backlog, SIGHTING), np.int64),
+        waiting=np.zeros((cameras, 2), np.int64),
+    )

@@ -1,0 +1,132 @@
+"""The phases of a span, in the order that every step has (Fig. 5 of the paper).
+
+In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps at which
+somebody must decide, nothing but arithmetic happens, so a run goes from decision to decision. What
+a span is never shows in a result: every draw is addressed by step, and every plan by time.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fleet2d.blame import blame
+from fleet2d.engine.state import State
+from fleet2d.entities.behavior import Situation
+from fleet2d.floorplan.change import HomeChanges
+
+
+@dataclass
+class Span:
+    """The steps from `first` to `end` - 1; each phase may end it earlier.
+
+    Attributes:
+        first: The step at which decisions are due.
+        end: The step before which it ends at the latest.
+        settles: Whether all watchers take it in now, or later, with others.
+    """
+
+    first: int
+    end: int
+    settles: bool = False
+
+
+def change_home(state: State, span: Span) -> None:
+    """Let the home change as it is due: the floor plan comes first in a step."""
+    due = state.changes.next_due()
+    if due is not None and due <= span.first:
+        state.settle(span.first)
+        with blame("changes", span.first):
+            state.events.emit(state.changes.make(span.first, state.actors))
+
+
+def decide(state: State, span: Span) -> None:
+    """Ask everybody whose plan is over, or who would drive at somebody: users, then robots."""
+    step, clearance = span.first, state.clearance
+    rows = set(state.bodies.due(step)) | clearance.robots.keys()
+    for row in sorted(rows):
+        actor = state.actors[row]
+        due, in_way = bool(state.bodies.ask_at[row] <= step), None
+        if due:
+            situation = Situation(actor, step, state.take_pending(row), state.learners.readable)
+            due = not actor.goes_on(situation)
+        if due:
+            state.end_plan(row, step)
+            actor.decide(situation)
+            state.bodies.follow(row, actor.plan)
+        if row in clearance.robots:
+            in_way = clearance.in_way(state.bodies, row)
+        if in_way is not None:
+            if not due:
+                state.end_plan(row, step)
+            situation = Situation(actor, step, (), state.learners.readable)
+            actor.give_way(situation, in_way.name, clearance.people(actor))
+            state.bodies.follow(row, actor.plan)
+        if due or in_way is not None:
+            state.changes.expect(row, actor)
+            state.begin_plan(row, step)
+
+
+def move(state: State, span: Span) -> None:
+    """Find the next step at which somebody decides or something is due: all move until then."""
+    end = min(span.end, state.bodies.next_decision(), state.settled + state.capacity)
+    if state.max_span is not None:
+        end = min(end, span.first + state.max_span)
+    dues = (
+        state.learners.next_due(),
+        state.changes.next_due(),
+        state.layers.next_due(span.first),
+    )
+    for due in dues:
+        if due is not None:
+            end = min(end, max(due, span.first + 1))
+    awaited = state.learners.awaited
+    if state.log is not None and awaited:
+        noted = state.next_note(span.first, awaited)
+        end = end if noted is None else min(end, noted + 1)
+    span.end = end
+
+
+def watch(state: State, span: Span) -> None:
+    """Let those look ahead who may end the span, and interrupt plans by what happens in it."""
+    waiting = [watcher for watcher in state.watchers if watcher.waits]
+    for watcher in waiting:
+        state.take(watcher, span.first)
+        span.end = watcher.limit(state.bodies, span.end)
+    state.bodies.step = span.end
+    for watcher in waiting:
+        state.interrupt(watcher, state.take(watcher, span.end))
+
+
+def record(state: State, span: Span) -> None:
+    """Take the span in, with those before it, if somebody needs to know now."""
+    due = (state.learners.next_due(), state.layers.next_due(span.first))
+    span.settles = (
+        state.max_span is not None
+        or span.end in due
+        or span.end >= state.settled + state.capacity
+        or (state.log is not None and bool(state.learners.awaited))
+    )
+    if span.settles:
+        state.settle(span.end)
+
+
+def learn(state: State, span: Span) -> None:
+    """Update the algorithms and metrics that are due."""
+    log, learners = state.log, state.learners
+    if log is None or not span.settles:
+        return
+    awaited = learners.awaited
+    happened = log.happened(span.end - 1) if awaited else []
+    if learners.next_due() == span.end or any(event.event in awaited for event in happened):
+        state.count_looks()
+        learners.update(span.end, log, happened)
+        for name, output in learners.fresh.items():
+            if isinstance(output, HomeChanges):
+                for change in output.changes:
+                    state.changes.ask(change, span.end, f"algorithms.{name}")
+        state.forget(learners.earliest_needed())
+
+
+Phase = Callable[[State, Span], None]
+
+PHASES: tuple[Phase, ...] = (change_home, decide, move, watch, record, learn)
+"""What happens in a span, in order."""

@@ -1,0 +1,198 @@
+"""Snapshots: copying the state of a run in memory, and writing it to a file, by one mechanism.
+
+A state refers to what never changes in a run: its scenario, floor plan, clock. A snapshot names
+these constants instead of holding them. A copy shares them; a file is read with the constants of a
+run that was set up from the same scenario.
+"""
+
+import hashlib
+import io
+import json
+import pickle
+from collections.abc import Mapping
+from pathlib import Path
+from types import FunctionType
+from typing import Any, BinaryIO
+
+from fleet2d import __version__
+from fleet2d.artifacts.chunk import ColumnChunk
+from fleet2d.artifacts.manifest import plain
+from fleet2d.engine.state import State
+from fleet2d.entities.plan import Track, Walk
+from fleet2d.errors import ArtifactError
+from fleet2d.floorplan.costmap import CostedSpace
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.space import Space
+from fleet2d.kernels.mesh import Mesh
+from fleet2d.outside import is_scenario_module
+from fleet2d.routines.persona import Persona
+
+_HASH = type(hashlib.sha256())
+
+# What never changes once it is made: copies in one process share it.
+_SHARED = frozenset(
+    {CostedSpace, FloorPlan, FunctionType, Mesh, Persona, Space, Track, Walk, ColumnChunk}
+)
+
+# What a file may refer to besides classes of Fleet2D and of the scenario's own modules.
+_KNOWN = {
+    "builtins": {"bytearray", "complex", "frozenset", "object", "range", "set", "slice"},
+    "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
+    "copyreg": {"_reconstructor"},
+    "datetime": {"date", "datetime", "time", "timedelta"},
+    "decimal": {"Decimal"},
+    "fractions": {"Fraction"},
+    "numpy": {"dtype", "ndarray"},
+    "numpy._core.multiarray": {"_reconstruct", "scalar"},
+    "numpy._core.numeric": {"_frombuffer"},
+    "pathlib": {"Path", "PosixPath", "PurePosixPath", "PureWindowsPath", "WindowsPath"},
+}
+
+MAGIC = b"fleet2d simulation"
+
+Constants = Mapping[str, object]
+
+
+def copy_state(state: State, constants: Constants) -> State:
+    """Return a state that goes on by itself, and shares only what never changes."""
+    shared: list[object] = []
+    buffer = io.BytesIO()
+    _Writer(buffer, constants, shared).dump(state)
+    buffer.seek(0)
+    return _Reader(buffer, constants, shared).state()
+
+
+def write_state(state: State, constants: Constants, file: BinaryIO) -> None:
+    """Write a state to a file.
+
+    Raises:
+        ArtifactError: A component of the user keeps what can't be written, such as an open file.
+    """
+    try:
+        _Writer(file, constants, None).dump(state)
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        raise ArtifactError(f"the state of the run can't be written: {error}") from error
+
+
+def read_state(file: BinaryIO, constants: Constants) -> State:
+    """Read a state from a file, for a run that was set up from the same scenario.
+
+    Raises:
+        ArtifactError: The file holds something else, or is damaged.
+    """
+    try:
+        return _Reader(file, constants, None).state()
+    except ArtifactError:
+        raise
+    except Exception as error:  # a damaged pickle raises almost anything
+        raise ArtifactError(f"the file holds no state of a run: {error}") from error
+
+
+def write_snapshot(
+    path: str | Path | BinaryIO, state: State, constants: Constants, header: Mapping[str, Any]
+) -> None:
+    """Write a state behind a header that says which run it is of.
+
+    Raises:
+        ArtifactError: The state, or the file, can't be written.
+    """
+    body = io.BytesIO()
+    write_state(state, constants, body)
+    first = json.dumps({"fleet2d": __version__, **plain(header)}).encode()
+    digest = hashlib.sha256(first + body.getvalue()).hexdigest().encode()
+    content = b"\n".join((MAGIC, digest, first, body.getvalue()))
+    if not isinstance(path, str | Path):
+        path.write(content)
+        return
+    partial = Path(f"{path}.partial")
+    try:
+        partial.write_bytes(content)
+        partial.replace(path)
+    except OSError as error:
+        raise ArtifactError(f"{path} can't be written: {error.strerror or error}") from error
+
+
+def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO]:
+    """Return the header of a snapshot, and the state behind it for `read_state`.
+
+    Raises:
+        ArtifactError: It is no snapshot, is damaged, or is of another version of Fleet2D.
+    """
+    try:
+        content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()
+    except OSError as error:
+        raise ArtifactError(f"{path} can't be read: {error.strerror or error}") from error
+    magic, _, rest = content.partition(b"\n")
+    digest, _, rest = rest.partition(b"\n")
+    first, _, body = rest.partition(b"\n")
+    if magic != MAGIC:
+        raise ArtifactError(f"{path} is no saved simulation")
+    if hashlib.sha256(first + body).hexdigest().encode() != digest:
+        raise ArtifactError(f"{path} is damaged: its content is not what was written")
+    header: dict[str, Any] = json.loads(first)
+    if header["fleet2d"] != __version__:
+        raise ArtifactError(
+            f"{path} was written by Fleet2D {header['fleet2d']}, and this is {__version__}: only"
+            " the same version can go on with it"
+        )
+    return header, io.BytesIO(body)
+
+
+class _Writer(pickle.Pickler):
+    """Names constants, and collects what is shared."""
+
+    def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._names = {id(value): name for name, value in constants.items()}
+        self._shared = shared
+
+    def persistent_id(self, obj: Any) -> object:
+        name = self._names.get(id(obj))
+        if name is not None:
+            return name
+        kind = type(obj)
+        if kind is _HASH:  # of a table: in a file it is made anew from the rows
+            if self._shared is None:
+                return ("sha256",)
+            obj = obj.copy()
+        elif self._shared is None:
+            return ("space", obj.key) if kind is Space else None
+        elif kind not in _SHARED:
+            return None
+        self._shared.append(obj)
+        return len(self._shared) - 1
+
+
+class _Reader(pickle.Unpickler):
+    """Finds constants by name; makes nothing but plain values, and objects of known classes."""
+
+    def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
+        super().__init__(file)
+        self._constants, self._shared = constants, shared
+
+    def state(self) -> State:
+        """Return the state."""
+        state = self.load()
+        if not isinstance(state, State):
+            raise ArtifactError("the file holds no state of a run")
+        return state
+
+    def persistent_load(self, pid: Any) -> object:
+        if self._shared is not None and isinstance(pid, int):
+            return self._shared[pid]
+        if isinstance(pid, tuple) and pid[0] == "sha256":
+            return hashlib.sha256()
+        if isinstance(pid, tuple) and pid[0] == "space":
+            return self._constants["shapes"].space_of(*pid[1])  # type: ignore[attr-defined]
+        return self._constants[pid]
+
+    def find_class(self, module: str, name: str) -> Any:
+        if self._shared is not None:
+            return super().find_class(module, name)
+        if name in _KNOWN.get(module, ()):
+            return super().find_class(module, name)
+        if module.partition(".")[0] == "fleet2d" or is_scenario_module(module):
+            found = super().find_class(module, name)
+            if isinstance(found, type):
+                return found
+        raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")

@@ -1,0 +1,138 @@
+"""Events: what happens in a run, as its tables, its algorithms and its scripts hear of it."""
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
+from typing import NamedTuple, Protocol
+
+from fleet2d.errors import InputError
+
+HOME = ""
+"""The entity of an event that happens to the home as a whole."""
+
+
+class EventKind(StrEnum):
+    """Every kind of event that Fleet2D itself records.
+
+    A behavior that records others declares them by `notes` in its class.
+    """
+
+    # Of cameras.
+    USER_LOST = "user_lost"
+    USER_SEEN = "user_seen"
+    ROBOT_LOST = "robot_lost"
+    ROBOT_SEEN = "robot_seen"
+    # Of people.
+    ACTIVITY = "activity"
+    CAME_HOME = "came_home"
+    LEFT_HOME = "left_home"
+    REACTS = "reacts"
+    USES = "uses"
+    # Of robots.
+    APPROACHES = "approaches"
+    BATTERY = "battery"
+    CALLS = "calls"
+    CHARGED = "charged"
+    DOCKS = "docks"
+    EXPLORED = "explored"
+    EXPLORES = "explores"
+    FIND_BEGINS = "find_begins"
+    FOLLOWS = "follows"
+    FOUND = "found"
+    GIVES_UP = "gives_up"
+    GIVES_WAY = "gives_way"
+    INTERACTION_OVER = "interaction_over"
+    INTERACTS = "interacts"
+    LOST = "lost"
+    RELOCATES = "relocates"
+    REPLAY = "replay"
+    RETRACED = "retraced"
+    RETRACES = "retraces"
+    VISITS = "visits"
+    WAY_BLOCKED = "way_blocked"
+    # Of the home.
+    LOCKED = "locked"
+    MOVED = "moved"
+    OPENED = "opened"
+    ROOM_CHANGED = "room_changed"
+    SENSOR = "sensor"
+    SHUT = "shut"
+    UNLOCKED = "unlocked"
+
+
+SIGHTS = frozenset(
+    {EventKind.USER_LOST, EventKind.USER_SEEN, EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN}
+)
+CHANGES = frozenset(
+    {
+        EventKind.LOCKED, EventKind.MOVED, EventKind.OPENED, EventKind.ROOM_CHANGED,
+        EventKind.SHUT, EventKind.UNLOCKED,
+    }
+)  # fmt: skip
+
+
+class Event(NamedTuple):
+    """Something that happened.
+
+    Attributes:
+        step: When.
+        entity: Name of the body or object that it happened to; empty for the home.
+        event: Its kind: one of EventKind, or one that a behavior declares.
+        detail: What else there is to say; of a camera's event, who was seen or lost.
+    """
+
+    step: int
+    entity: str
+    event: str
+    detail: str
+
+    @property
+    def rank(self) -> int:
+        """The order among the events of one entity at one step: plans, cameras, the home."""
+        return 1 if self.event in SIGHTS else 2 if self.event in CHANGES else 0
+
+
+class EventSink(Protocol):
+    """What takes the events of a run: its tables, the history of algorithms, a script."""
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Take events, in the order in which they became known, not by step."""
+
+
+class EventStream:
+    """The events of a run: each is made once, and handed to all sinks.
+
+    Attributes:
+        sinks: Who takes them.
+    """
+
+    KEPT = 1 << 16
+
+    def __init__(self, sinks: Iterable[EventSink] = ()) -> None:
+        self.sinks = list(sinks)
+        self._recent: deque[Event] = deque(maxlen=self.KEPT)
+        self._dropped_until = 0  # every event from this step on is still there
+
+    def emit(self, events: Sequence[Event]) -> None:
+        """Hand events to all sinks."""
+        if not events:
+            return
+        if len(self._recent) + len(events) > self.KEPT:
+            dropped = [*self._recent, *events][: len(self._recent) + len(events) - self.KEPT]
+            self._dropped_until = max(self._dropped_until, *(e.step + 1 for e in dropped))
+        self._recent.extend(events)
+        for sink in self.sinks:
+            sink.take_events(events)
+
+    def since(self, step: int) -> list[Event]:
+        """Return the events from a step on, in order of step.
+
+        Raises:
+            InputError: Those of that step are no longer kept.
+        """
+        if step < self._dropped_until:
+            raise InputError(
+                f"events from step {self._dropped_until} on are kept, not from step {step}: ask"
+                " more often, or read the table 'events'"
+            )
+        return sorted((e for e in self._recent if e.step >= step), key=lambda e: (e.step, e.rank))

@@ -1,0 +1,5 @@
+"""How bodies move over time, and the runs of equal pose that follow from it."""
+
+from fleet2d._core import Timelines, Window
+
+__all__ = ["Timelines", "Window"]
