@@ -7,6 +7,7 @@ from fleet2d.routines.busy import Busy
 from fleet2d.routines.interruptions import interrupted
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import DAY_S, DayPlan, Doing, plan_day
+from fleet2d.routines.recorded import draw_recorded, in_free_rooms, source, with_jobs
 from fleet2d.streams import Draws, stream_key
 
 # So many days are remembered, of those that were asked for.
@@ -40,7 +41,10 @@ class Life:
 
     def wake(self, ordinal: int) -> int:
         """Return when a day begins [s since its midnight]."""
-        return self.template(ordinal).wake.draw(Draws(self._wake, ordinal))
+        plan, draws = self.template(ordinal), Draws(self._wake, ordinal)
+        if plan.recorded is not None:
+            return plan.recorded.days[source(plan.recorded, draws)].begins[0]
+        return plan.wake.draw(draws)
 
     def draws(self, ordinal: int) -> Draws:
         """Return the random draws of a day."""
@@ -65,4 +69,8 @@ class Life:
     def planned(self, ordinal: int, plan: DayPlan, busy: Busy | None = None) -> Sequence[Doing]:
         """Draw a day from a template, without what comes up in it."""
         next_wake = self.wake(ordinal + 1) + DAY_S
+        if plan.recorded is not None:
+            first = source(plan.recorded, Draws(self._wake, ordinal))
+            day = draw_recorded(plan.recorded, first, self.draws(ordinal), next_wake)
+            return in_free_rooms(with_jobs(day, plan.jobs), self.persona.body.private, busy)
         return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, busy)

@@ -29,6 +29,7 @@ from fleet2d.routines.needs import (
     usual_needs,
 )
 from fleet2d.routines.planner import REST, SLEEP, DayPlan
+from fleet2d.routines.recorded import AnyRecordedDay
 from fleet2d.routines.templates import check, day_plans
 from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
@@ -157,10 +158,22 @@ class DayTemplate(Settings):
         default=None, description="what fills the rest; left out: as the persona's"
     )
 
+    recorded: tuple[AnyRecordedDay, ...] = Field(
+        default=(),
+        description="days as they were lived, '07:00 wash, 07:20 work, …, 23:00 sleep, 31:00 end':"
+        " new days are drawn from them, instead of from `do` and `leisure`",
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _drop_deleted(cls, data: Any) -> Any:
         return _without_nulls(data, ("do", "leisure"))
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Self:
+        if self.recorded and (self.do or self.leisure):
+            raise problem_at(("recorded",), "days are recorded, or told by do and leisure: not both")
+        return self
 
     @model_validator(mode="after")
     def _order_is_possible(self) -> Self:
@@ -209,7 +222,8 @@ class Persona(Settings):
     )
     needs: dict[str, AnyNeed] = Field(
         default_factory=lambda: dict(usual_needs()),
-        description="what builds up and interrupts a day, by name; left out: an adult's; null: nothing",
+        description="what builds up and interrupts a day, by name; left out: an adult's;"
+        " null: nothing",
     )
     errands: dict[str, AnyErrand] = Field(
         default_factory=lambda: dict(usual_errands()),
@@ -227,6 +241,9 @@ class Persona(Settings):
         for name, day in self.days.items():
             for task, fields in day.do.items():
                 self._check_activity(fields.activity or task, ("days", name, "do", task))
+            for recorded in day.recorded:
+                for what in recorded.activities:
+                    self._check_activity(what, ("days", name, "recorded"))
             for pastime in day.leisure or ():
                 self._check_activity(pastime, ("days", name, "leisure", pastime))
         for pastime in self.leisure:
@@ -282,6 +299,7 @@ class Persona(Settings):
         """The activities that its days may hold, by name."""
         names = {job.activity for plan in self.plans.values() for job in plan.jobs}
         names |= {fill.activity for plan in self.plans.values() for fill in plan.fills}
+        names |= {n for day in self.days.values() for r in day.recorded for n in r.activities}
         names |= activities_of(self.needs, self.errands)
         return {name: self.activity(name) for name in sorted(names | {REST, SLEEP})}
 

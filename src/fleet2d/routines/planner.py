@@ -12,11 +12,14 @@ rule: of those that needn't be done every day, the one that is done on the fewes
 """
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from fleet2d.routines.busy import ANY_ROOM, Busy
 from fleet2d.routines.laws import Law, weighted
 from fleet2d.streams import Draws
+
+if TYPE_CHECKING:
+    from fleet2d.routines.recorded import Recording
 
 DAY_S = 86_400
 ORDERS = 5  # drawn before a job is left out
@@ -93,7 +96,7 @@ class Fill(NamedTuple):
 
 
 class DayPlan(NamedTuple):
-    """A template as the planner uses it."""
+    """A template as the planner uses it; days are drawn from `recorded` ones where it has them."""
 
     name: str
     wake: Law
@@ -101,6 +104,7 @@ class DayPlan(NamedTuple):
     least_sleep: int
     jobs: tuple[Job, ...]
     fills: tuple[Fill, ...]
+    recorded: "Recording | None" = None
 
 
 class Chain(NamedTuple):
