@@ -22,23 +22,25 @@ public:
           stretches_(stretches),
           filtered_(filtered),
           moments_(moments),
-          ahead_in_view_(Array<f64, 2>::empty({ways.stages(), ways.patches()})),
-          ahead_hidden_(Array<f64, 2>::empty({ways.stages(), ways.patches()})),
-          in_view_(Array<f64, 2>::empty({ways.stages(), ways.patches()})),
-          hidden_(Array<f64, 2>::empty({ways.stages(), ways.patches()})),
-          comes_(Array<f64, 2>::empty({ways.stages(), ways.patches()})),
+          rooms_(ways.rooms()),
+          stages_(ways.stages()),
+          ahead_in_view_(Array<f64, 2>::empty({stages_, ways.patches()})),
+          ahead_hidden_(Array<f64, 2>::empty({stages_, ways.patches()})),
+          in_view_(Array<f64, 2>::empty({stages_, ways.patches()})),
+          hidden_(Array<f64, 2>::empty({stages_, ways.patches()})),
+          comes_(Array<f64, 2>::empty({stages_, ways.patches()})),
           sums_(Array<f64>::empty({ways.nodes()})),
-          arrival_(Array<f64>::empty({ways.rooms()})),
+          arrival_(Array<f64>::empty({rooms_})),
           go_(Array<f64>::empty({ways.nodes()})),
-          comers_(Array<f64>::empty({ways.rooms()})) {}
+          comers_(Array<f64>::empty({rooms_})) {}
 
     // Begin after the last stretch; `end` (stages, patches) is the probability there, `dusk` as for `smooth`.
     void begin(View<const f64, 2> end, View<const f64, 2> dusk) {
         f64 total = 0.0;
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             for (i64 p = 0; p < ways_.patches(); ++p) total += end(stage, p) * dusk(stage, p);
         }
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             for (i64 p = 0; p < ways_.patches(); ++p) {
                 ahead_in_view_(stage, p) = ahead_hidden_(stage, p) = dusk(stage, p) / total;
             }
@@ -50,21 +52,21 @@ public:
         locate_person(t, places);
         weigh_states(t);
         leave(t);
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             arrive(t, stage);
             stay(t, stage, stage);
-            if (stage + 1 < ways_.stages()) stay(t, stage, stage + 1);
+            if (stage + 1 < stages_) stay(t, stage, stage + 1);
         }
     }
 
     // How likely each hidden state makes all after it, largest 1: (stages, patches).
     Array<f64, 2> ahead() const {
         f64 largest = ahead_hidden_[0][0];
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             for (const f64 value : ahead_hidden_[stage]) largest = std::max(largest, value);
         }
-        auto made = Array<f64, 2>::empty({ways_.stages(), ways_.patches()});
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        auto made = Array<f64, 2>::empty({stages_, ways_.patches()});
+        for (i64 stage = 0; stage < stages_; ++stage) {
             for (i64 p = 0; p < ways_.patches(); ++p) made(stage, p) = ahead_hidden_[stage][p] / largest;
         }
         return made;
@@ -74,10 +76,10 @@ private:
     // P(room) in a stretch.
     void locate_person(i64 t, View<f64> places) {
         const View<const bool> visible = filtered_.visible[t + 1];
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             const View<const f64> in_view = filtered_.in_view[t + 1][stage], hidden = filtered_.hidden[t + 1][stage];
             const View<const f64> if_in_view = ahead_in_view_[stage], if_hidden = ahead_hidden_[stage];
-            for (i64 room = 0; room < ways_.rooms(); ++room) {
+            for (i64 room = 0; room < rooms_; ++room) {
                 const Range range = ways_.patches_of(room);
                 f64 sum = 0.0;
                 if (visible[room]) {
@@ -87,12 +89,12 @@ private:
                 } else {
                     sum = dot(hidden, if_hidden, range);
                 }
-                sums_[ways_.node(room, stage)] = sum;
+                sums_[node(room, stage)] = sum;
             }
         }
         f64 total = 0.0;
         for (i64 k = 0; k < ways_.nodes(); ++k) {
-            places[k / ways_.stages()] += sums_[k];
+            places[k / stages_] += sums_[k];
             total += sums_[k];
         }
         for (f64& share : places) share /= total;
@@ -103,7 +105,7 @@ private:
     void weigh_states(i64 t) {
         const View<const f64> likely = filtered_.likely[t];
         const f64 scale = filtered_.scale[t];
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             multiply(likely[0] * scale, ahead_in_view_[stage], in_view_[stage]);
             multiply(likely[1] * scale, ahead_hidden_[stage], hidden_[stage]);
         }
@@ -111,11 +113,11 @@ private:
 
         const View<const u8> view = stretches_.shown[t];
         const View<const bool> visible = filtered_.visible[t + 1];
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             const View<const f64> in_view = in_view_[stage], hidden = hidden_[stage];
             const View<f64> comes = comes_[stage];
             std::copy(hidden.begin(), hidden.end(), comes.begin());
-            for (i64 room = 0; room < ways_.rooms(); ++room) {
+            for (i64 room = 0; room < rooms_; ++room) {
                 if (!visible[room]) continue;
                 const auto [begin, end] = ways_.patches_of(room);
                 for (i64 p = begin; p < end; ++p) {
@@ -132,14 +134,14 @@ private:
         const View<const f64> mass = filtered_.mass[t], hop = filtered_.transitions.hop[length];
         const View<const f64, 2> chance = filtered_.transitions.leave[length];
         const f64 bins = static_cast<f64>(stretches_.bins[t]), halfway = until_event(bins);
-        for (i64 room = 0; room < ways_.rooms(); ++room) {
+        for (i64 room = 0; room < rooms_; ++room) {
             arrival_[room] = dot(ways_.spread, comes_[0], ways_.patches_of(room));
             comers_[room] = 0.0;
         }
-        for (i64 room = 0; room < ways_.rooms(); ++room) {
-            for (i64 stage = 0; stage < ways_.stages(); ++stage) {
-                const i64 k = ways_.node(room, stage);
-                const f64 left = leave_node(ways_.rooms(), mass[k], chance[k].data, arrival_.data(), comers_.data(),
+        for (i64 room = 0; room < rooms_; ++room) {
+            for (i64 stage = 0; stage < stages_; ++stage) {
+                const i64 k = node(room, stage);
+                const f64 left = leave_node(rooms_, mass[k], chance[k].data, arrival_.data(), comers_.data(),
                                             moments_.exits[k].data);
                 const f64 drawn =
                     stage == 0 ? arrival_[room] : dot(ways_.spread, comes_[stage], ways_.patches_of(room));
@@ -169,8 +171,8 @@ private:
         const View<const f64> mass = filtered_.mass[t];
         const View<const f64> hop = filtered_.transitions.hop[filtered_.transitions.length[t]];
         const View<const f64> comes = comes_[stage];
-        for (i64 room = 0; room < ways_.rooms(); ++room) {
-            const i64 k = ways_.node(room, stage);
+        for (i64 room = 0; room < rooms_; ++room) {
+            const i64 k = node(room, stage);
             const auto [begin, end] = ways_.patches_of(room);
             const f64 came = stage == 0 ? hop[k] * mass[k] + comers_[room] : hop[k] * mass[k];
             arrive_room(end - begin, came, ways_.spread.data + begin, comes.data + begin,
@@ -192,8 +194,8 @@ private:
         const View<const f64> was = filtered_.hidden[t][stage], comes = comes_[then];
         const View<f64> to = ahead_hidden_[stage];
         const View<const bool> visible = filtered_.visible[t];
-        for (i64 room = 0; room < ways_.rooms(); ++room) {
-            const i64 k = ways_.node(room, stage);
+        for (i64 room = 0; room < rooms_; ++room) {
+            const i64 k = node(room, stage);
             const auto [begin, end] = ways_.patches_of(room);
             const f64 chance = then == stage ? rest[k] : leave(k, ways_.next_stage());
             const f64 total = visible[room] ? stay_visible(t, stage, then, room, chance)
@@ -215,7 +217,7 @@ private:
         const View<f64> to_in_view = ahead_in_view_[stage], to_hidden = ahead_hidden_[stage];
         const View<const f64> in_view = in_view_[then], hidden = hidden_[then], comes = comes_[then];
         const View<const bool> same = filtered_.same[t];
-        const f64 go = go_[ways_.node(room, stage)];
+        const f64 go = go_[node(room, stage)];
         const auto [begin, end] = ways_.patches_of(room);
         f64 total = 0.0;
         for (i64 p = begin; p < end; ++p) {
@@ -243,10 +245,13 @@ private:
     // Bins until what happens in a stretch, on average.
     static f64 until_event(f64 bins) { return 0.5 * (bins + 1); }
 
+    i64 node(i64 room, i64 stage) const { return room * stages_ + stage; }
+
     const Ways& ways_;
     const Stretches& stretches_;
     const Filtered& filtered_;
     const Moments& moments_;
+    const i64 rooms_, stages_;
     // How likely each state makes all after a stretch, (stages, patches). In view only where visible.
     Array<f64, 2> ahead_in_view_, ahead_hidden_;
     // How well each state in a stretch, and coming to each patch, explains it and all after it, (stages, patches).

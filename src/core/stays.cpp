@@ -22,9 +22,13 @@ Transitions transitions_of(const Ways& ways, View<const i64> bins) {
     std::sort(lengths.begin(), lengths.end());
     lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
     const i64 count = static_cast<i64>(lengths.size()), nodes = ways.nodes(), columns = ways.follow.shape[1];
-    Transitions made{Array<i64>::empty({bins.size()}),         Array<f64, 2>::empty({count, nodes}),
-                     Array<f64, 2>::empty({count, nodes}),     Array<f64, 2>::empty({count, nodes}),
-                     Array<f64, 3>::empty({count, nodes, columns}), Array<f64>::empty({count})};
+    Transitions made;
+    made.length = Array<i64>::empty({bins.size()});
+    made.over = Array<f64, 2>::empty({count, nodes});
+    made.rest = Array<f64, 2>::empty({count, nodes});
+    made.hop = Array<f64, 2>::empty({count, nodes});
+    made.leave = Array<f64, 3>::empty({count, nodes, columns});
+    made.missed = Array<f64>::empty({count});
     for (i64 t = 0; t < bins.size(); ++t) {
         made.length[t] = std::lower_bound(lengths.begin(), lengths.end(), bins[t]) - lengths.begin();
     }
@@ -43,14 +47,15 @@ Transitions transitions_of(const Ways& ways, View<const i64> bins) {
     return made;
 }
 
-// Where the probability of a stage of stays in a room comes from.
+// Where the probability of one stage of stays in a room comes from.
 struct Flow {
-    f64 came;    // probability to have come to the room, or changed patch in it
-    f64 rest;    // share that rests of what was in the stage
-    f64 onward;  // share that comes on of what was in the stage before
+    f64 came;    // the probability to have come to the room, or changed patch in it
+    f64 rest;    // the chance to stay in the stage and in the patch
+    f64 onward;  // the chance to go on from the stage before; 0 if there is none
 };
 
-// The probability of hidden states of a room that isn't visible; nullptr for `last` if there is no stage before.
+// The probability of the hidden states of a room that isn't visible and wasn't, (patches,) arrays: `was` and `now`
+// of the stage before and after a stretch, `last` of the stage before it, nullptr if there is none.
 void flow_hidden(Flow flow, f64 likely, i64 patches, const f64* spread, const f64* was, const f64* last,
                  f64* __restrict now) {
     if (last == nullptr) {
@@ -66,7 +71,12 @@ void flow_hidden(Flow flow, f64 likely, i64 patches, const f64* spread, const f6
 class ForwardPass {
 public:
     ForwardPass(const Ways& ways, const Stretches& stretches, Filtered& filtered)
-        : ways_(ways), stretches_(stretches), filtered_(filtered), comers_(Array<f64>::empty({ways.rooms()})) {}
+        : ways_(ways),
+          stretches_(stretches),
+          filtered_(filtered),
+          rooms_(ways.rooms()),
+          stages_(ways.stages()),
+          comers_(Array<f64>::empty({rooms_})) {}
 
     // Go from before a stretch to after it.
     void step(i64 t) {
@@ -74,8 +84,8 @@ public:
         filtered_.likely(t, 0) = weight * filtered_.transitions.missed[filtered_.transitions.length[t]];
         filtered_.likely(t, 1) = weight;
         count_comers(t);
-        for (i64 room = 0; room < ways_.rooms(); ++room) filtered_.visible(t + 1, room) = becomes_visible(t, room);
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) predict(t, stage);
+        for (i64 room = 0; room < rooms_; ++room) filtered_.visible(t + 1, room) = becomes_visible(t, room);
+        for (i64 stage = 0; stage < stages_; ++stage) predict(t, stage);
         weigh_sightings(stretches_, t, filtered_.likely[t], filtered_.in_view[t + 1], filtered_.hidden[t + 1]);
         sum_nodes(t + 1);
         normalize(t);
@@ -105,7 +115,7 @@ private:
         if (!filtered_.visible[t][room]) return false;
         // The view has gone, and `in_view` with it; but the beginning may say what no view does.
         const View<const bool> same = filtered_.same[t];
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             const View<const f64> in_view = filtered_.in_view[t][stage];
             for (i64 p = begin; p < end; ++p) {
                 if (same[p] && in_view[p] != 0.0) return true;
@@ -125,9 +135,9 @@ private:
         const f64* last = stage == 0 ? nullptr : filtered_.hidden[t][stage - 1].data;
         f64* now = filtered_.hidden[t + 1][stage].data;
         const f64 likely = filtered_.likely(t, 1);
-        for (i64 room = 0; room < ways_.rooms(); ++room) {
+        for (i64 room = 0; room < rooms_; ++room) {
             const auto [begin, end] = ways_.patches_of(room);
-            const i64 k = ways_.node(room, stage);
+            const i64 k = node(room, stage);
             Flow flow{hop[k] * mass[k], rest[k], 0.0};
             if (stage == 0) {
                 flow.came += comers_[room];
@@ -168,9 +178,9 @@ private:
     void sum_nodes(i64 t) {
         const View<const bool> visible = filtered_.visible[t];
         const View<f64> mass = filtered_.mass[t];
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             const View<const f64> in_view = filtered_.in_view[t][stage], hidden = filtered_.hidden[t][stage];
-            for (i64 room = 0; room < ways_.rooms(); ++room) {
+            for (i64 room = 0; room < rooms_; ++room) {
                 const auto [begin, end] = ways_.patches_of(room);
                 f64 sum = 0.0;
                 if (visible[room]) {
@@ -178,7 +188,7 @@ private:
                 } else {
                     for (i64 p = begin; p < end; ++p) sum += hidden[p];
                 }
-                mass[ways_.node(room, stage)] = sum;
+                mass[node(room, stage)] = sum;
             }
         }
     }
@@ -192,10 +202,10 @@ private:
         const f64 scale = 1.0 / total;
         filtered_.scale[t] = scale;
         for (f64& part : mass) part *= scale;
-        for (i64 stage = 0; stage < ways_.stages(); ++stage) {
+        for (i64 stage = 0; stage < stages_; ++stage) {
             for (f64& part : filtered_.hidden[t + 1][stage]) part *= scale;
             const View<f64> in_view = filtered_.in_view[t + 1][stage];
-            for (i64 room = 0; room < ways_.rooms(); ++room) {
+            for (i64 room = 0; room < rooms_; ++room) {
                 if (!visible[room]) continue;
                 const auto [begin, end] = ways_.patches_of(room);
                 for (f64& part : in_view.slice(begin, end)) part *= scale;
@@ -203,9 +213,12 @@ private:
         }
     }
 
+    i64 node(i64 room, i64 stage) const { return room * stages_ + stage; }
+
     const Ways& ways_;
     const Stretches& stretches_;
     Filtered& filtered_;
+    const i64 rooms_, stages_;
     Array<f64> comers_;  // (rooms,)
 };
 
@@ -297,56 +310,71 @@ struct Sighting {
 };
 
 Sighting sighting_of(View<const i64> seen) {
-    Sighting found;
     i64 any = 0;
     for (const i64 steps : seen) any |= steps;
-    if (any == 0) return found;
+    Sighting sighting;
+    if (any == 0) return sighting;
     for (i64 p = 0; p < seen.size(); ++p) {
-        if (seen[p] > 0) found = {found.patches + 1, p};
+        if (seen[p] > 0) sighting = {sighting.patches + 1, p};
     }
-    return found;
+    return sighting;
+}
+
+// Whether bins are alike, each with what was in view and where the user was perceived.
+bool alike(View<const u8> shown, Sighting sighting, View<const u8> shown_before, Sighting before) {
+    return sighting.patches < 2 && before.patches < 2 && sighting.patch == before.patch &&
+           std::equal(shown.begin(), shown.end(), shown_before.begin());
 }
 
 }  // namespace
 
 OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, View<const i64, 2> seen, i64 longest) {
-    const i64 bins = shown.size(), patches = shown.shape[1];
-    std::vector<i64> opened;  // the first bin of each stretch, and the number of bins
+    struct Opening {
+        i64 bin;  // the first of a stretch
+        Sighting sighting;
+    };
+    std::vector<Opening> openings;
+    Sighting before;
     i64 sightings = 0;
-    Sighting last;
+    const i64 bins = shown.size(), patches = shown.shape[1];
     for (i64 t = 0; t < bins; ++t) {
         const Sighting now = sighting_of(seen[t]);
-        const bool alike = t > 0 && t - opened.back() < longest &&
-                           floor_div(minute[t], 60) == floor_div(minute[opened.back()], 60) && now.patches < 2 &&
-                           last.patches < 2 && now.patch == last.patch &&
-                           std::equal(shown[t].begin(), shown[t].end(), shown[t - 1].begin());
-        if (!alike) {
-            opened.push_back(t);
+        const bool goes_on = t > 0 && t - openings.back().bin < longest &&
+                             floor_div(minute[openings.back().bin], 60) == floor_div(minute[t], 60) &&
+                             alike(shown[t], now, shown[t - 1], before);
+        if (!goes_on) {
+            openings.push_back({t, now});
             sightings += now.patches;
         }
-        last = now;
+        before = now;
     }
-    const i64 count = static_cast<i64>(opened.size());
-    opened.push_back(bins);
 
-    OwnedStretches made{Array<i64>::empty({count}),
-                        Array<i64>::empty({count}),
-                        Array<u8, 2>::zeros({count, patches + 1}),
-                        Array<i64>::zeros({count + 1}),
-                        Array<i64>::empty({sightings}),
-                        Array<f64>::empty({sightings})};
-    i64 used = 0;
+    const i64 count = static_cast<i64>(openings.size());
+    OwnedStretches made;
+    made.bins = Array<i64>::empty({count});
+    made.hour = Array<i64>::empty({count});
+    made.shown = Array<u8, 2>::zeros({count, patches + 1});
+    made.begin = Array<i64>::zeros({count + 1});
+    made.patch = Array<i64>::empty({sightings});
+    made.share = Array<f64>::empty({sightings});
+    i64 used = 0, end = bins;
+    for (i64 i = count - 1; i >= 0; --i) {
+        const i64 bin = openings[static_cast<std::size_t>(i)].bin;
+        made.bins[i] = end - bin;
+        end = bin;
+    }
     for (i64 i = 0; i < count; ++i) {
-        const i64 t = opened[static_cast<std::size_t>(i)];
-        made.bins[i] = opened[static_cast<std::size_t>(i) + 1] - t;
-        made.hour[i] = floor_div(minute[t], 60);
-        std::copy(shown[t].begin(), shown[t].end(), made.shown[i].begin());
-        f64 total = 0.0;
-        for (const i64 steps : seen[t]) total += static_cast<f64>(steps);
-        for (i64 p = 0; p < patches; ++p) {
-            if (seen(t, p) > 0) {
+        const auto [bin, sighting] = openings[static_cast<std::size_t>(i)];
+        made.hour[i] = floor_div(minute[bin], 60);
+        std::copy(shown[bin].begin(), shown[bin].end(), made.shown[i].begin());
+        if (sighting.patches > 0) {
+            f64 total = 0.0;
+            for (const i64 steps : seen[bin]) total += static_cast<f64>(steps);
+            for (i64 p = 0; p < patches; ++p) {
+                if (seen(bin, p) <= 0) continue;
                 made.patch[used] = p;
-                made.share[used++] = static_cast<f64>(seen(t, p)) / total;
+                made.share[used] = static_cast<f64>(seen(bin, p)) / total;
+                ++used;
             }
         }
         made.begin[i + 1] = used;

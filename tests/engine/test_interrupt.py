@@ -56,7 +56,7 @@ def test_a_second_interrupt_does_not_wait_for_the_span_to_end() -> None:
     simulation = fleet2d.Simulation(scenario("10 min", algorithms={"impatient": impatient}))
     with pytest.raises(KeyboardInterrupt):
         simulation.run()
-    assert ["first", "second"] == simulation._world.learners.all[0].component.lived_to_see
+    assert ["first", "second"] == simulation._state.learners.all[0].component.lived_to_see
 
 
 def test_the_handler_of_the_caller_is_put_back() -> None:

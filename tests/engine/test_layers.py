@@ -311,7 +311,7 @@ def test_nothing_is_watched_when_nobody_asks() -> None:
     content["floorplan"].pop("layers")
     simulation = Simulation(content)
 
-    assert [] == simulation._world.layers.areas
+    assert [] == simulation._state.layers.areas
     assert {} == dict(simulation.home.layers)
     with pytest.raises(InputError, match="unknown key"):
         fleet2d.load_scenario(content, "floorplan.layer.dust.unit=g")

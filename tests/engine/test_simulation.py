@@ -157,17 +157,19 @@ def test_branches_share_the_floor_plan_and_nothing_else() -> None:
     simulation.advance(600)
     branch = copy.deepcopy(simulation)
     assert branch.home.plan is simulation.home.plan
-    assert branch._world.users[0] is not simulation._world.users[0]
-    assert branch._world.users[0].behaviors[0] is not simulation._world.users[0].behaviors[0]
+    for name in ("ana", "astro"):
+        assert branch.actors[name] is not simulation.actors[name]
+        assert branch.actors[name].behaviors[0] is not simulation.actors[name].behaviors[0]
+        assert branch.actors[name].entity is simulation.actors[name].entity
 
 
 def test_a_branch_can_be_changed_without_the_other_noticing() -> None:
     simulation = fleet2d.Simulation(small())
     simulation.advance(200)
     branch = copy.deepcopy(simulation)
-    robot = branch._world.robots[0]
+    robot = branch.actors["astro"]
     robot.state = robot.state._replace(x=robot.state.x + 2)
-    robot.ask_at = branch.step
+    robot.ask(branch.step)
     assert digests(run(small())) == digests(simulation.run())
     assert digests(branch.run())["trajectories"] != digests(run(small()))["trajectories"]
 
@@ -251,7 +253,7 @@ def test_the_manifest_tells_what_was_run() -> None:
     )  # fmt: skip
     assert "2026-01-05T07:00:00" == manifest["start"]
     assert {"users": ["ana"], "robots": ["astro"]} == manifest["entities"]
-    assert {"fleet2d", "numpy", "numba", "python"} <= set(manifest["versions"])
+    assert {"fleet2d", "numpy", "pyarrow", "shapely", "python"} <= set(manifest["versions"])
     (record,) = manifest["inputs"]
     assert record["path"].endswith("flat.json")
     assert 64 == len(record["sha256"])

@@ -97,10 +97,10 @@ def test_notice_chance_is_the_product_in_its_unit_and_1_is_sure() -> None:
 
 @quick
 @given(VECTOR)
-def test_the_farthest_distances_share_the_last_entry(vector: tuple[int, int]) -> None:
+def test_the_farthest_distances_share_the_last_bin(vector: tuple[int, int]) -> None:
     table = BY_ALL
-    assert 0 <= k.distance_entry(table, 0, *vector) < k.BINS
-    assert k.BINS - 1 == k.distance_entry(table, 0, 10**6, 10**6)
+    assert 0 <= k.distance_bin(table, 0, *vector) < k.BINS
+    assert k.BINS - 1 == k.distance_bin(table, 0, 10**6, 10**6)
 
 
 @quick
@@ -118,14 +118,14 @@ def test_turn_and_stretch_is_that_of_trigonometry(
 
 
 def test_a_user_at_the_camera_and_one_without_noise_stay_where_they_are() -> None:
-    keys = np.zeros((1, 3, k.PURPOSES), np.uint64)
+    keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
     noisy = table_of(attributes={"range_noise": 0.5, "bearing_noise_deg": 20})
     assert (0, 0) == k.blurred(noisy, keys, 0, 0, 7, 0, 0)
     assert (300, -40) == k.blurred(table_of(), keys, 0, 0, 7, 300, -40)
 
 
 def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
-    keys = np.full((1, 3, k.PURPOSES), 5, np.uint64)
+    keys = np.full((1, 3, len(k.UserDraw)), 5, np.uint64)
     table = table_of(attributes={"range_noise": 3})
     places = [k.blurred(table, keys, 0, 0, step, 400, 0) for step in range(2000)]
     assert 0 == min(x for x, _ in places)

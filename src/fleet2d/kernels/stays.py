@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d import _core
-from fleet2d._core import WHOLE_PATCH as WHOLE
-from fleet2d._core import follow
+from fleet2d._core import WHOLE_PATCH, follow
 
-__all__ = ["WHOLE", "Moments", "Stretches", "Ways", "follow", "take_together"]
+__all__ = ["WHOLE_PATCH", "Moments", "Stretches", "Ways", "follow", "take_together"]
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -48,12 +47,12 @@ class Ways(NamedTuple):
 
     Attributes:
         stay: float64 (stages,), chance to be in the same stage a bin later.
-        follow: float64 (stages, rooms + 2), where those go who aren't: to each room, away, and the
-            next stage of the same; rows sum to one.
-        spread: float64 (patches,), who comes to a room comes to which of its patches.
-        restless: float64 (rooms + 1,), chance a bin that who stays in a room changes patch.
+        follow: float64 (stages, rooms + 2), where a person goes after a stage: to each room, away,
+            and the next stage of the same; rows sum to one.
+        spread: float64 (patches,), chance that a person who comes to a room comes to the patch.
+        restless: float64 (rooms + 1,), chance a bin to change patch while staying in a room.
         first: int64 (rooms + 2,), the first patch of each room, that of away, and their number.
-        detection: Chance that who is in view is perceived in a bin.
+        detection: Chance that a person in view is perceived in a bin.
     """
 
     stay: F64
@@ -70,8 +69,9 @@ class Moments(NamedTuple):
     Attributes:
         time: float64 (stages,), bins.
         exits: float64 (stages, rooms + 2), how often each is followed by what.
-        arrivals: float64 (patches,), how often who came, or changed patch, came there.
-        moves: float64 (rooms + 1,), changes of patch; rests, bins without one.
+        arrivals: float64 (patches,), how often a person who came, or changed patch, came there.
+        moves: float64 (rooms + 1,), changes of patch.
+        rests: float64 (rooms + 1,), bins without one.
     """
 
     time: F64
@@ -91,5 +91,8 @@ def take_together(minute: I64, shown: U8, seen: I64, longest: int) -> Stretches:
         shown: (bins, patches), as in Stretches, away left out.
         seen: (bins, patches), steps at which the user was perceived in each.
         longest: Most bins of a stretch.
+
+    Raises:
+        ValueError: The arrays aren't of the same bins and patches.
     """
     return Stretches(*_core.take_together(minute, shown, seen, longest))

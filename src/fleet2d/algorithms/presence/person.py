@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import WHOLE, Moments, Stretches, Ways, follow, take_together
+from fleet2d.kernels.stays import WHOLE_PATCH, Moments, Stretches, Ways, follow, take_together
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -221,12 +221,13 @@ class Person:
 
 
 def watched_patches(bins: Bins) -> NDArray[np.uint8]:
-    """Return how much of each patch was watched, up to WHOLE: uint8 (bins, patches).
+    """Return how much of each patch was watched, up to WHOLE_PATCH: uint8 (bins, patches).
 
     One in which somebody unknown was perceived, who may be any user, doesn't count as watched.
     """
     seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
-    shown: NDArray[np.uint8] = np.rint(np.minimum(bins.parts.shown, 1) * WHOLE).astype(np.uint8)
+    whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
+    shown: NDArray[np.uint8] = np.rint(whole).astype(np.uint8)
     if users:
         shown[seen[:, -1] > seen[:, :-1].sum(axis=1)] = 0
     return shown
