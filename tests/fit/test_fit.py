@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 
 from fleet2d import cli
 from fleet2d.fit.command import fit_routine
-from fleet2d.fit.compare import Distances, by_hour, distances, dwell_times, ks_distance, shares, wasserstein
+from fleet2d.fit.compare import (
+    Distances,
+    by_hour,
+    distances,
+    dwell_times,
+    ks_distance,
+    shares,
+    wasserstein,
+)
 from fleet2d.fit.days import find_days
 from fleet2d.fit.persona import fit_persona, to_yaml
 from fleet2d.fit.sample import sample_markov, sample_persona

@@ -28,7 +28,7 @@ def furniture_of(actor: "Actor", place: RoomChoice | Point) -> "PlacedObject | N
             if name in (thing.name, thing.type) and _gets_to(actor, thing)
         ]
         if pieces:
-            return Draws(actor.stream(f"object of {name}"), 0).choice(pieces)  # type: ignore[arg-type]
+            return Draws(actor.stream(f"object of {name}"), 0).choice(pieces)
     return None
 
 
@@ -79,4 +79,4 @@ def _gets_to(actor: "Actor", thing: "PlacedObject") -> bool:
     at = actor.home.plan.lattice.to_lattice(use.approach or (use.x, use.y)).tolist()
     # From nearby if that is too tight, but not from another room behind a wall.
     far = actor.home.plan.lattice.units_per_m
-    return (x - at[0]) ** 2 + (y - at[1]) ** 2 <= far * far
+    return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= far * far)

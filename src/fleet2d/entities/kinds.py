@@ -68,7 +68,7 @@ def is_kind(actor: "Actor", place: RoomChoice | Point) -> bool:
     types = {room.type for room in actor.home.rooms} | {t.type for t in actor.home.objects}
     return all(
         name not in names
-        and not name[-1:].isdigit()  # bathroom_7 is one bathroom
+        and not str(name)[-1:].isdigit()  # bathroom_7 is one bathroom
         and (name in types or name in FURNITURE or usual_type(str(name)) in PRIORITY)
         for name in place
         if name != ANY

@@ -40,7 +40,7 @@ class Meander(Behavior):
 
     at_walls: Literal["turn", "stay"] = Field(
         default="turn",
-        description="where a wall is in the way: turn by any angle, or stay and sway until it isn't",
+        description="where a wall is in the way: turn by any angle, or sway until it isn't",
     )
 
     def start(self, actor: "Actor") -> None:

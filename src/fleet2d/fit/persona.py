@@ -49,9 +49,11 @@ def fit_persona(
     """Fit a persona to days of a log.
 
     Of model `recorded`, its days are drawn from those of the log, of which each goes on as another
-    where both do the same at about the same time. Of model `laws`: what is done once on most days at about the same time becomes a task with the mean and spread
-    of its beginning, the measured law of its duration and the share of days that have it. All else
-    fills the rest: per three hours of the day a weighted choice, with the measured durations of
+    where both do the same at about the same time.
+
+    Of model `laws`: what is done once on most days at about the same time becomes a task with the
+    mean and spread of its beginning, the measured law of its duration and the share of days that
+    have it. All else fills the rest: per three hours of the day a weighted choice, with the measured durations of
     what began in them. Getting up at night becomes the fetching of sleep.
 
     Raises:

@@ -129,20 +129,25 @@ def _urge(name: str, need: "Need", activities: Mapping[str, "Activity"]) -> Urge
         tuple(steps),
         _quantiles(need.every.table()),
         None if need.asleep is None else _quantiles(need.asleep.table()),
-        *(
-            round(share * CERTAIN)
-            for share in (need.on_waking, need.before_bed, need.before_leaving, need.on_return)
-        ),
+        _chance(need.on_waking),
+        _chance(need.before_bed),
+        _chance(need.before_leaving),
+        _chance(need.on_return),
         seconds(need.patience),
         window,
         frozenset(need.met_by),
     )
 
 
+def _chance(share: float) -> int:
+    """Return a probability in parts of CERTAIN."""
+    return round(share * CERTAIN)
+
+
 def _step(name: str, chance: float, takes: object, activities: Mapping[str, "Activity"]) -> Step:
     activity = activities[name]
     law = (takes or activity.takes).table()  # type: ignore[attr-defined]
-    return Step(name, round(chance * CERTAIN), _quantiles(law), activity.exclusive)
+    return Step(name, _chance(chance), _quantiles(law), activity.exclusive)
 
 
 def _quantiles(law: Law) -> Quantiles:

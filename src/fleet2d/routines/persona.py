@@ -172,7 +172,7 @@ class DayTemplate(Settings):
     @model_validator(mode="after")
     def _is_of_one_kind(self) -> Self:
         if self.recorded and (self.do or self.leisure):
-            raise problem_at(("recorded",), "days are recorded, or told by do and leisure: not both")
+            raise problem_at(("recorded",), "give recorded days, or do and leisure: not both")
         return self
 
     @model_validator(mode="after")

@@ -57,7 +57,9 @@ def parse_day(value: Any) -> RecordedDay:
         time, _, name = entry.strip().partition(" ")
         hours, colon, minutes = time.partition(":")
         if not (colon and hours.isdigit() and minutes.isdigit() and name):
-            raise problem(f"found {entry.strip()!r}; a time and an activity are wanted, '07:00 wash'")
+            raise problem(
+                f"found {entry.strip()!r}; a time and an activity are wanted, '07:00 wash'"
+            )
         times.append(int(hours) * 3600 + int(minutes) * 60)
         names.append(name.strip())
     if any(a >= b for a, b in pairwise(times)):
@@ -77,7 +79,9 @@ AnyRecordedDay = Annotated[
     RecordedDay,
     BeforeValidator(parse_day),
     PlainSerializer(write_day),
-    WithJsonSchema({"type": "string", "examples": ["07:00 wash, 07:20 work, 23:00 sleep, 31:00 end"]}),
+    WithJsonSchema(
+        {"type": "string", "examples": ["07:00 wash, 07:20 work, 23:00 sleep, 31:00 end"]}
+    ),
 ]
 
 

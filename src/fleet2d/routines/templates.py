@@ -61,7 +61,7 @@ def day_plans(persona: "Persona") -> dict[str, DayPlan]:
 
 def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     if day.recorded:
-        return _recorded_plan(persona, name, day)
+        return _recorded_plan(name, day)
     wake = starts(day.wake, 0)
     assert wake is not None
     dawn = wake.shortest
@@ -74,7 +74,7 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, fills)
 
 
-def _recorded_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
+def _recorded_plan(name: str, day: "DayTemplate") -> DayPlan:
     """Return the plan of a template that has recorded days."""
     wakes = [recorded.begins[0] for recorded in day.recorded]
     beds = [recorded.begins[-1] for recorded in day.recorded]
