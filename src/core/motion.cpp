@@ -124,8 +124,8 @@ bool is_traceable(const Breakpoints& track) {
         if (i == 0) continue;
         if (track.time[i] < track.time[i - 1]) return false;
         const i64 turn = turn_between(track.heading[i - 1], track.heading[i]);
-        const i64 change = std::max({std::abs(track.x[i] - track.x[i - 1]), std::abs(track.y[i] - track.y[i - 1]),
-                                     std::abs(turn)});
+        const i64 change =
+            std::max({std::abs(track.x[i] - track.x[i - 1]), std::abs(track.y[i] - track.y[i - 1]), std::abs(turn)});
         const f64 whole = static_cast<f64>(track.time[i] - track.time[i - 1]);
         if (static_cast<f64>(change) * whole > static_cast<f64>(LATEST)) return false;
     }

@@ -87,6 +87,6 @@ def test_file_record_hashes_the_bytes(tmp_path: Path) -> None:
 def test_versions_name_all_that_numbers_depend_on() -> None:
     found = versions()
 
-    expected = {"fleet2d", "numba", "numpy", "platform", "pyarrow", "python", "shapely"}
+    expected = {"fleet2d", "numpy", "platform", "pyarrow", "python", "shapely"}
     assert expected == found.keys()
     assert np.__version__ == found["numpy"]

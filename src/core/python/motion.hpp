@@ -10,8 +10,8 @@ namespace fleet2d {
 template <>
 struct border::Fields<Breakpoints> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Breakpoints::time, &Breakpoints::x, &Breakpoints::y,
-                                               &Breakpoints::heading, &Breakpoints::away);
+    static constexpr auto members =
+        std::tuple(&Breakpoints::time, &Breakpoints::x, &Breakpoints::y, &Breakpoints::heading, &Breakpoints::away);
 };
 
 template <>

@@ -46,6 +46,7 @@ class Manifest:
         wall_s: Wall time by phase [s].
         metrics: Summary of the metrics.
         notes: Remarks in plain words.
+        interventions: What was done to the run from outside, in order.
     """
 
     format: int = FORMAT
@@ -64,6 +65,7 @@ class Manifest:
     wall_s: dict[str, float] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    interventions: list[dict[str, Any]] = field(default_factory=list)
 
     def to_json(self) -> str:
         """Return the text of the file: sorted keys, no NaN."""
@@ -113,6 +115,7 @@ class Manifest:
                 f"reads up to {FORMAT}): update Fleet2D"
             )
         names = {entry.name for entry in fields(cls)}
+        content = {"interventions": [], **content}  # runs before it was a field had none
         missing = sorted(names - content.keys())
         if missing:
             raise _damaged(path, f"it lacks {', '.join(missing)}")

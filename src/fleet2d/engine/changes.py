@@ -110,13 +110,21 @@ class Changes:
         Raises:
             ComponentError: There is nothing of that name to change.
         """
+        self.check(change, by)
+        if change.at is not None:
+            step = max(step, self._step_of(change.at))
+        self._put(step, change, by)
+
+    def check(self, change: HomeChange, by: str) -> None:
+        """Refuse a change that an algorithm or a script asks for.
+
+        Raises:
+            ComponentError: There is nothing of that name to change.
+        """
         try:
             self._check(change)
         except ScenarioError as error:
             raise ComponentError(f"{by} asks for a change that can't be: {error}") from None
-        if change.at is not None:
-            step = max(step, self._step_of(change.at))
-        self._put(step, change, by)
 
     def expect(self, row: int, actor: Actor) -> None:
         """Note the doors on the way of somebody who opens doors, once a plan is made."""

@@ -80,7 +80,8 @@ def reproduce(directory: str | Path) -> Reproduction:
     # Running it at a pace of its own would only take longer.
     scenario = load_scenario({**content, "simulation": {**content["simulation"], "speedup": None}})
     with tempfile.TemporaryDirectory() as folder:
-        again = Simulation(scenario, out=Path(folder) / "run").run()
+        interventions = stored.manifest["interventions"]
+        again = Simulation(scenario, out=Path(folder) / "run", interventions=interventions).run()
         before, after = stored.manifest["tables"], again.manifest["tables"]
     names = sorted(before.keys() | after.keys())
     differing = [

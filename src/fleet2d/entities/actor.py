@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,6 +142,10 @@ class Actor:
         if self._bodies is not None:
             self._bodies.ask_at[self.row] = NEVER if step is None else step
 
+    def choose(self, plan: Plan) -> None:
+        """Take a plan from outside as its next decision, which is due now."""
+        self._chosen, self._waiting = plan, None
+
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
@@ -255,6 +259,33 @@ class Actor:
         row, column = cells[draws.below(len(cells))].tolist()
         return self.home.plan.lattice.cell_centre(row, column)
 
+    def find_anywhere(self, place: Any, time_us: int, purpose: str) -> tuple[int, int]:
+        """Return the lattice point of a place that it may be carried to: also one without a way.
+
+        Raises:
+            PlacementError: There is no such room, or its body fits nowhere there.
+        """
+        where = parse_place(place)
+        if not is_point(where):
+            names = where
+            rooms = matching_rooms(names, self.home.rooms, self.home.rooms)[1]  # type: ignore[arg-type]
+            draws = Draws(self.stream(purpose), time_us)
+            for part in range(self.space.parts):
+                cells = self.space.cells(rooms[0].index, part)
+                if len(cells):
+                    row, column = cells[draws.below(len(cells))].tolist()
+                    return self.home.plan.lattice.cell_centre(row, column)
+            raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
+        x, y = self.home.plan.lattice.to_lattice(where).tolist()
+        if self.space.part_at(x, y) < 0:
+            near = self.space.nearest(x, y)
+            there = None if near is None else self._shown(near)
+            raise PlacementError(
+                f"{self.path}: the point {list(where)} is in a wall or nearer to one than its"
+                f" radius of {self.entity.radius:g} m; the nearest free point is {there}"
+            )
+        return x, y
+
     def middle(self, room: Room) -> tuple[int, int]:
         """Return the point of a room that it can reach, nearest to the room's deepest inside."""
         x, y = self.home.plan.lattice.to_lattice(room.anchor_xy).tolist()
@@ -303,6 +334,8 @@ class Actor:
             self.charge.follow(self.motion, now.step * self.clock.step_us)
             if self.charge.is_empty:
                 return False
+        if self._chosen is not None:  # from outside
+            return False
         with blame(self.path, now.step):
             found = self.arbiter.goes_on(now, self.plan, self._asked)
             if found is True:

@@ -228,7 +228,8 @@ def watched_patches(bins: Bins) -> NDArray[np.uint8]:
     seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
     shown = bins.parts.shown_parts
     if shown is None:
-        shown = np.rint(np.minimum(bins.parts.shown, 1) * WHOLE_PATCH).astype(np.uint8)
+        whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
+        shown = np.rint(whole).astype(np.uint8)
     if users:
         known = seen[:, 0] if users == 1 else seen[:, :-1].sum(axis=1)
         shown = np.where(seen[:, -1] > known, np.uint8(0), shown)
