@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.manifest import Manifest, file_record, versions
+from fleet2d.artifacts.manifest import Entities, InputRecord, Manifest, file_record, versions
 from fleet2d.artifacts.reader import FLOORPLAN_NAME
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
@@ -27,9 +27,11 @@ def describe_start(
     manifest.seed = seed
     manifest.step_us = clock.step_us
     manifest.start = clock.start.isoformat()
-    manifest.entities = {"users": list(scenario.users), "robots": list(scenario.robots)}
+    manifest.entities = Entities(users=list(scenario.users), robots=list(scenario.robots))
     manifest.versions = versions()
-    manifest.inputs = [file_record(path) for path in input_files(scenario)]
+    manifest.inputs = [
+        InputRecord(**file_record(path)) for path in input_files(scenario)
+    ]
     manifest.notes = list(plan.notes)
     for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
         manifest.notes += [
