@@ -127,6 +127,7 @@ class Manifest(BaseModel):
         metrics: Summary of the metrics.
         notes: Remarks in plain words.
         interventions: What was done to the run from outside, in order.
+        resumed: The steps at which it was taken up again after it had ended early.
         seal: What the whole run is recognised by; None until the run is closed, and in format 1.
 
     Example:
@@ -153,6 +154,7 @@ class Manifest(BaseModel):
     metrics: dict[str, Any] = {}
     notes: list[str] = []
     interventions: list[dict[str, Any]] = []
+    resumed: list[Count] = []
     seal: Seal | None = None
 
     def content(self) -> dict[str, Any]:
@@ -205,7 +207,7 @@ class Manifest(BaseModel):
 
 
 # What the manifest of every version has.
-_ALWAYS = Manifest.model_fields.keys() - {"interventions", "seal"}
+_ALWAYS = Manifest.model_fields.keys() - {"interventions", "resumed", "seal"}
 
 
 def read_content(directory: Path) -> Any:

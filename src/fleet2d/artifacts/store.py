@@ -172,6 +172,15 @@ class RunStore:
         with self._writing(name):
             write_atomically(self._root / name, content.encode())
 
+    def keep_checkpoint(self, content: bytes) -> None:
+        """Replace the checkpoint of the run.
+
+        Raises:
+            ArtifactError: It can't be written; the run is marked as failed.
+        """
+        with self._writing("the checkpoint"):
+            self._ledger_of().keep_checkpoint(content)
+
     def commit(self, step: int, *, sync: bool = False) -> Commit | None:
         """Let all rows so far survive the end of this process; nothing for a run in memory.
 

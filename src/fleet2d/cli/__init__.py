@@ -7,6 +7,9 @@ import typer
 
 from fleet2d.calibrate.command import calibrating
 from fleet2d.cli import inputs, paper, pictures, runs
+from fleet2d.cli.reproduce import reproduce
+from fleet2d.cli.resume import resume
+from fleet2d.cli.verify import verify
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.fit.command import fitting
 
@@ -26,7 +29,9 @@ for command in (
     pictures.show,
     inputs.convert,
     runs.export,
-    runs.reproduce,
+    resume,
+    verify,
+    reproduce,
     paper.reproduce_paper,
 ):
     app.command()(command)
