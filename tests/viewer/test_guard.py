@@ -10,7 +10,7 @@ from fleet2d.viewer.guard import new_token
 from fleet2d.viewer.serve import PageServer
 from fleet2d.viewer.server import Shelf, page_app
 
-TOKEN = new_token()
+TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
 PORT = 8765
 OWN = f"http://127.0.0.1:{PORT}"
 FACTS = f"/{TOKEN}/run/0/facts.json"
