@@ -49,6 +49,8 @@ class Greet(Behavior):
 class Obey(Behavior):
     """Go where the algorithm `share` says that somebody was seen most."""
 
+    records = frozenset({"obeys"})
+
     def decide(self, now: Situation) -> Plan | None:
         plan = now.plan()
         if "share" in now.outputs:

@@ -41,6 +41,8 @@ class SightingShare(Algorithm):
 class VisitMostSeen(Behavior):
     """Every other time wait where people were seen most, according to an algorithm."""
 
+    records = frozenset({"visit"})
+
     of: str = Field(default="share", description="the algorithm to go by")
     dwell: Duration = Field(default=timedelta(hours=1), description="how long it waits")
 

@@ -12,6 +12,8 @@ from fleet2d import Behavior, Duration, Length, Plan, Situation
 class Greeter(Behavior):
     """Go from room to room; when a user comes into view, drive up and stay a while."""
 
+    records = frozenset({"greeting"})
+
     # A typed field is a key in the YAML, checked and converted: `company: 10 min`.
     dwell: Duration = Field(
         default=timedelta(minutes=5), description="how long it looks around in a room"

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run as Run
     from fleet2d.artifacts.reader import open_run as open_run
     from fleet2d.component import register as register
-    from fleet2d.engine.run import reproduce as reproduce
+    from fleet2d.engine.reproduce import reproduce as reproduce
+    from fleet2d.engine.resume import resume as resume
     from fleet2d.engine.run import run as run
     from fleet2d.engine.simulation import Simulation as Simulation
     from fleet2d.entities.actor import Actor as Actor
@@ -78,7 +79,8 @@ _HOME_OF = {
     "open_run": "artifacts.reader",
     "open_study": "studies.reader",
     "register": "component",
-    "reproduce": "engine.run",
+    "reproduce": "engine.reproduce",
+    "resume": "engine.resume",
     "run": "engine.run",
     "study": "studies.api",
 }

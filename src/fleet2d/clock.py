@@ -1,10 +1,12 @@
 """Simulated time: steps of one length from a start; times are integer microseconds since then."""
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime, time, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fleet2d.errors import InputError
 
 MICROSECOND = timedelta(microseconds=1)
 
@@ -52,3 +54,21 @@ class Clock:
     def step_at_or_after(self, elapsed_us: int) -> int:
         """Return the first step that is not before a moment [us since the start]."""
         return -(-elapsed_us // self.step_us)
+
+
+def next_time(text: str, now: datetime) -> datetime:
+    """Return the next moment at which it is a time of day, now included.
+
+    Raises:
+        InputError: It is no time of day.
+
+    Example:
+        >>> next_time("19:00", datetime(2026, 1, 5, 20)).isoformat()
+        '2026-01-06T19:00:00'
+    """
+    try:
+        at = time.fromisoformat(text)
+    except ValueError:
+        raise InputError(f"{text!r} is no time of day: write it like 19:00") from None
+    moment = datetime.combine(now.date(), at)
+    return moment if moment >= now else moment + timedelta(days=1)

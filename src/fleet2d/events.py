@@ -1,7 +1,7 @@
 """Events: what happens in a run, as its tables, its algorithms and its scripts hear of it."""
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 from typing import NamedTuple, Protocol
 
@@ -14,7 +14,7 @@ HOME = ""
 class EventKind(StrEnum):
     """Every kind of event that Fleet2D itself records.
 
-    A behavior that records others declares them by `notes` in its class.
+    A behavior that records others declares them by `records` in its class.
     """
 
     # Of cameras.
@@ -60,6 +60,7 @@ class EventKind(StrEnum):
     UNLOCKED = "unlocked"
 
 
+KINDS = frozenset(kind.value for kind in EventKind)
 SIGHTS = frozenset(
     {EventKind.USER_LOST, EventKind.USER_SEEN, EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN}
 )
@@ -99,6 +100,17 @@ class EventSink(Protocol):
         """Take events, in the order in which they became known, not by step."""
 
 
+class Listener:
+    """A function that takes the events of a run."""
+
+    def __init__(self, function: Callable[[Sequence[Event]], None]) -> None:
+        self.function = function
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Call the function."""
+        self.function(events)
+
+
 class EventStream:
     """The events of a run: each is made once, and handed to all sinks.
 
@@ -112,6 +124,11 @@ class EventStream:
         self.sinks = list(sinks)
         self._recent: deque[Event] = deque(maxlen=self.KEPT)
         self._dropped_until = 0  # every event from this step on is still there
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out functions that listen: they belong to who called, not to the run."""
+        sinks = [sink for sink in self.sinks if not isinstance(sink, Listener)]
+        return {**self.__dict__, "sinks": sinks}
 
     def emit(self, events: Sequence[Event]) -> None:
         """Hand events to all sinks."""

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.scenes import scenario
 
-from fleet2d.engine.buckets import PoseBlock
+from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.simulation import Simulation
 
@@ -68,6 +68,16 @@ def meetings(draw: st.DrawFn) -> list[tuple[int, int, bool]]:
     return found
 
 
+class Given(Bodies):
+    """Bodies whose poses are given at each step."""
+
+    def __init__(self, poses: PoseBlock) -> None:
+        self.poses_at = poses
+
+    def block(self, first: int, end: int) -> PoseBlock:
+        return PoseBlock(*(column[:, first:end] for column in self.poses_at))
+
+
 @settings(max_examples=80, deadline=None)
 @given(meeting=meetings(), cuts=st.lists(st.integers(1, 7), max_size=40))
 def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
@@ -79,19 +89,23 @@ def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
     x = [4.7 * UNITS - cm * UNITS // 100 for cm, _, _ in meeting]
     user = round(4.7 * UNITS), round(3.1 * UNITS)
     xs = [round(v) for v in x]
-    block = _BLOCKS[0]
+    still = np.full(len(xs), user[0]), np.full(len(xs), user[1])
+    zero = np.zeros((2, len(xs)), np.int64)
+    away = zero.astype(np.uint8)
+    away[0] = [away for _, _, away in meeting]
+    posture = zero.astype(np.int8)
+    posture[0] = [posture for _, posture, _ in meeting]
+    x, y = np.array([still[0], xs]), np.array([still[1], still[1]])
+    bodies = Given(PoseBlock(x, y, zero, away, posture))
     found, first, sizes = [], 0, iter(cuts)
     while first < len(meeting):
-        count = min(next(sizes, 5), len(meeting) - first)
-        part = slice(first, first + count)
-        block.x[0, :count], block.y[0, :count] = user
-        block.x[1, :count], block.y[1, :count] = xs[part], user[1]
-        block.posture[0, :count] = [posture for _, posture, _ in meeting[part]]
-        block.away[0, :count] = [away for _, _, away in meeting[part]]
-        count = encounters.limit(block, first, count)
-        for _, _, event in encounters.take(block, first, count):
-            found.append((first + count - 1, event.event))
-        first += count
+        end = encounters.limit(bodies, min(first + next(sizes, 5), len(meeting)))
+        assert first < end
+        for row, event in encounters.interruptions(encounters.take(bodies, end)):
+            assert 0 == row
+            found.append((end - 1, event.event))
+        assert end == encounters.taken
+        first = end
     moved = np.diff(xs, prepend=xs[0]) != 0
     steps = [
         Seen(abs(user[0] - xs[k]) / UNITS, bool(moved[k]), posture, away)
@@ -101,7 +115,6 @@ def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
 
 
 _ACTORS: list[Any] = []
-_BLOCKS: list[PoseBlock] = []
 
 
 def _bodies() -> tuple[list[Any], list[Any]]:
@@ -109,7 +122,6 @@ def _bodies() -> tuple[list[Any], list[Any]]:
     if not _ACTORS:
         actors = simulation().actors
         _ACTORS.extend([actors["ana"], actors["astro"]])
-        _BLOCKS.append(PoseBlock(_ACTORS))
     return _ACTORS[:1], _ACTORS[1:]
 
 
@@ -118,4 +130,9 @@ def test_nobody_is_watched_who_does_not_react() -> None:
     quiet = Simulation(scenario(users={"ana": {"type": "meander"}})).actors["ana"]
     encounters = Encounters([quiet], robots)
     assert [] == encounters.pairs
-    assert 17 == encounters.limit(_BLOCKS[0], 0, 17)
+    assert not encounters.waits
+    nowhere = np.zeros((2, 17), np.int64)
+    bodies = Given(PoseBlock(*[nowhere] * 3, nowhere.astype(np.uint8), nowhere.astype(np.int8)))
+    assert 17 == encounters.limit(bodies, 17)
+    assert () == encounters.take(bodies, 17)
+    assert [] == list(encounters.interruptions(()))

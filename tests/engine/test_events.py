@@ -48,6 +48,8 @@ class HeardMetric(Metric):
 class Watch(Behavior):
     """Notes at each second of its own how many sightings an algorithm has heard of."""
 
+    records = frozenset({"knows"})
+
     def decide(self, now: Situation) -> Plan:
         told = now.outputs.get("heard")
         plan = now.plan().note("knows", str(told["end"] if told else 0))

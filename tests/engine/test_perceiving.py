@@ -1,12 +1,11 @@
 """Runs in which perception errs: spans never show, truth stands beside it, algorithms don't see it."""
 
-import json
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.scenes import digests, everything, process, run, scenario, table
+from tests.scenes import digests, everything, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, History, Metric, Present

@@ -253,7 +253,7 @@ def test_the_manifest_tells_what_was_run() -> None:
     )  # fmt: skip
     assert "2026-01-05T07:00:00" == manifest["start"]
     assert {"users": ["ana"], "robots": ["astro"]} == manifest["entities"]
-    assert {"fleet2d", "numpy", "numba", "python"} <= set(manifest["versions"])
+    assert {"fleet2d", "numpy", "pyarrow", "shapely", "python"} <= set(manifest["versions"])
     (record,) = manifest["inputs"]
     assert record["path"].endswith("flat.json")
     assert 64 == len(record["sha256"])

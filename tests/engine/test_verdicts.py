@@ -63,6 +63,8 @@ class Broken(FieldOfView):
 class Shy(Behavior):
     """Goes elsewhere when a robot comes into view."""
 
+    records = frozenset({"shied"})
+
     def decide(self, now: Any) -> Any:
         for event in now.events:
             plan = now.plan().note("shied", f"{event.event} {event.user}").go_to("bedroom")

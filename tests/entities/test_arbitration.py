@@ -19,6 +19,8 @@ OWN = __name__
 class Errand(Behavior):
     """Says when it wants to be asked, and does something at that time."""
 
+    records = frozenset({"errand"})
+
     at: tuple[int, ...] = ()  # minutes after the start
     declines: bool = False
 
@@ -40,12 +42,16 @@ class Errand(Behavior):
 class Idle(Behavior):
     """Stays for good."""
 
+    records = frozenset({"idle"})
+
     def decide(self, now: Situation) -> Plan:
         return now.plan().note("idle", str(now.step)).stay()
 
 
 class Round(Behavior):
     """Stays in three rooms for five minutes each; tells how far it is."""
+
+    records = frozenset({"at"})
 
     def decide(self, now: Situation) -> Plan:
         plan = now.plan()

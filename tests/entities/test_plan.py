@@ -20,6 +20,7 @@ _DECIDE: dict[str, Decide] = {}
 class Told(Behavior):
     """Does what a function of the test says."""
 
+    records = frozenset({"back", "gone", "later", "never", "now", "on the step"})
     name: str
 
     def decide(self, now: Situation) -> Plan | None:

@@ -1,5 +1,6 @@
 """Filtered and smoothed stays against products of whole matrices, and in pieces as at once."""
 
+import hashlib
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,7 +38,7 @@ def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...
     chances[stages - 1 :: stages, places] = 0.0
     chances /= chances.sum(axis=1, keepdims=True)
     spread = np.concatenate([random.dirichlet(np.ones(n)) for n in sizes])
-    first = np.append(0, np.cumsum(sizes)).astype(np.uint64)
+    first = np.append(0, np.cumsum(sizes))
     ways = Ways(
         random.uniform(0.3, 0.99, nodes), chances, spread,
         np.append(random.uniform(0, 0.3, places - 1), 0.0), first, float(random.uniform(0.3, 0.95)),
@@ -85,7 +86,7 @@ def twin(of: Case) -> Any:
     )
 
 
-@settings(deadline=None)  # the first compiles
+@settings(deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 3), st.integers(1, 7), st.integers(1, 4))
 def test_following_is_the_product_of_matrices(
     seed: int, stages: int, count: int, longest: int
@@ -102,7 +103,7 @@ def test_following_is_the_product_of_matrices(
     assert of.stretches.shown[-1].tolist() == shown.tolist()
 
 
-@settings(deadline=None)  # the first compiles
+@settings(deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 6))
 def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int) -> None:
     of = case(seed, stages, count, longest=3)
@@ -116,23 +117,34 @@ def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int
     assert np.abs(by_place(smoothed, stages) - places).max() < 1e-9
 
 
-@pytest.mark.skipif(JIT_IS_OFF, reason="there is nothing to compare with")
-@pytest.mark.parametrize("stages", [1, 2])
-def test_compiled_or_not_it_is_the_same_to_the_last_bit(stages: int) -> None:
-    """A sum over more than eight rooms by `sum` was added up in another order uncompiled."""
-    of = case(3, stages, 12, 3, sizes=(2, 1, 3, 1, 4, 2, 1, 5, 2, 3, 1, 2, 1))
-    dawn, found = of.now.sum(axis=0), []
-    for smoothed in (smooth, smooth.py_func):
-        moments = no_moments(of.ways)
-        found.append(
-            (*smoothed(of.ways, of.stretches, dawn, np.ones_like(dawn), moments), *moments)
-        )
-    for followed in (follow, follow.py_func):
-        now = of.now.copy()
-        found.append((followed(of.ways, of.stretches, now, of.shown.copy()), now))
-    for compiled, plain in (found[:2], found[2:]):
-        for one, other in zip(compiled, plain, strict=True):
-            assert np.array_equal(one, other)
+@pytest.mark.parametrize(
+    ("stages", "digest"),
+    [
+        (1, "d18b333b922d83c9cf8332079d7d07e6a641a4212b8b4259c9f4f70744122765"),
+        (2, "9063b3df558bf6a8782e68b8c3c324a261515bcc38635c5cce02e0669c35fb6b"),
+    ],
+)
+def test_stays_are_the_same_to_the_last_bit_on_every_machine(stages: int, digest: str) -> None:
+    """A sum over more than eight rooms once was added up in another order uncompiled."""
+    of = portable(case(3, stages, 12, 3, sizes=(2, 1, 3, 1, 4, 2, 1, 5, 2, 3, 1, 2, 1)))
+    dawn, moments = of.now.sum(axis=0), no_moments(of.ways)
+    smoothed = smooth(of.ways, of.stretches, dawn, np.ones_like(dawn), moments)
+    now = of.now.copy()
+    followed = follow(of.ways, of.stretches, now, of.shown.copy())
+    found = b"".join(part.tobytes() for part in (*smoothed, *moments, followed, now))
+    assert digest == hashlib.sha256(found).hexdigest()
+
+
+def portable(of: Case) -> Case:
+    """Round what NumPy draws by logarithms, which differ in the last bit between machines."""
+    ways, stretches, now, shown, seen = of
+    ways = Ways(
+        *(np.round(part, 6) if part is not ways.first else part for part in ways[:-1]),
+        round(ways.detection, 6),
+    )
+    return Case(
+        ways, stretches._replace(share=np.round(stretches.share, 6)), np.round(now, 9), shown, seen
+    )
 
 
 @pytest.mark.parametrize("cut", [1, 3, 6])

@@ -6,13 +6,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.homes import Home, home_of
 from tests.reference import seen as slow
+from tests.strategies import quick, seeds
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.timelines import Window
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.tables import Scene, stack_lenses
@@ -69,6 +73,12 @@ def random_poses(rng: np.random.Generator, count: int) -> Poses:
     )  # fmt: skip
 
 
+def window_of(poses: Poses, first: int = 0, bodies: int = 1, body: int = 0) -> Window:
+    """Return how one of several bodies moves; the others are where it is in another step."""
+    columns = [np.stack([np.roll(column, b - body) for b in range(bodies)]) for column in poses]
+    return Window(first, *columns, np.zeros(columns[0].shape, np.int8))
+
+
 def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
     """Return what is seen, step by step and cell by cell."""
     shape = (FLAT.rows, FLAT.columns)
@@ -96,8 +106,18 @@ def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
     return Seen(first, last, exposure.tolist(), binned.tolist(), most.tolist())
 
 
-def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[int]) -> Seen:
-    """Return what the kernel makes of it, in spans that end at the given steps."""
+def by_kernel(
+    poses: Poses,
+    lenses: Lenses,
+    every: int,
+    slots: int,
+    ends: list[int],
+    body: int | None = None,
+) -> Seen:
+    """Return what the kernel makes of it, in spans that end at the given steps.
+
+    Each span has a window of its own, or all have one in which the robot is one of three bodies.
+    """
     shape = (FLAT.rows, FLAT.columns)
     several = len(lenses.near_squared) > 1
     record = Record(
@@ -110,8 +130,11 @@ def by_kernel(poses: Poses, lenses: Lenses, every: int, slots: int, ends: list[i
     glances = no_glances(slots, ROOMS)
     begin = 0
     for end in [*ends, len(poses.x)]:
-        part = Poses(*(np.ascontiguousarray(column[begin:end]) for column in poses))
-        watch(watched, part, begin, glances, record)
+        if body is None:
+            part = Poses(*(column[begin:end] for column in poses))
+            watch(watched, window_of(part, begin), 0, begin, end, glances, record)
+        else:
+            watch(watched, window_of(poses, 0, 3, body), body, begin, end, glances, record)
         reached = slice(begin // BIN, (end - 1) // BIN + 1)
         length = reached.stop - reached.start
         binned[reached] += record.binned[:length]
@@ -138,14 +161,15 @@ TWO = [
 @pytest.mark.parametrize("cameras", [ONE, WIDE, TWO], ids=["one", "wide", "two, one of them pans"])
 @pytest.mark.parametrize(("every", "slots"), [(1, 64), (1, 2), (3, 8)])
 @pytest.mark.parametrize("ends", [[], [1, 2, 17, 18, 40]], ids=["whole", "in spans"])
+@pytest.mark.parametrize("body", [None, 2], ids=["alone", "among others"])
 def test_what_was_seen_is_what_brute_force_sees(
-    cameras: Any, every: int, slots: int, ends: list[int]
+    cameras: Any, every: int, slots: int, ends: list[int], body: int | None
 ) -> None:
     poses = random_poses(np.random.default_rng(len(cameras)), 60)
     lenses = lenses_of(*cameras)
 
     expected = by_brute_force(poses, lenses, every)
-    found = by_kernel(poses, lenses, every, slots, ends)
+    found = by_kernel(poses, lenses, every, slots, ends, body)
 
     assert expected.exposure == found.exposure
     assert expected.binned == found.binned
@@ -153,6 +177,22 @@ def test_what_was_seen_is_what_brute_force_sees(
     assert np.array_equal(expected.first, found.first)
     assert np.array_equal(expected.last, found.last)
     assert (expected.first >= 0).sum() > 20
+
+
+@quick
+@given(seeds(), st.sampled_from([ONE, TWO]), st.integers(1, 4), st.lists(st.integers(1, 59)))
+def test_what_is_seen_in_spans_is_what_brute_force_sees(
+    seed: int, cameras: Any, every: int, cuts: list[int]
+) -> None:
+    rng = np.random.default_rng(seed)
+    poses, lenses = random_poses(rng, 60), lenses_of(*cameras)
+    slots = int(rng.choice([2, 4, 64]))
+
+    expected = by_brute_force(poses, lenses, every)
+    found = by_kernel(poses, lenses, every, slots, sorted(set(cuts)))
+
+    for one, other in zip(expected, found, strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_tables_that_do_not_fit_are_refused() -> None:
@@ -163,7 +203,8 @@ def test_tables_that_do_not_fit_are_refused() -> None:
         np.zeros((0, 0), np.int64), none, none,
     )  # fmt: skip
     watched = Watched(FLAT.mesh, lenses_of(*ONE), rooms, SECOND, 1, BIN)
-    poses = random_poses(np.random.default_rng(1), 60)
+    window = window_of(random_poses(np.random.default_rng(1), 60))
+    far = window_of(Poses(*[np.full(3, 2**41)] * 3, np.zeros(3, np.uint8)))
     glances = no_glances(8, ROOMS)
     full = no_glances(8, ROOMS)
     full.last[:] = 0
@@ -171,19 +212,21 @@ def test_tables_that_do_not_fit_are_refused() -> None:
         binned=np.zeros((2, ROOMS), np.int64), most=np.zeros((2, ROOMS), np.int64)
     )
 
+    steps = (window, 0, 0, 60)
     for arguments, message in [
-        ((watched, poses, 0, no_glances(6, ROOMS), record), "a power of two"),
-        ((watched, poses, 0, no_glances(8, 2), record), "cells must be"),
-        ((watched, poses, 0, full, record), "more slots of glances"),
-        (
-            (watched._replace(patch_of_cell=rooms + np.int16(9)), poses, 0, glances, record),
-            "patches",
-        ),
-        ((watched._replace(patch_of_cell=rooms[1:]), poses, 0, glances, record), "patch_of_cell"),
-        ((watched._replace(every=0), poses, 0, glances, record), "every"),
-        ((watched, poses._replace(away=poses.away[1:]), 0, glances, record), "poses"),
-        ((watched, poses, -1, glances, record), "begin"),
-        ((watched, poses, 0, glances, bins), "a row for every bin"),
+        ((watched, *steps, no_glances(6, ROOMS), record), "a power of two"),
+        ((watched, *steps, no_glances(8, 2), record), "cells must be"),
+        ((watched, *steps, full, record), "more slots of glances"),
+        ((watched._replace(patch_of_cell=rooms + np.int16(9)), *steps, glances, record), "patches"),
+        ((watched._replace(patch_of_cell=rooms[1:]), *steps, glances, record), "patch_of_cell"),
+        ((watched._replace(every=0), *steps, glances, record), "every"),
+        ((watched, window, 1, 0, 60, glances, record), "no such body"),
+        ((watched, window, -1, 0, 60, glances, record), "no such body"),
+        ((watched, window, 0, -1, 60, glances, record), "within the window"),
+        ((watched, window, 0, 0, 61, glances, record), "within the window"),
+        ((watched, window, 0, 9, 8, glances, record), "within the window"),
+        ((watched, far, 0, 0, 3, glances, record), "lattice units"),
+        ((watched, *steps, glances, bins), "a row for every bin"),
     ]:
         with pytest.raises(ValueError, match=message):
             watch(*arguments)

@@ -62,15 +62,21 @@ def least_walk_us(squared: int, speed: Fraction) -> int:
 
 
 def walk(
-    walls: Int64, space: Int64, key: int, stride: int, sway: int, limit: int, start: Sequence[int]
+    walls: Int64,
+    space: Int64,
+    key: int,
+    stride: int,
+    sway: int,
+    limit: int,
+    start: Sequence[int],
+    step: int = 0,
 ) -> Iterator[tuple[int, int, int]]:
-    """Yield the poses of a random walk from step 0 on, by a look at every wall of the space.
+    """Yield the poses of a random walk from a step on, by a look at every wall of the space.
 
     Both are int64 (w, 4) pieces of wall. `stride` is in 1/256 lattice units, `sway` in 2**-16
     headings per unit of the bell, `limit` in headings.
     """
     x, y, heading = start
-    step = 0
     while True:
         yield x, y, heading
         before = heading

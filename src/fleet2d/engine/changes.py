@@ -17,7 +17,7 @@ from shapely import LineString
 
 from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.objects.door import Door
+from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.plan import Track
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
@@ -110,13 +110,21 @@ class Changes:
         Raises:
             ComponentError: There is nothing of that name to change.
         """
+        self.check(change, by)
+        if change.at is not None:
+            step = max(step, self._step_of(change.at))
+        self._put(step, change, by)
+
+    def check(self, change: HomeChange, by: str) -> None:
+        """Refuse a change that an algorithm or a script asks for.
+
+        Raises:
+            ComponentError: There is nothing of that name to change.
+        """
         try:
             self._check(change)
         except ScenarioError as error:
             raise ComponentError(f"{by} asks for a change that can't be: {error}") from None
-        if change.at is not None:
-            step = max(step, self._step_of(change.at))
-        self._put(step, change, by)
 
     def expect(self, row: int, actor: Actor) -> None:
         """Note the doors on the way of somebody who opens doors, once a plan is made."""
@@ -317,9 +325,10 @@ class Changes:
         else:
             kind, known = "door", self.names
         if change.target not in known:
+            hint = how_to_hang_a_door(self.home.plan, change.target) if kind == "door" else ""
             raise ScenarioError(
                 f"there is no {kind} {change.target!r}{did_you_mean(change.target, known)}"
-                f" There are: {', '.join(known) or 'none'}"
+                f" There are: {', '.join(known) or 'none'}{hint}"
             )
         if change.verb == "move":
             self._check_move(change)

@@ -55,6 +55,7 @@ class KeyFrames:
         self._emitted = [2] * len(actors)
         self._complete_until = [-1] * len(actors)  # where the plan before was followed to its end
         self._walked = [1] * len(actors)  # the step before which a random walk is gathered
+        self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
         self._blocks: list[NDArray[np.int64]] = []
         self._rows = 0
 
@@ -81,11 +82,17 @@ class KeyFrames:
         moment = step * self._clock.step_us
         # A plan that takes over just where the last one ended needs no key frame to begin.
         self._walked[row] = step + 1
-        self._emitted[row] = int(self._complete_until[row] == moment and step > 0)
+        goes_on = self._complete_until[row] == moment and step > 0 and row not in self._moved
+        self._emitted[row] = int(goes_on)
+        self._moved.discard(row)
         actor = self._actors[row]
         if not isinstance(actor.motion, Track):
             self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
         self.pass_by(row, step)
+
+    def move_body(self, row: int) -> None:
+        """Begin the next plan of a body with a key frame, for it doesn't go on from the last."""
+        self._moved.add(row)
 
     def pass_by(self, row: int, step: int) -> None:
         """Gather the breakpoints of the present plan that are reached up to a step."""

@@ -29,6 +29,14 @@ class Span:
     settles: bool = False
 
 
+def intervene(state: State, span: Span) -> None:
+    """Do what a script, a test or a person does at this step."""
+    while state.script and state.script[0].step <= span.first:
+        intervention = state.script.pop(0)
+        intervention.apply(state)
+        state.done.append(intervention)
+
+
 def change_home(state: State, span: Span) -> None:
     """Let the home change as it is due: the floor plan comes first in a step."""
     due = state.changes.next_due()
@@ -74,12 +82,13 @@ def move(state: State, span: Span) -> None:
         state.learners.next_due(),
         state.changes.next_due(),
         state.layers.next_due(span.first),
+        state.next_intervention(),
     )
     for due in dues:
         if due is not None:
             end = min(end, max(due, span.first + 1))
-    awaited = state.learners.awaited
-    if state.log is not None and awaited:
+    awaited = state.learners.awaited | state.awaited
+    if awaited:
         noted = state.next_note(span.first, awaited)
         end = end if noted is None else min(end, noted + 1)
     span.end = end
@@ -103,7 +112,7 @@ def record(state: State, span: Span) -> None:
         state.max_span is not None
         or span.end in due
         or span.end >= state.settled + state.capacity
-        or (state.log is not None and bool(state.learners.awaited))
+        or bool(state.learners.awaited | state.awaited)
     )
     if span.settles:
         state.settle(span.end)
@@ -128,5 +137,5 @@ def learn(state: State, span: Span) -> None:
 
 Phase = Callable[[State, Span], None]
 
-PHASES: tuple[Phase, ...] = (change_home, decide, move, watch, record, learn)
+PHASES: tuple[Phase, ...] = (intervene, change_home, decide, move, watch, record, learn)
 """What happens in a span, in order."""

@@ -104,6 +104,10 @@ class Recorder:
         if "key_frames" in self._tables:
             self._keys.begin_plan(row, step)
 
+    def move_body(self, row: int) -> None:
+        """Take note that a body is put elsewhere: its next plan doesn't go on from its last one."""
+        self._keys.move_body(row)
+
     def take_events(self, events: Sequence[Event]) -> None:
         """Gather events."""
         if "events" in self._tables:

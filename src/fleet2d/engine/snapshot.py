@@ -36,7 +36,22 @@ _SHARED = frozenset(
 
 # What a file may refer to besides classes of Fleet2D and of the scenario's own modules.
 _KNOWN = {
-    "builtins": {"bytearray", "complex", "frozenset", "object", "range", "set", "slice"},
+    "builtins": {
+        "bool",
+        "bytearray",
+        "complex",
+        "dict",
+        "float",
+        "frozenset",
+        "int",
+        "list",
+        "object",
+        "range",
+        "set",
+        "slice",
+        "str",
+        "tuple",
+    },  # fmt: skip
     "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
     "copyreg": {"_reconstructor"},
     "datetime": {"date", "datetime", "time", "timedelta"},
@@ -45,6 +60,7 @@ _KNOWN = {
     "numpy": {"dtype", "ndarray"},
     "numpy._core.multiarray": {"_reconstruct", "scalar"},
     "numpy._core.numeric": {"_frombuffer"},
+    "shapely.io": {"from_wkb"},
     "pathlib": {"Path", "PosixPath", "PurePosixPath", "PureWindowsPath", "WindowsPath"},
 }
 

@@ -1,7 +1,9 @@
 """The state of a run: all that changes from step to step, and nothing else."""
 
+from bisect import insort
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +24,13 @@ from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
-from fleet2d.events import Event, EventStream
+from fleet2d.events import Event, EventKind, EventStream
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
+
+if TYPE_CHECKING:
+    from fleet2d.engine.interventions import Intervention
 
 # The most steps that watchers take in together: the fewer, the more bodies there are.
 MOST_STEPS = 1 << 16
@@ -54,6 +59,10 @@ class State:
         max_span: The most steps of a span; None for as many as there is room for.
         settled: The step before which all watchers have taken everything in.
         pending: Events that interrupted the plan of a body, by its row, until it decides.
+        script: Interventions that are still to come, in order of their steps.
+        done: Those that were made.
+        driven: Rows of the bodies that are driven from outside.
+        awaited: Kinds of events at which a script wants the span to end.
         notes_emitted: How many of the notes of each body's present plan have happened.
     """
 
@@ -76,6 +85,10 @@ class State:
     watchers: list[Watcher] = field(init=False)
     settled: int = 0
     pending: dict[int, list[SightEvent]] = field(default_factory=dict)
+    script: "list[Intervention]" = field(default_factory=list)
+    done: "list[Intervention]" = field(default_factory=list)
+    driven: set[int] = field(default_factory=set)
+    awaited: frozenset[str] = frozenset()
     notes_emitted: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -94,6 +107,24 @@ class State:
     def capacity(self) -> int:
         """The most steps that watchers take in together."""
         return max(LEAST_STEPS, min(MOST_STEPS, MOST_POSES // max(1, len(self.actors))))
+
+    # Interventions
+
+    def intervene(self, intervention: "Intervention") -> None:
+        """Let something be done at the step that it names, after all that is to be done before."""
+        insort(self.script, intervention, key=lambda later: later.step)
+
+    def next_intervention(self) -> int | None:
+        """Return the step at which something is done from outside next."""
+        return self.script[0].step if self.script else None
+
+    def wait_for(self, kinds: frozenset[str]) -> None:
+        """Let spans end at events of these kinds, besides those that algorithms wait for."""
+        self.awaited = kinds
+        awaited = kinds | self.learners.awaited
+        for cameras in [*self.gazes, *self.cameras]:
+            cameras.awaited = awaited
+        self.sensors.awaited = EventKind.SENSOR in awaited
 
     # Decisions
 

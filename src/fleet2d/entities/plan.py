@@ -1,20 +1,23 @@
 """Plans: the timed path that a behavior decided on, followed until it is over or interrupted."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import ceil
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.furniture import seat_at
 from fleet2d.errors import ComponentError, NoWayError
+from fleet2d.events import KINDS
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.motion import Breakpoints, WalkRule, time_route
+from fleet2d.problems import did_you_mean
 from fleet2d.units import micros
 
 if TYPE_CHECKING:
@@ -112,8 +115,12 @@ class Plan:
 
         A robot takes the cheapest path where the home has a costmap.
 
-        In a room, the place is a spot drawn from its free cells; `purpose` names the random stream.
+        In a room, the place is a spot drawn from its free cells by the stream `purpose`. Furniture
+        is used by people; robots stop where one steps up to it.
         """
+        thing = seat_at(self._actor, place)
+        if thing is not None:
+            return self.use(thing)
         return self.go_to_point(*self._actor.find(place, self.time_us, purpose))
 
     def go_to_point(self, x: int, y: int, *, route: I64 | None = None) -> Self:
@@ -298,7 +305,17 @@ class Plan:
         return self
 
     def note(self, event: str, detail: str = "") -> Self:
-        """Add a row to the events table, at the moment up to which it is planned."""
+        """Add a row to the events table, at the moment up to which it is planned.
+
+        Raises:
+            ComponentError: No behavior of the body declares such events, and Fleet2D has none.
+        """
+        behaviors = self._actor.behaviors
+        if event not in KINDS and not any(event in b.records for b in behaviors):
+            raise ComponentError(
+                f"{self._actor.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
+                f" behavior declares its own: records = frozenset({{{event!r}}})"
+            )
         self.notes.append(Note(self.time_us, event, detail))
         return self
 
@@ -356,6 +373,35 @@ class Plan:
             track = Breakpoints(time, x, y, heading, rows[:, 4].astype(np.uint8))
             self._motion = Track(track, self._actor.clock.step_us)
         return self._motion
+
+    def data(self) -> dict[str, Any]:
+        """Return all that the plan is, as numbers and texts: another run can follow it by `of`."""
+        motion = self.finish()
+        walk: list[Any] | None = list(motion.rule) if isinstance(motion, Walk) else None
+        return {
+            "rows": self._breakpoints().tolist(),
+            "walk": None if walk is None else [int(number) for number in walk],
+            "notes": [list(note) for note in self.notes],
+            "interrupts": sorted(self.interrupts),
+            "asks_us": self.asks_us,
+            "endless": self.endless,
+            "postures": [list(taken) for taken in self.postures],
+        }
+
+    @classmethod
+    def of(cls, actor: "Actor", step: int, data: Mapping[str, Any]) -> Self:
+        """Return the plan of a body that `data` returned, to be followed from a step on."""
+        plan = cls(actor, step)
+        if data["walk"] is not None:
+            key, *numbers = data["walk"]
+            return plan.meander(WalkRule(np.uint64(key), *numbers))
+        plan._rows = [np.array(data["rows"], np.int64).reshape(-1, 5)]
+        plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
+        plan.notes = [Note(*note) for note in data["notes"]]
+        plan.interrupts, plan.asks_us = frozenset(data["interrupts"]), data["asks_us"]
+        plan.endless = data["endless"]
+        plan.postures = [(time, code) for time, code in data["postures"]]
+        return plan
 
     def _check_goes_on(self) -> None:
         if self.endless:

@@ -50,7 +50,7 @@ class Ways(NamedTuple):
         follow: float64 (stages, rooms + 2), where a person goes after a stage: to each room, away,
             and the next stage of the same; rows sum to one.
         spread: float64 (patches,), chance that a person who comes to a room comes to the patch.
-        restless: float64 (rooms + 1,), chance a bin that a person who stays in a room changes patch.
+        restless: float64 (rooms + 1,), chance a bin to change patch while staying in a room.
         first: int64 (rooms + 2,), the first patch of each room, that of away, and their number.
         detection: Chance that a person in view is perceived in a bin.
     """

@@ -15,7 +15,7 @@ from fleet2d.studies.engine import files_of
 
 DIGITS = 32  # of the hexadecimal text of a hash
 # What runs, shows or sums up simulations has no part in what they compute.
-_LEAVES = ("studies", "cli", "view", "paper", "fit", "calibrate")
+_LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 

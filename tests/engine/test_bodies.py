@@ -1,0 +1,131 @@
+"""Bodies of a run: where each is at which step, and when it decides."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import everything
+
+import fleet2d
+from fleet2d.engine import state
+from fleet2d.engine.bodies import Bodies, poses_of
+from fleet2d.entities.actor import NEVER
+from fleet2d.entities.plan import Pose, Track
+from fleet2d.kernels.motion import Breakpoints
+
+SECOND = 1_000_000
+
+
+class Planned:
+    """A plan as bodies know it: breakpoints (time [s], x), and postures from times [s] on."""
+
+    def __init__(
+        self,
+        *ways: tuple[float, int],
+        posture: int = 0,
+        postures: tuple[tuple[float, int], ...] = (),
+    ) -> None:
+        self.ways, self.posture, self.postures = ways, posture, postures
+
+    def finish(self) -> Track:
+        times = np.array([round(seconds * SECOND) for seconds, _ in self.ways], np.int64)
+        x = np.array([x for _, x in self.ways], np.int64)
+        zero = np.zeros_like(x)
+        return Track(Breakpoints(times, x, zero, zero, zero.astype(np.uint8)), SECOND)
+
+    def posture_times(self) -> Any:
+        times = [round(seconds * SECOND) for seconds, _ in self.postures]
+        codes = [self.posture, *(code for _, code in self.postures)]
+        return np.array(times, np.int64), np.array(codes, np.int8)
+
+
+def bodies_at(*xs: int) -> Bodies:
+    """Return bodies that rest at x = …, one user and the rest robots."""
+    bodies = Bodies(1, len(xs) - 1, SECOND)
+    for row, x in enumerate(xs):
+        bodies.hold(row, Pose(x, 0, 0, 0))
+    return bodies
+
+
+@pytest.mark.parametrize(
+    ("actors", "capacity"),
+    [(0, 1 << 16), (1, 1 << 16), (32, 1 << 16), (64, 1 << 15), (10**4, 1 << 12)],
+)
+def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(
+    actors: int, capacity: int
+) -> None:
+    simulation = fleet2d.Simulation(everything("1 min"))
+    simulation._state.actors = [None] * actors  # type: ignore[list-item]
+    assert capacity == simulation._state.capacity
+    assert state.LEAST_STEPS <= capacity <= state.MOST_STEPS
+
+
+def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step() -> None:
+    bodies = bodies_at(5, 7, 9)
+    bodies.follow(1, Planned((0, 7), (4, 11)))  # type: ignore[arg-type]
+    block = bodies.block(1, 6)
+    assert [5] * 5 == block.x[0].tolist()
+    assert [8, 9, 10, 11, 11] == block.x[1].tolist() == poses_of(block, 1).x.tolist()
+    assert (3, 5) == block.x.shape == block.posture.shape
+    assert [Pose(x, 0, 0, 0) for x in (8, 9, 10)] == [bodies.pose_at(1, step) for step in (1, 2, 3)]
+    assert [[5, 10, 9], [0] * 3, [0] * 3, [0] * 3] == [part.tolist() for part in bodies.poses(3)]
+
+
+def test_a_block_of_nobody_has_no_rows() -> None:
+    assert (0, 4) == Bodies(0, 0, SECOND).block(0, 4).x.shape
+
+
+def test_a_plan_holds_from_the_present_step_on() -> None:
+    bodies = bodies_at(5, 7)
+    bodies.step = 3
+    assert [7] * 6 == bodies.block(0, 6).x[1].tolist()
+    bodies.follow(1, Planned((0, 20), (10, 30)))  # type: ignore[arg-type]
+    assert [7, 7, 7, 23, 24, 25] == bodies.block(0, 6).x[1].tolist()
+    bodies.hold(1, Pose(1, 2, 3, 1))
+    assert [7, 7, 7, 1, 1, 1] == bodies.block(0, 6).x[1].tolist()
+    assert Pose(1, 2, 3, 1) == bodies.pose(1)
+
+
+def test_postures_are_taken_and_forgotten_when_a_plan_has_none() -> None:
+    bodies = bodies_at(5)
+    bodies.step = 10
+    bodies.follow(0, Planned((10, 5), posture=0, postures=((12, 2),)))  # type: ignore[arg-type]
+    assert [0, 0, 2, 2] == bodies.block(10, 14).posture[0].tolist()
+    bodies.step = 14
+    bodies.follow(0, Planned((14, 5)))  # type: ignore[arg-type]
+    assert [2, 0, 0, 0] == bodies.block(13, 17).posture[0].tolist()
+
+
+def test_who_is_due_is_whose_step_has_come() -> None:
+    bodies = bodies_at(5, 7, 9)
+    assert [0, 1, 2] == bodies.due(0)
+    bodies.ask_at[:] = 30, NEVER, 20
+    assert 20 == bodies.next_decision()
+    assert [] == bodies.due(19)
+    assert [2] == bodies.due(29)
+    assert [0, 2] == bodies.due(30)
+    assert NEVER == Bodies(0, 0, SECOND).next_decision()
+
+
+def test_bodies_are_written_without_what_follows_and_read_the_same() -> None:
+    bodies = bodies_at(5, 7)
+    bodies.follow(1, Planned((0, 7), (400, 5000)))  # type: ignore[arg-type]
+    small = len(pickle.dumps(bodies))
+    before = [column.tolist() for column in bodies.block(0, 400)]
+    assert small == len(pickle.dumps(bodies))
+    again = pickle.loads(pickle.dumps(bodies))
+    assert before == [column.tolist() for column in again.block(0, 400)]
+    assert (bodies.step, bodies.users, bodies.ask_at.tolist()) == (
+        again.step, again.users, again.ask_at.tolist()
+    )  # fmt: skip
+
+
+def test_what_is_forgotten_is_no_longer_told() -> None:
+    bodies = bodies_at(5, 7)
+    bodies.step = 4
+    bodies.follow(1, Planned((4, 20)))  # type: ignore[arg-type]
+    bodies.forget(4)
+    assert [20] == bodies.block(4, 5).x[1].tolist()
+    with pytest.raises(ValueError, match="forgotten"):
+        bodies.pose_at(1, 3)
