@@ -12,6 +12,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from fleet2d.engine.inputs import input_files
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError
 from fleet2d.scenario.model import Scenario
@@ -48,6 +49,11 @@ class Outcome:
     peak_rss_mb: float = 0.0
     error: str | None = None
     trace: str | None = None
+
+
+def files_of(scenario: Scenario) -> list[Path]:
+    """Return the files that a scenario reads, and the modules of the user's own."""
+    return input_files(scenario)
 
 
 def check_setup(scenario: Scenario) -> None:

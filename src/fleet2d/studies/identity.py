@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import fleet2d
-from fleet2d.engine.inputs import input_files
 from fleet2d.errors import InputError
 from fleet2d.scenario.model import Scenario
+from fleet2d.studies.engine import files_of
 
 DIGITS = 32  # of the hexadecimal text of a hash
 # What runs, shows or sums up simulations has no part in what they compute.
-_LEAVES = ("studies", "cli", "view", "paper", "fit", "calibrate")
+_LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 
@@ -85,7 +85,7 @@ def input_hash(scenario: Scenario, files: FileHashes) -> str:
     Raises:
         InputError: One can't be read.
     """
-    return content_hash({str(path): files[path] for path in input_files(scenario)})
+    return content_hash({str(path): files[path] for path in files_of(scenario)})
 
 
 def identity(content: Mapping[str, Any], inputs: str) -> tuple[str, str]:
