@@ -20,7 +20,7 @@ Figure = Annotated[
 def show(
     what: Annotated[
         Path | None,
-        typer.Argument(metavar="[FLOORPLAN|RUN_DIR]", help="Left out: the bundled home."),
+        typer.Argument(metavar="[FLOORPLAN|RUN_DIR|PERSONA]", help="Left out: the bundled home."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")] = None,
     resolution: Resolution = None,
@@ -30,6 +30,11 @@ def show(
     step: Annotated[
         int | None, typer.Option(help="With --layer: as it was after this step; else the last.")
     ] = None,
+    diary: Annotated[
+        bool, typer.Option("--diary", help="Of a persona: what it does on some days.")
+    ] = False,
+    days: Annotated[int, typer.Option(min=1, max=60, help="With --diary: how many days.")] = 7,
+    seed: Annotated[int, typer.Option(help="With --diary: of the days.")] = 4,
     reliability: Annotated[
         str | None,
         typer.Option(help="Of a run: how often what this algorithm believed of presence was true."),
@@ -50,7 +55,15 @@ def show(
     end: Annotated[str | None, typer.Option("--to", help="Of a run: where it ends.")] = None,
     figure: Figure = "life",
 ) -> None:
-    """Draw a floor plan of any format, or a stored run in its home."""
+    """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
+    if diary:
+        from fleet2d.cli.diaries import show_diary
+
+        for line in show_diary(None if what is None else str(what), out, days, seed):
+            typer.echo(line)
+        return
+    if step is not None and layer is None:
+        raise InputError("--step goes with --layer: it says as of which step a layer is drawn")
     is_run = what is not None and (what / "manifest.json").exists()
     stretch = RunPicture(layer, step, reliability, at, begin, end, figure)
     if fov is not None if is_run else stretch != RunPicture():
@@ -62,6 +75,11 @@ def show(
         target = _draw_run(what, out, stretch)
     elif what is not None and what.is_dir():
         raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
+    elif what is not None and not what.exists() and what.parent != Path():
+        raise RunDirectoryError(
+            f"there is no {what}: give the directory of a run (what --out named), a floor plan's"
+            " file, synthetic:SEED, or family_home"
+        )
     else:
         target = _draw_floorplan(what, out, fov, resolution)
     typer.echo(target)

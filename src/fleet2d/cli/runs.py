@@ -1,4 +1,4 @@
-"""Commands that run, and what they say: run, reproduce, export."""
+"""Commands that run, and what they report: run, export."""
 
 import gc
 import json
@@ -51,15 +51,7 @@ def run(
                 directory.rmdir()
                 directory.parent.rmdir()  # if it was the first run here
         raise
-    try:
-        stored = _run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
-    except KeyboardInterrupt:
-        typer.echo(
-            f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
-            f" {simulation.directory}",
-            err=True,
-        )
-        raise typer.Exit(130) from None
+    stored = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
     summary = summary_of(stored)
     if as_json:
         typer.echo(json.dumps(summary))
@@ -99,22 +91,6 @@ def export(
         typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
 
 
-def reproduce(
-    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-) -> None:
-    """Run a stored run again from its manifest, and compare."""
-    from fleet2d.engine.run import reproduce as run_again
-
-    result = run_again(directory)
-    for cause in result.causes:
-        typer.echo(f"note: {cause}")
-    if result.same:
-        typer.echo(f"reproduced: digest {result.digest}")
-        return
-    typer.echo(f"not reproduced: {', '.join(result.differing)} came out different", err=True)
-    raise typer.Exit(1)
-
-
 def _fresh_directory(name: str) -> Path:
     """Make and return runs/NAME-001, or the first number that is free."""
     plain = file_name(name) or "run"
@@ -133,7 +109,24 @@ def _fresh_directory(name: str) -> Path:
             return directory
 
 
-def _run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
+def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
+    """Run to the end, with a bar on stderr if it is to be shown.
+
+    Raises:
+        Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
+    """
+    try:
+        return _run_with_bar(simulation, show=show)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
+            f" {simulation.directory}: go on by `fleet2d resume {simulation.directory}`",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+
+
+def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
     gc.freeze()  # what is loaded lives to the end: the collector need not go through it every time
     if not show:
         return simulation.run()

@@ -63,7 +63,7 @@ class FloorPlan:
     name: str
     source: str
     lattice: Lattice
-    polygons: list[Polygon]
+    polygons: Sequence[Polygon]
     mesh: Mesh
     free: NDArray[np.bool_]
     room_of_cell: NDArray[np.int16]
@@ -140,7 +140,7 @@ class FloorPlan:
             name=name,
             source=source,
             lattice=lattice,
-            polygons=polygons,
+            polygons=tuple(polygons),
             mesh=mesh,
             free=cells,
             room_of_cell=room_of_cell,
