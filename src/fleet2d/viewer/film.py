@@ -68,17 +68,22 @@ def write_film(
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
         frames = _frames(stage, first, moments, on_progress)
-        unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
-        try:
-            write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
-            write(unfinished, frames, total, rate)
-            unfinished.replace(path)
-        except OSError as error:
-            raise InputError(f"{path} can't be written: {error.strerror or error}") from error
-        finally:
-            with suppress(OSError):
-                unfinished.unlink(missing_ok=True)
+        _store(path, frames, total, rate)
     return len(moments)
+
+
+def _store(path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction) -> None:
+    """Write a film under another name, and give it its own once it is whole."""
+    unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
+    write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
+    try:
+        write(unfinished, frames, total, rate)
+        unfinished.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} can't be written: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
 
 
 def _check(path: Path, speed: float, height: int) -> None:
