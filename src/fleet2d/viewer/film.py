@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
 from fleet2d.view.floorplan import drawing_style, figure_size
 from fleet2d.viewer.stage import Stage
+from fleet2d.viewer.words import Words
 
 ENDINGS = (".mp4", ".gif", ".webp")
 MOST_FRAMES_A_S = 25
@@ -66,17 +68,22 @@ def write_film(
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
         frames = _frames(stage, first, moments, on_progress)
-        unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
-        try:
-            write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
-            write(unfinished, frames, total, rate)
-            unfinished.replace(path)
-        except OSError as error:
-            raise InputError(f"{path} can't be written: {error.strerror or error}") from error
-        finally:
-            with suppress(OSError):
-                unfinished.unlink(missing_ok=True)
+        _store(path, frames, total, rate)
     return len(moments)
+
+
+def _store(path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction) -> None:
+    """Write a film under another name, and give it its own once it is whole."""
+    unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
+    write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
+    try:
+        write(unfinished, frames, total, rate)
+        unfinished.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} can't be written: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
 
 
 def _check(path: Path, speed: float, height: int) -> None:
@@ -115,15 +122,20 @@ def _frames(
         artist.set_animated(True)
     canvas.draw()
     ground = canvas.copy_from_bbox(stage.figure.bbox)
+    width, height = canvas.get_width_height()
+    words = Words(width, height, stage.figure.dpi)
     for done, moment in enumerate(moments.tolist()):
         stage.show(first + moment * stage.every)
         canvas.restore_region(ground)
+        pixels = np.asarray(canvas.buffer_rgba())
         for axes, artist in moving:
-            drawn_on: Any = axes or stage.figure
-            drawn_on.draw_artist(artist)
+            if isinstance(artist, Text):
+                words.paste(artist, pixels)
+            elif axes is not None:
+                axes.draw_artist(artist)
         if on_progress and done % 50 == 0:
             on_progress(done, len(moments))
-        yield moment, np.asarray(canvas.buffer_rgba())
+        yield moment, pixels
 
 
 def _write_mp4(

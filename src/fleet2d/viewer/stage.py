@@ -108,13 +108,7 @@ class Stage:
         self._sightings = LineCollection([], lw=1.0, ls=(0, (2, 1.5)), color=VIEW_EDGE, zorder=3.6)
         for lines in (self._ways, self._sightings):
             self._axes.add_collection(lines, autolim=False)
-        write = axes.text if self._strip is None else self.figure.text
-        style: dict[str, Any] = {"va": "top"}
-        if self._strip is None:
-            style = {"va": "bottom", "transform": axes.transAxes}
-        high = 1.0 if self._strip is None else 0.975
-        self._clock = write(0.02, high, "", fontsize=13, weight="bold", color=TEXT_COLOR, **style)
-        self._aside = write(0.98, high, "", fontsize=9, color=QUIET_COLOR, ha="right", **style)
+        self._clock, self._aside = self._write_head(axes)
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
         self._seen = _Observations(self._part)
 
@@ -161,6 +155,16 @@ class Stage:
         changed[1:] |= minute[1:] != minute[:-1]
         changed[0] = True
         return changed
+
+    def _write_head(self, axes: Axes) -> tuple[Any, Any]:
+        """Return the texts above the plan: the clock, and who is away."""
+        write, style, high = self.figure.text, dict[str, Any](va="top"), 0.975
+        if self._strip is None:
+            write, high = axes.text, 1.0
+            style = {"va": "bottom", "transform": axes.transAxes}
+        clock = write(0.02, high, "", fontsize=13, weight="bold", color=TEXT_COLOR, **style)
+        aside = write(0.98, high, "", fontsize=9, color=QUIET_COLOR, ha="right", **style)
+        return clock, aside
 
     def _fill_strip(self, strip: Axes) -> Any:
         """Draw the strip; return its cursor."""
