@@ -14,7 +14,6 @@ fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
 fitting.callback()(lambda: None)
 
 
-
 @fitting.command()
 def routine(
     log: Annotated[Path, typer.Argument(help="A log of rooms and activities, or its folder.")],

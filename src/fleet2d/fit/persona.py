@@ -53,8 +53,8 @@ def fit_persona(
 
     Of model `laws`: what is done once on most days at about the same time becomes a task with the
     mean and spread of its beginning, the measured law of its duration and the share of days that
-    have it. All else fills the rest: per three hours of the day a weighted choice, with the measured durations of
-    what began in them. Getting up at night becomes the fetching of sleep.
+    have it. All else fills the rest: per three hours of the day a weighted choice, with the
+    measured durations of what began in them. Getting up at night becomes the fetching of sleep.
 
     Raises:
         LogError: There are no days to fit.

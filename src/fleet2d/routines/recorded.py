@@ -150,9 +150,7 @@ def draw_recorded(kept: Recording, first: int, draws: Draws, next_wake: int) -> 
     return _joined(result)
 
 
-def _elsewhere(
-    kept: Recording, activity: str, now: int, draws: Draws
-) -> tuple[int, int] | None:
+def _elsewhere(kept: Recording, activity: str, now: int, draws: Draws) -> tuple[int, int] | None:
     """Draw where else an activity was over at about that time, if anywhere."""
     times, where = kept.endings[activity]
     low, high = bisect_left(times, now - REACH_S), bisect_right(times, now + REACH_S)
