@@ -4,7 +4,9 @@ import inspect
 from collections.abc import Iterator
 from pathlib import Path
 
+from fleet2d.artifacts.manifest import Manifest, file_record, is_regular
 from fleet2d.component import Component
+from fleet2d.errors import RunDirectoryError
 from fleet2d.scenario.model import Scenario
 
 
@@ -23,6 +25,29 @@ def input_files(scenario: Scenario) -> list[Path]:
             if source:
                 files.add(Path(source))
     return sorted(files)
+
+
+def changed_inputs(manifest: Manifest) -> list[str]:
+    """Return the files that a run read and that hold something else now.
+
+    Raises:
+        RunDirectoryError: One is gone, or is no file.
+    """
+    changed = []
+    for record in manifest.inputs:
+        path = Path(record.path)
+        try:
+            if not is_regular(path):
+                raise RunDirectoryError(
+                    f"the run read {path}, which is no file now: put the file back"
+                )
+            if file_record(path)["sha256"] != record.sha256:
+                changed.append(record.path)
+        except (OSError, ValueError) as error:
+            raise RunDirectoryError(
+                f"the run read {path}, which is gone or can't be read: put it back"
+            ) from error
+    return changed
 
 
 def _components(scenario: Scenario) -> Iterator[Component]:

@@ -13,10 +13,12 @@ from typing import Any, BinaryIO, Self
 from pydantic import ValidationError
 
 from fleet2d.algorithms.algorithm import Algorithm
+from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.reader import LEARNED_NAME, Run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock, next_time
+from fleet2d.engine.checkpoint import Checkpoint, Keeper
 from fleet2d.engine.interventions import (
     Change,
     Decide,
@@ -30,12 +32,19 @@ from fleet2d.engine.keeping import (
     deferred_interrupt,
     describe_end,
     describe_start,
+    keep_plan,
     open_store,
 )
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.phases import PHASES, Span
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import copy_state, open_snapshot, read_state, write_snapshot
+from fleet2d.engine.snapshot import (
+    Constants,
+    copy_state,
+    open_snapshot,
+    read_state,
+    write_snapshot,
+)
 from fleet2d.engine.state import State
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
@@ -93,12 +102,24 @@ class Simulation:
                 Nothing is written then.
         """
         began = time.perf_counter()
-        self.scenario = load_scenario(scenario, *overrides, **settings)
-        simulation = self.scenario.simulation
+        loaded = load_scenario(scenario, *overrides, **settings)
+        store = RunStore(out)
+        store.check()
+        self._prepare(loaded, store, interventions)
+        open_store(self._store, self.home.plan)
+        self._setup_s = time.perf_counter() - began
+
+    def _prepare(
+        self,
+        scenario: Scenario,
+        store: RunStore,
+        interventions: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        """Set up everything but the directory."""
+        self.scenario, simulation = scenario, scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
-        self._store = RunStore(out)
-        self._store.check()
+        self._store = store
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         for intervention in interventions:
             self._state.intervene(read_intervention(intervention))
@@ -106,9 +127,54 @@ class Simulation:
         self._stopping = self._broken = False
         self._run: Run | None = None  # once it is finished
         describe_start(self._store.manifest, self.scenario, self.seed, self.clock, self.home.plan)
-        open_store(self._store, self.home.plan)
-        self._setup_s = time.perf_counter() - began
-        self._simulate_s = self._save_s = 0.0
+        store.manifest.interventions = [*map(dict, interventions)]
+        self._keeper: Keeper | None = None
+        if store.directory is not None:
+            settings = scenario.artifacts
+            self._keeper = Keeper(store, settings, self.clock, self._checkpoint_header)
+        self._setup_s = self._simulate_s = self._save_s = 0.0
+        self._began: float | None = None  # while it simulates
+
+    @classmethod
+    def reopened(
+        cls, scenario: Scenario, store: RunStore, ledger: Ledger, checkpoint: Checkpoint | None
+    ) -> Self:
+        """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
+
+        Args:
+            scenario: Of the run.
+            store: Of its directory, not opened.
+            ledger: What the run wrote there, locked.
+            checkpoint: Where to go on; None begins anew.
+
+        Raises:
+            UnusableCheckpointError: The checkpoint can't be read; nothing is written then.
+            ArtifactError: The journal is damaged, or the directory can't be written.
+        """
+        began = time.perf_counter()
+        run = cls.__new__(cls)
+        run._prepare(scenario, store)
+        if checkpoint is None:
+            store.reopen(ledger, None)
+            keep_plan(store, run.home.plan)
+            run._setup_s = time.perf_counter() - began
+            return run
+        state = checkpoint.read(run._constants)
+        store.manifest = checkpoint.manifest
+        store.manifest.resumed.append(checkpoint.commit.step)
+        store.reopen(ledger, checkpoint.commit)
+        run._take(state)
+        run._setup_s, run._simulate_s, run._save_s = checkpoint.wall_s
+        assert run._keeper is not None
+        run._keeper.resume(run.step)
+        return run
+
+    def catch_up(self, interventions: Sequence[Mapping[str, Any]]) -> None:
+        """Let be done again what was done to the run after its checkpoint."""
+        known = [*self._state.done, *self._state.script]
+        for intervention in map(read_intervention, interventions):
+            if intervention not in known:
+                self._state.intervene(intervention)
 
     # Copies
 
@@ -181,11 +247,15 @@ class Simulation:
         self._state, self._store = state, state.store
 
     def _header(self) -> dict[str, Any]:
+        under_way = 0.0 if self._began is None else time.perf_counter() - self._began
         return {
             "scenario": self.scenario.resolved(),
             "seed": self.seed,
-            "wall_s": [self._setup_s, self._simulate_s, self._save_s],
+            "wall_s": [self._setup_s, self._simulate_s + under_way, self._save_s],
         }
+
+    def _checkpoint_header(self) -> tuple[Constants, dict[str, Any]]:
+        return self._constants, {**self._header(), "manifest": self._store.manifest.content()}
 
     @property
     def _constants(self) -> dict[str, object]:
@@ -463,6 +533,18 @@ class Simulation:
         """
         return Plan(self._body(name), self.step)
 
+    def decide(self, name: str, plan: Plan) -> None:
+        """Let a driven body follow a plan from the present step on; time does not go on.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+            InputError: The body isn't driven.
+        """
+        row = list(self.actors).index(self._body(name).name)
+        if row not in self._state.driven:
+            raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
+        self._intervene(Decide(step=self.step, entity=name, plan=plan.data()))
+
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""
         missing = [name for name in self.pending() if name not in plans]
@@ -471,10 +553,7 @@ class Simulation:
                 f"advance(): {missing[0]} has to decide now, and there is no plan for it"
             )
         for name, plan in plans.items():
-            row = list(self.actors).index(self._body(name).name)
-            if row not in self._state.driven:
-                raise InputError(f"advance(): {name} isn't driven: call drive({name!r}) first")
-            self._intervene(Decide(step=self.step, entity=name, plan=plan.data()))
+            self.decide(name, plan)
         while not self.done:
             self._run_to(self.clock.steps, spans=1)
             if self.pending():
@@ -520,6 +599,8 @@ class Simulation:
         if status == "complete" and (self._broken or not self.done):
             status = "failed" if self._broken else "interrupted"
         began = time.perf_counter()
+        if status == "interrupted" and self._keeper is not None:
+            self._keeper.checkpoint(self._state)
         # Where a component failed, asking the metrics could fail again, and lose what is stored.
         results: dict[str, Any] = {}
         state = self._state
@@ -569,6 +650,7 @@ class Simulation:
         if self._broken:
             raise InputError("the run broke off in the middle of a span and can't go on")
         began, stored = time.perf_counter(), self._state.recorder.wall_s
+        self._began = began
         self._set_pace()
         # A few steps are over before anybody could press Ctrl-C.
         short = end - self.step < SHORT
@@ -582,6 +664,7 @@ class Simulation:
                 stored = self._state.recorder.wall_s - stored
                 self._simulate_s += time.perf_counter() - began - stored
                 self._save_s += stored
+                self._began = None
         if self._stopping:
             self._stopping = False
             raise KeyboardInterrupt
@@ -594,6 +677,8 @@ class Simulation:
             span = Span(self.step, self._slice(end))
             for phase in PHASES:
                 phase(state, span)
+            if self._keeper is not None:
+                self._keeper.after_span(state)
             if self._pace:
                 self._pace.hold(self.step * self.clock.step_us / 1e6, lambda: self._stopping)
             if on_progress and time.perf_counter() - reported > 0.1:

@@ -82,10 +82,7 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
         return read_valetudo(path, cell)
     if path.suffix.lower() in YAML:
         return read_ros(path, cell)
-    raise FloorPlanError(
-        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
-        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
-    )
+    raise _unknown_format(path)
 
 
 def is_floorplan(plan: str | Path) -> bool:
@@ -103,6 +100,28 @@ def is_floorplan(plan: str | Path) -> bool:
     except FloorPlanError:
         return False
     return _format_of(content) is not None or "image" in content
+
+
+def format_of_file(path: Path) -> str:
+    """Return the `type` of a floor plan in a scenario that reads a file.
+
+    Raises:
+        FloorPlanError: It can't be read, or is no floor plan that Fleet2D knows.
+    """
+    content = read_document(path)
+    kind = _format_of(content)
+    if kind is None and path.suffix.lower() in YAML and "image" in content:
+        return "ros"
+    if kind is None:
+        raise _unknown_format(path)
+    return kind
+
+
+def _unknown_format(path: Path) -> FloorPlanError:
+    return FloorPlanError(
+        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
+        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
+    )
 
 
 def _format_of(content: dict[str, Any]) -> str | None:
