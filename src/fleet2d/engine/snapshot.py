@@ -51,7 +51,7 @@ _KNOWN = {
         "slice",
         "str",
         "tuple",
-    },  # fmt: skip
+    },
     "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
     "copyreg": {"_reconstructor"},
     "datetime": {"date", "datetime", "time", "timedelta"},

@@ -69,10 +69,7 @@ def key_frame_rows(table: Any, first: int, end: int) -> NDArray[np.int64]:
 
 def _known(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a manifest that this version knows."""
-    from dataclasses import fields
-
-    names = {entry.name for entry in fields(Manifest)}
-    return {name: value for name, value in content.items() if name in names}
+    return {name: value for name, value in content.items() if name in Manifest.model_fields}
 
 
 def _cut(run: Run, name: str, first: int, end: int) -> Any:
