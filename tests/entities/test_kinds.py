@@ -40,6 +40,12 @@ def test_a_kind_that_the_home_lacks_is_left_out_with_a_note(
     assert "garage" in notes(content)
 
 
+def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too() -> None:
+    """Six of 1,103 homes refused the bundled scenario, for it avoids bathrooms."""
+    content = robot({"type": "hangout", "avoid": ["storage"]}, start="kitchen")
+    assert "hangout.avoid: left out" in notes(content)
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [

@@ -107,9 +107,13 @@ def matching_rooms(
     hint = f"; did you mean {close[0]!r}?" if close else ""
     if any(name in (thing.name, thing.type) for name in names for thing in objects):
         raise PlacementError(f"{wanted} has no place to use it from that can be reached")
-    kinds = sorted({thing.type for thing in objects if thing.uses})
-    furniture = f" The furniture is: {', '.join(kinds)}." if kinds else ""
     raise PlacementError(
-        f"there is no room {wanted}{hint or '.'} The rooms are: {listed}.{furniture}"
+        f"there is no room {wanted}{hint or '.'} The rooms are: {listed}.{_furniture(objects)}"
         " A list that ends in 'any' works in every home"
     )
+
+
+def _furniture(objects: Sequence[PlacedObject]) -> str:
+    """Return the kinds of furniture that are places, for messages."""
+    kinds = sorted({thing.type for thing in objects if thing.uses})
+    return f" The furniture is: {', '.join(kinds)}." if kinds else ""

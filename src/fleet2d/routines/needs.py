@@ -116,3 +116,19 @@ def activities_of(needs: Mapping[str, Need], errands: Mapping[str, Errand]) -> s
     names = {need.activity or name for name, need in needs.items()}
     names |= {what for need in needs.values() for what in need.then}
     return names | {errand.activity or name for name, errand in errands.items()}
+
+
+def named_activities(
+    needs: Mapping[str, Need], errands: Mapping[str, Errand]
+) -> list[tuple[tuple[str, ...], str]]:
+    """Return every activity that needs and errands name, each with its keys in the persona."""
+    named: list[tuple[tuple[str, ...], str]] = []
+    for name, need in needs.items():
+        named.append((("needs", name), need.activity or name))
+        named += [(("needs", name, "then", what), what) for what in need.then]
+        named += [(("needs", name, "met_by"), what) for what in need.met_by]
+    for name, errand in errands.items():
+        named.append((("errands", name), errand.activity or name))
+        named += [(("errands", name, "after"), what) for what in errand.after]
+        named += [(("errands", name, "before"), what) for what in errand.before]
+    return named

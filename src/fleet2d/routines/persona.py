@@ -25,6 +25,7 @@ from fleet2d.routines.needs import (
     AnyErrand,
     AnyNeed,
     activities_of,
+    named_activities,
     usual_errands,
     usual_needs,
 )
@@ -248,7 +249,8 @@ class Persona(Settings):
                 self._check_activity(pastime, ("days", name, "leisure", pastime))
         for pastime in self.leisure:
             self._check_activity(pastime, ("leisure", pastime))
-        self._check_interruptions()
+        for where, name in named_activities(self.needs, self.errands):
+            self._check_activity(name, where)
         covered = {weekday for day in self.days.values() for weekday in day.weekdays}
         if missing := [WEEKDAYS[i] for i in range(7) if i not in covered]:
             raise problem_at(
@@ -266,19 +268,6 @@ class Persona(Settings):
     def body(self) -> Body:
         """What the planner uses of its needs and errands."""
         return body_of(self.needs, self.errands, {**catalogue(), **self.activities})
-
-    def _check_interruptions(self) -> None:
-        for name, need in self.needs.items():
-            self._check_activity(need.activity or name, ("needs", name))
-            for what in need.then:
-                self._check_activity(what, ("needs", name, "then", what))
-            for what in need.met_by:
-                self._check_activity(what, ("needs", name, "met_by"))
-        for name, errand in self.errands.items():
-            self._check_activity(errand.activity or name, ("errands", name))
-            for key, names in (("after", errand.after), ("before", errand.before)):
-                for what in names:
-                    self._check_activity(what, ("errands", name, key))
 
     def _check_activity(self, name: str, where: tuple[str, ...]) -> None:
         try:
