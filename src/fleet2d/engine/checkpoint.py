@@ -158,10 +158,11 @@ class Keeper:
 
     def checkpoint(self, state: State) -> None:
         """Write the state of the run, and the rows until then, so that it can be gone on with."""
-        began = time.monotonic()
+        first = time.monotonic()
         if self._every:
             self._next_step = (state.bodies.step // self._every + 1) * self._every
         commit = self.commit(state, sync=self.is_able)
+        began = time.monotonic()
         if self.is_able:
             constants, header = self._describe()
             content = io.BytesIO()
@@ -176,7 +177,7 @@ class Keeper:
                 self._store.keep_checkpoint(content.getvalue())
         now = time.monotonic()
         state.recorder.wall_s += now - began
-        self._next_checkpoint = now + max(CHECKPOINT_S, SHARE * (now - began))
+        self._next_checkpoint = now + max(CHECKPOINT_S, SHARE * (now - first))
 
     def _keep_interventions(self, state: State) -> None:
         """Let the manifest name what was done to the run so far."""
