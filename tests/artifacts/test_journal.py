@@ -58,7 +58,7 @@ def killed(store: RunStore) -> Path:
         (np.arange(3), True, RAW),
         (np.zeros(0, np.int32), False, RAW),
         (np.ones(1000, bool), False, RUNS),
-        (np.array([-(2**63), 2**63 - 1] * 50), True, RAW),
+        (np.array([-(2**63), 2**63 - 1, 5] * 500), True, RAW),
     ],
 )
 def test_arrays_come_back_to_the_last_bit(values: Any, ramps: bool, how: str) -> None:

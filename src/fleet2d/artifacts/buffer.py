@@ -164,7 +164,8 @@ class TableBuffer:
         if not column.nullable:
             return ColumnChunk(kept)
         valid = self._valid[column.name][start : self.rows]
-        kept[~valid] = 0
+        if not valid.all():
+            kept[~valid] = 0
         return ColumnChunk(kept, valid)
 
     def _make_room(self, rows: int) -> None:
