@@ -142,6 +142,12 @@ class TableBuffer:
                 self._values[column.name] = []
         return chunk
 
+    def learn_words(self, words: Mapping[str, Words]) -> None:
+        """Enter words in the order of their codes, before rows are encoded that hold them."""
+        for name, known in words.items():
+            for word in known.listed():
+                self.words[name][word]  # looking a new word up enters it
+
     def peek(self, start: int = 0) -> Chunk:
         """Return the rows from `start` on, which stay here; arrays are not copied."""
         return {column.name: self._rows_of(column, start) for column in self.spec.columns}
@@ -158,7 +164,8 @@ class TableBuffer:
         if not column.nullable:
             return ColumnChunk(kept)
         valid = self._valid[column.name][start : self.rows]
-        kept[~valid] = 0
+        if not valid.all():
+            kept[~valid] = 0
         return ColumnChunk(kept, valid)
 
     def _make_room(self, rows: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ Encoded = tuple[str, int, list[bytes]]
 """How the values are kept, how many runs there are, and the bytes."""
 
 # Fewer values than this aren't worth looking at.
-_FEW = 64
+_FEW = 256
 _BITS = {1: np.uint8, 2: np.uint16, 4: np.uint32, 8: np.uint64}
 
 
@@ -29,14 +30,14 @@ def encode(values: NDArray[Any], *, ramps: bool = False) -> Encoded:
         >>> kept[:2], sum(map(len, kept[2])), decode(kept, np.dtype(np.int64), 1000).sum()
         (('runs', 1), 12, np.int64(7000))
     """
-    values = np.ascontiguousarray(values)
     if len(values) >= _FEW and values.dtype != np.uint8:  # text
-        looked_at = np.diff(values) if ramps else values
+        looked_at = values[1:] - values[:-1] if ramps else values
         bits = looked_at.view(_BITS[values.itemsize])
-        starts = np.flatnonzero(bits[1:] != bits[:-1]) + 1
-        if 4 * len(starts) < len(values):
-            starts = np.concatenate([[0], starts])
-            lengths = np.diff(starts, append=len(looked_at)).astype(np.uint32)
+        changes = (bits[1:] != bits[:-1]).nonzero()[0]
+        if 4 * len(changes) < len(values):
+            starts = np.empty(len(changes) + 2, np.int64)
+            starts[0], starts[1:-1], starts[-1] = 0, changes + 1, len(looked_at)
+            lengths, starts = (starts[1:] - starts[:-1]).astype(np.uint32), starts[:-1]
             first = [_bytes(values[:1])] if ramps else []
             parts = [*first, _bytes(looked_at[starts]), _bytes(lengths)]
             return (RAMPS if ramps else RUNS), len(starts), parts
@@ -77,4 +78,6 @@ def decode(kept: Encoded, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
 
 
 def _bytes(values: NDArray[Any]) -> bytes:
-    return values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+    if sys.byteorder == "big":
+        values = values.byteswap()
+    return values.tobytes()

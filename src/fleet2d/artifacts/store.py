@@ -160,6 +160,7 @@ class RunStore:
             for entry in ledger.go_on(commit):
                 self.add_table(entry.spec)
                 table = self._tables[entry.spec.name]
+                table.buffer.learn_words(entry.words)
                 self._fill(table, table.buffer.check(columns_of(entry)), log=False)
 
     def keep(self, name: str, content: str) -> None:

@@ -21,9 +21,10 @@ from fleet2d.units import micros
 DAY_US = 86_400_000_000
 # Rows are committed at least this often [s of wall time], and every simulated day.
 COMMIT_S = 2.0
-# `auto`: a checkpoint is written this often [s] at most, and so rarely that it takes a fortieth of
-# the time.
-CHECKPOINT_S = 10.0
+# `auto`: a checkpoint is written after so much computing [s], or so much time [s] where a run is
+# held at a pace, and so rarely that it takes a fortieth of the computing.
+COMPUTING_S = 10.0
+WAITING_S = 60.0
 SHARE = 40
 
 
@@ -108,19 +109,16 @@ class Keeper:
         every = settings.checkpoint
         self._every = max(1, micros(every) // clock.step_us) if isinstance(every, timedelta) else 0
         self.is_able = every != "off"
-        self._next_step = 0
-        self._begin(0)
+        self.resume(0)
 
-    def _begin(self, step: int) -> None:
+    def resume(self, step: int) -> None:
         """Count from a step on."""
         now = time.monotonic()
         self._next_day = (step // self._day + 1) * self._day
         self._next_commit = now + COMMIT_S
-        self._next_checkpoint = now + CHECKPOINT_S
+        self._next_checkpoint = (time.process_time() + COMPUTING_S, now + WAITING_S)
         self._next_step = (step // self._every + 1) * self._every if self._every else 0
         self._check_at = min(self._next_day, self._next_step) if self._every else self._next_day
-
-    resume = _begin
 
     def after_span(self, state: State) -> None:
         """Commit, and write a checkpoint, if it is time.
@@ -131,8 +129,11 @@ class Keeper:
         step = state.bodies.step
         if step < self._check_at and time.monotonic() < self._next_commit:
             return
-        wanted = self._every and step >= self._next_step
-        if wanted or (not self._every and time.monotonic() >= self._next_checkpoint):
+        wanted = step >= self._next_step
+        if not self._every:
+            computing, waiting = self._next_checkpoint
+            wanted = time.process_time() >= computing or time.monotonic() >= waiting
+        if wanted and self.is_able:
             self.checkpoint(state)
         else:
             self.commit(state)
@@ -158,10 +159,11 @@ class Keeper:
 
     def checkpoint(self, state: State) -> None:
         """Write the state of the run, and the rows until then, so that it can be gone on with."""
-        began = time.monotonic()
+        computed = time.process_time()
         if self._every:
             self._next_step = (state.bodies.step // self._every + 1) * self._every
         commit = self.commit(state, sync=self.is_able)
+        began = time.perf_counter()
         if self.is_able:
             constants, header = self._describe()
             content = io.BytesIO()
@@ -174,9 +176,12 @@ class Keeper:
                 )
             else:
                 self._store.keep_checkpoint(content.getvalue())
-        now = time.monotonic()
-        state.recorder.wall_s += now - began
-        self._next_checkpoint = now + max(CHECKPOINT_S, SHARE * (now - began))
+        state.recorder.wall_s += time.perf_counter() - began
+        now = time.process_time()
+        self._next_checkpoint = (
+            now + max(COMPUTING_S, SHARE * (now - computed)),
+            time.monotonic() + WAITING_S,
+        )
 
     def _keep_interventions(self, state: State) -> None:
         """Let the manifest name what was done to the run so far."""

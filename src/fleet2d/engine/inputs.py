@@ -16,7 +16,7 @@ def input_files(scenario: Scenario) -> list[Path]:
     A component says by `files` what it reads; the paths among its fields are noted anyway.
     """
     files: set[Path] = set()
-    for component in _components(scenario):
+    for component in components_of(scenario):
         reads = getattr(component, "files", None)
         files |= set(reads()) if reads else set()
         files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}
@@ -50,7 +50,8 @@ def changed_inputs(manifest: Manifest) -> list[str]:
     return changed
 
 
-def _components(scenario: Scenario) -> Iterator[Component]:
+def components_of(scenario: Scenario) -> Iterator[Component]:
+    """Yield all components of a scenario, and those within others."""
     outer: list[Component] = [scenario.floorplan, scenario.sight.method]
     for entity in (*scenario.users.values(), *scenario.robots.values()):
         outer += entity.behaviors
