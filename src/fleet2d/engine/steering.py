@@ -115,7 +115,8 @@ class Steering(ABC):
             KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
 
         Example:
-            >>> simulation = Simulation(None, "simulation.duration=1 h", seed=4)
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 h", seed=4)
             >>> simulation.drive("astro")
             >>> while simulation.pending():
             ...     plan = simulation.plan("astro").go_to("kitchen").stay(timedelta(minutes=20))
@@ -156,7 +157,8 @@ class Steering(ABC):
             KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
 
         Example:
-            >>> simulation = Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
             >>> simulation.run_until("19:00")
             >>> simulation.time.hour
             19
@@ -264,7 +266,8 @@ class Steering(ABC):
             PlacementError: There is no such place, or its body doesn't fit there.
 
         Example:
-            >>> simulation = Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
             >>> simulation.put("ana", "kitchen")
             >>> simulation.advance()
             >>> simulation.state["ana"]["room"].startswith("kitchen")
