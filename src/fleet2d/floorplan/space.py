@@ -226,7 +226,7 @@ class Space:
 
 
 def _shrunk(
-    polygons: list[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
+    polygons: Sequence[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
 ) -> list[Polygon]:
     """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side.
 
@@ -278,8 +278,6 @@ def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]
 
 def _even_at_least(value: float) -> int:
     return 2 * int(np.ceil(value / 2))
-
-
 
 
 def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:

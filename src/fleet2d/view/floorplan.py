@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
@@ -251,7 +252,7 @@ def _spread(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
     return grown[1:-1, 1:-1]
 
 
-def _outline(plan: FloorPlan, polygons: list[shapely.Polygon]) -> Outline:
+def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
     """Return polygons [lattice] as one path [m]."""
     parts = []
     for polygon in polygons:
