@@ -192,7 +192,7 @@ void trace_meander(const Mesh& walls, const Mesh& space, const WalkRule& rule, i
         // A stride is in 1/256 lattice units and a cosine in 2**-30; rounded to nearest.
         const i64 dx = (rule.stride * cosine(ahead) + (i64{1} << 37)) >> 38;
         const i64 dy = (rule.stride * sine(ahead) + (i64{1} << 37)) >> 38;
-        if (body.go({body.at.x + dx, body.at.y + dy})) {
+        if (body.go({body.at.x + dx, body.at.y + dy}) || rule.stays != 0) {
             heading = ahead;
         } else {
             const u64 choices = static_cast<u64>(2 * rule.turn_limit + 1);

@@ -66,6 +66,7 @@ struct WalkRule {
     i64 stride;      // 1/256 lattice units forward
     i64 sway;        // standard deviation of the turn, in 2**-16 headings per unit of random_bell
     i64 turn_limit;  // headings, half a turn at most
+    i64 stays;       // 1: where a wall is in the way it only sways, as the published Fleet2D does
 };
 
 // Walk at random from `start` and `heading`, where the body is at step `first`; out[j] is the pose at

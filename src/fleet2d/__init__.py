@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run as Run
     from fleet2d.artifacts.reader import open_run as open_run
     from fleet2d.component import register as register
-    from fleet2d.engine.run import reproduce as reproduce
+    from fleet2d.engine.reproduce import reproduce as reproduce
+    from fleet2d.engine.resume import resume as resume
     from fleet2d.engine.run import run as run
     from fleet2d.engine.simulation import Simulation as Simulation
     from fleet2d.entities.actor import Actor as Actor
@@ -35,6 +36,10 @@ if TYPE_CHECKING:
     from fleet2d.scenario.model import load_scenario as load_scenario
     from fleet2d.sight.fov import FieldOfView as FieldOfView
     from fleet2d.sight.region import VisibleRegion as VisibleRegion
+    from fleet2d.studies.api import map_runs as map_runs
+    from fleet2d.studies.api import study as study
+    from fleet2d.studies.reader import Study as Study
+    from fleet2d.studies.reader import open_study as open_study
     from fleet2d.units import Duration as Duration
     from fleet2d.units import Length as Length
     from fleet2d.units import Share as Share
@@ -66,13 +71,18 @@ _HOME_OF = {
     "Share": "units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
+    "Study": "studies.reader",
     "VisibleRegion": "sight.region",
     "load_floorplan": "floorplan.load",
     "load_scenario": "scenario.model",
+    "map_runs": "studies.api",
     "open_run": "artifacts.reader",
+    "open_study": "studies.reader",
     "register": "component",
-    "reproduce": "engine.run",
+    "reproduce": "engine.reproduce",
+    "resume": "engine.resume",
     "run": "engine.run",
+    "study": "studies.api",
 }
 
 __all__ = sorted([*_HOME_OF, "__version__"])

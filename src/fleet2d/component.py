@@ -186,7 +186,7 @@ def lookup(kind: str, name: str) -> type[Component]:
     if (found := _registered(kind, name)) is not None:
         return found
     for entry in entry_points(group=f"fleet2d.{kind}", name=name):
-        cls = _checked(kind, name, import_class(entry.value))
+        cls = _checked(kind, name, import_class(entry.value, is_plugin=True))
         cls.type_name = name
         return cls
     known = sorted(components(kind))

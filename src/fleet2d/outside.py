@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,9 +15,13 @@ from typing import Any
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean
+from fleet2d.trust import check_trust
 
 _PREFIX = "fleet2d_scenario_"
 _FOLDERS: dict[str, Path] = {}  # the package that stands for a scenario's folder -> the folder
+
+
+_FOLDERS_BY_PATH: dict[Path, str] = {}
 
 
 class BrokenModule(ScenarioError):
@@ -46,8 +51,12 @@ def importable(folder: Path) -> Iterator[None]:
                 del sys.modules[name]
 
 
-def import_class(name: str) -> object:
+def import_class(name: str, *, is_plugin: bool = False) -> object:
     """Import what 'folder/package.module:Class' names, or 'folder/module.py:Class'.
+
+    Args:
+        name: The class.
+        is_plugin: Whether an installed package declares it, so that its user wants it.
 
     Raises:
         BrokenModule: the module fails while it is imported.
@@ -58,6 +67,8 @@ def import_class(name: str) -> object:
     folder = (folder_of(name) / (written + slash)).resolve()
     if not all(part.isidentifier() for part in (*module_name.split("."), *qualname.split("."))):
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
+    if not is_plugin:
+        check_trust(name, files_of(folder, module_name))
     try:
         module = _import_module(folder, module_name)
     except Exception as error:  # whatever the user's module does while it is imported
@@ -124,6 +135,27 @@ def _shown(file: str, folder: Path) -> str:
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else file
 
 
+def files_of(folder: Path, name: str) -> list[Path]:
+    """Return the files that importing a module would run and that aren't loaded yet.
+
+    A module that is in no folder and isn't installed is given by the file that it would be.
+    """
+    parts = name.split(".")
+    file = folder.joinpath(*parts).with_suffix(".py")
+    package = file.with_suffix("") / "__init__.py"
+    if not (file.is_file() or package.is_file()):
+        if parts[0] == "fleet2d" or name in sys.modules:
+            return []
+        installed = PathFinder.find_spec(parts[0], sys.path)
+        origin = installed.origin if installed else None
+        return [Path(origin) if origin else file]
+    for loaded in (name, f"{_FOLDERS_BY_PATH.get(folder)}.{name}"):
+        if getattr(sys.modules.get(loaded), "__file__", None) in (str(file), str(package)):
+            return []
+    around = [folder.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts))]
+    return [*(path for path in around if path.is_file()), file if file.is_file() else package]
+
+
 def _import_module(folder: Path, name: str) -> ModuleType:
     """Import a module from ``folder`` under a name of its own, else as an installed one."""
     file = folder.joinpath(*name.split(".")).with_suffix(".py")
@@ -144,7 +176,7 @@ def _folder_package(folder: Path) -> str:
         package = ModuleType(name)
         package.__path__ = [str(folder)]
         sys.modules[name] = package
-        _FOLDERS[name] = folder
+        _FOLDERS[name], _FOLDERS_BY_PATH[folder] = folder, name
     return name
 
 

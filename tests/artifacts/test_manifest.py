@@ -65,7 +65,7 @@ def test_plain_has_words_for_what_models_hold() -> None:
         ("[]", "does not say its format"),
         ("{}", "does not say its format"),
         ('{"format": 1, "status": "complete"}', "lacks digest"),
-        ('{"format": 2}', "written by a later Fleet2D"),
+        ('{"format": 99}', "written by a later Fleet2D"),
         ("\x00\xff", "is damaged"),
     ],
 )

@@ -235,7 +235,7 @@ def test_disk_full_marks_the_run_as_failed(tmp_path: Path, monkeypatch: pytest.M
         store.append("poses", step=np.arange(20), x=0.0)
     with pytest.raises(ArtifactError, match="the disk is full"):
         store.close()
-    expected = ["manifest.json", "noise.parquet.partial", "poses.parquet.partial"]
+    expected = ["manifest.json", "noise.parquet.partial", "poses.parquet.partial", "unfinished"]
     assert expected == names_in(tmp_path / "run")
     run = open_run(tmp_path / "run")
     assert "failed" == run.status
@@ -263,7 +263,7 @@ def test_disk_really_full(tiny_disk: Path) -> None:
 
     with pytest.raises(ArtifactError, match=r"the disk is full.*and marked as failed"):
         store.append("noise", x=noise)
-    assert ["manifest.json", "noise.parquet.partial"] == names_in(tiny_disk / "run")
+    assert ["manifest.json", "noise.parquet.partial", "unfinished"] == names_in(tiny_disk / "run")
     run = open_run(tiny_disk / "run")
     assert "failed" == run.status
     assert [] == list(run.tables)

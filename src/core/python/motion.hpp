@@ -25,7 +25,7 @@ template <>
 struct border::Fields<WalkRule> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
     static constexpr auto members =
-        std::tuple(&WalkRule::key, &WalkRule::stride, &WalkRule::sway, &WalkRule::turn_limit);
+        std::tuple(&WalkRule::key, &WalkRule::stride, &WalkRule::sway, &WalkRule::turn_limit, &WalkRule::stays);
 };
 
 }  // namespace fleet2d

@@ -13,12 +13,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from fleet2d.artifacts import files
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, empty_chunk
+from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.errors import ArtifactError
-
-PARTIAL = ".partial"
-"""What the name of a file ends in until the file is whole."""
 
 # Bytes of text in one array: Arrow counts them by 32 bits.
 MOST_TEXT = 2**31 - 1
@@ -241,14 +240,14 @@ class ParquetTable:
         self._writer.close()
         handle = os.open(self.partial, os.O_RDWR)
         try:
-            os.fsync(handle)
+            files.sync(handle)
         finally:
             os.close(handle)
 
     def publish(self) -> None:
         """Give the finished file its name."""
         if not self._is_published:
-            self.partial.replace(self.path)
+            files.replace(self.path, self.partial)
             self._is_published = True
 
     def abandon(self) -> None:

@@ -132,7 +132,7 @@ class TableBuffer:
             reuse: The caller is done with the arrays before the next append, so the same memory
                 may collect the next rows.
         """
-        chunk = {column.name: self._taken(column) for column in self.spec.columns}
+        chunk = self.peek()
         self.rows = 0
         if not reuse:
             self._needed = max(self._needed, self._capacity)  # likely needed again
@@ -142,19 +142,30 @@ class TableBuffer:
                 self._values[column.name] = []
         return chunk
 
-    def _taken(self, column: Column) -> ColumnChunk:
-        """Encode what one column holds."""
-        if not self.rows:
+    def learn_words(self, words: Mapping[str, Words]) -> None:
+        """Enter words in the order of their codes, before rows are encoded that hold them."""
+        for name, known in words.items():
+            for word in known.listed():
+                self.words[name][word]  # looking a new word up enters it
+
+    def peek(self, start: int = 0) -> Chunk:
+        """Return the rows from `start` on, which stay here; arrays are not copied."""
+        return {column.name: self._rows_of(column, start) for column in self.spec.columns}
+
+    def _rows_of(self, column: Column, start: int) -> ColumnChunk:
+        """Encode what one column holds from row `start` on."""
+        if self.rows <= start:
             return empty_chunk(column)
-        kept = self._values[column.name][: self.rows]
+        kept = self._values[column.name][start : self.rows]
         if column.kind == "string":
             return encode_strings(kept, column.nullable)
         if column.is_growing:
             return encode_words(kept, self.words[column.name], column.nullable)
         if not column.nullable:
             return ColumnChunk(kept)
-        valid = self._valid[column.name][: self.rows]
-        kept[~valid] = 0
+        valid = self._valid[column.name][start : self.rows]
+        if not valid.all():
+            kept[~valid] = 0
         return ColumnChunk(kept, valid)
 
     def _make_room(self, rows: int) -> None:

@@ -71,17 +71,6 @@ def remove_directories(made: list[Path]) -> None:
             path.rmdir()
 
 
-def sync_directory(directory: Path) -> None:
-    """See the names in a directory onto the disk, where the system can do that."""
-    if os.name != "posix":
-        return
-    handle = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
 def is_disk_full(error: OSError) -> bool:
     """Whether an error means that nothing more fits on the disk, or in one's share of it."""
     return error.errno in _FULL

@@ -7,27 +7,107 @@ import hashlib
 import json
 import math
 import os
+import stat
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from fleet2d.artifacts.files import write_atomically
+from fleet2d.artifacts.strict_json import read_json
+from fleet2d.artifacts.table import Kind
 from fleet2d.errors import RunDirectoryError
+from fleet2d.problems import did_you_mean
 
-FORMAT = 1
+FORMAT = 2
 """Version of the run directory's layout; a reader refuses a later one."""
 
 FILE_NAME = "manifest.json"
 
+# Problems of one manifest that a message names.
+_MOST_TOLD = 5
+# Characters of a wrong value that a message shows.
+_MOST_SHOWN = 60
+
 Status = Literal["running", "complete", "interrupted", "failed"]
 
 
-@dataclass
-class Manifest:
-    """What `manifest.json` holds.
+def _moment(text: str) -> str:
+    """Refuse what is no local time."""
+    if text:
+        dt.datetime.fromisoformat(text)
+    return text
+
+
+Count = Annotated[int, Field(ge=0, lt=2**62)]
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+# A table's name is its file's: nothing that leads out of the directory.
+TableName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
+FileName = Annotated[str, Field(pattern=r"^(learned/)?[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
+
+
+class _Record(BaseModel):
+    """A part of a manifest: plain values of the right type, and no others."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class ColumnRecord(_Record):
+    """A column of a table."""
+
+    name: str
+    kind: Kind
+    unit: str = ""
+
+
+class TableRecord(_Record):
+    """A table: its rows, the digest of its content, and its columns in order."""
+
+    rows: Count
+    digest: Sha256 | None = None
+    columns: list[ColumnRecord] = []
+
+
+class InputRecord(_Record):
+    """A file that the run read."""
+
+    path: str
+    sha256: Sha256
+
+
+class FileRecord(_Record):
+    """A file of the run directory."""
+
+    bytes: Count
+    sha256: Sha256
+
+
+class Entities(_Record):
+    """Names of what lives in the home."""
+
+    users: list[str] = []
+    robots: list[str] = []
+
+
+class Seal(_Record):
+    """What the whole run is recognised by; see `fleet2d.artifacts.seal`.
+
+    Attributes:
+        digest: Over all below, in one.
+        fields: SHA-256 of each field of the manifest, or of each part of it.
+        files: Each file of the run directory besides the manifest.
+    """
+
+    digest: Sha256
+    fields: dict[str, Sha256]
+    files: dict[FileName, FileRecord]
+
+
+class Manifest(BaseModel):
+    """What `manifest.json` holds. A field that a later version adds has a default.
 
     Attributes:
         format: Version of the layout of the run directory.
@@ -47,29 +127,44 @@ class Manifest:
         metrics: Summary of the metrics.
         notes: Remarks in plain words.
         interventions: What was done to the run from outside, in order.
+        resumed: The steps at which it was taken up again after it had ended early.
+        seal: What the whole run is recognised by; None until the run is closed, and in format 1.
+
+    Example:
+        >>> Manifest(seed=4).seed
+        4
     """
 
-    format: int = FORMAT
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
     status: Status = "running"
-    scenario: dict[str, Any] = field(default_factory=dict)
-    seed: int | None = None
-    steps: int = 0
-    step_us: int = 0
-    start: str = ""
-    simulated_s: float = 0.0
-    entities: Any = field(default_factory=dict)
-    versions: dict[str, str] = field(default_factory=dict)
-    inputs: list[dict[str, str]] = field(default_factory=list)
-    tables: dict[str, dict[str, Any]] = field(default_factory=dict)
-    digest: str | None = None
-    wall_s: dict[str, float] = field(default_factory=dict)
-    metrics: dict[str, Any] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    interventions: list[dict[str, Any]] = field(default_factory=list)
+    scenario: dict[str, Any] = {}
+    seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    steps: Count = 0
+    step_us: Count = 0
+    start: Annotated[str, AfterValidator(_moment)] = ""
+    simulated_s: Annotated[float, Field(ge=0)] = 0.0
+    entities: Entities = Entities()
+    versions: dict[str, str] = {}
+    inputs: list[InputRecord] = []
+    tables: dict[TableName, TableRecord] = {}
+    digest: Sha256 | None = None
+    wall_s: dict[str, Annotated[float, Field(ge=0)]] = {}
+    metrics: dict[str, Any] = {}
+    notes: list[str] = []
+    interventions: list[dict[str, Any]] = []
+    resumed: list[Count] = []
+    seal: Seal | None = None
+
+    def content(self) -> dict[str, Any]:
+        """Return all of it as plain JSON data."""
+        content: dict[str, Any] = plain(self.model_dump())
+        return content
 
     def to_json(self) -> str:
         """Return the text of the file: sorted keys, no NaN."""
-        return json.dumps(plain(asdict(self)), indent=2, sort_keys=True, allow_nan=False) + "\n"
+        return canonical(self.content())
 
     def write(self, directory: Path) -> None:
         """Replace the manifest of a run directory at one stroke.
@@ -77,56 +172,109 @@ class Manifest:
         Raises:
             OSError: The directory can't be written.
         """
-        partial = directory / f"{FILE_NAME}.partial"
-        with partial.open("w", encoding="utf-8") as file:
-            file.write(self.to_json())
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(directory / FILE_NAME)
+        write_atomically(directory / FILE_NAME, self.to_json().encode())
 
     @classmethod
     def read(cls, directory: Path) -> Manifest:
         """Read the manifest of a run directory.
 
         Raises:
-            RunDirectoryError: There is none, or it can't be understood.
+            RunDirectoryError: There is none, or it can't be understood; what is wrong is named.
         """
-        path = directory / FILE_NAME
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError as error:
-            raise RunDirectoryError(
-                f"{directory} is no run directory, for it has no {FILE_NAME}: "
-                "give the directory that `fleet2d run --out` wrote"
-            ) from error
-        except OSError as error:
-            raise RunDirectoryError(f"{path} can't be read: {error.strerror}") from error
-        except ValueError as error:
-            raise _damaged(path, str(error)) from error
-        return cls._from_content(path, content)
+        return cls.of_content(directory / FILE_NAME, read_content(directory))
 
     @classmethod
-    def _from_content(cls, path: Path, content: Any) -> Manifest:
-        if not isinstance(content, dict) or not isinstance(content.get("format"), int):
+    def of_content(cls, path: Path, content: Any) -> Manifest:
+        """Return the manifest that a file's content is.
+
+        Raises:
+            RunDirectoryError: It is none; what is wrong is named.
+        """
+        if not isinstance(content, dict) or type(content.get("format")) is not int:
             raise _damaged(path, "it does not say its format")
         if content["format"] > FORMAT:
             raise RunDirectoryError(
                 f"{path} was written by a later Fleet2D (format {content['format']}, this one "
                 f"reads up to {FORMAT}): update Fleet2D"
             )
-        names = {entry.name for entry in fields(cls)}
-        content = {"interventions": [], **content}  # runs before it was a field had none
-        missing = sorted(names - content.keys())
+        missing = sorted(_ALWAYS - content.keys())
         if missing:
             raise _damaged(path, f"it lacks {', '.join(missing)}")
-        if not isinstance(content["tables"], dict) or not isinstance(content["notes"], list):
-            raise _damaged(path, "its tables or notes are not what they should be")
-        return cls(**{name: content[name] for name in names})
+        try:
+            return cls.model_validate(content)
+        except ValidationError as error:
+            raise _damaged(path, _problems(error)) from None
+
+
+# What the manifest of every version has.
+_ALWAYS = Manifest.model_fields.keys() - {"interventions", "resumed", "seal"}
+
+
+def read_content(directory: Path) -> Any:
+    """Return the content of a run's manifest as JSON has it.
+
+    Raises:
+        RunDirectoryError: There is none, or it is no JSON.
+    """
+    path = directory / FILE_NAME
+    try:
+        return json_of(path, path.read_bytes() if is_regular(path) else None)
+    except FileNotFoundError as error:
+        raise RunDirectoryError(
+            f"{directory} is no run directory, for it has no {FILE_NAME}: "
+            "give the directory that `fleet2d run --out` wrote"
+        ) from error
+    except OSError as error:
+        raise RunDirectoryError(f"{path} can't be read: {error.strerror}") from error
+
+
+def json_of(path: Path, text: bytes | None) -> Any:
+    """Return the content of a manifest's text.
+
+    Raises:
+        RunDirectoryError: It is no JSON, or no file.
+    """
+    if text is None:
+        raise RunDirectoryError(f"{path} is no file: give the directory of a run")
+    try:
+        return read_json(text)
+    except ValueError as error:
+        raise _damaged(path, str(error)) from error
+
+
+def is_regular(path: Path) -> bool:
+    """Whether a path is a file, behind links or not, and no device, pipe or folder.
+
+    Raises:
+        OSError: There is nothing, or it can't be looked at.
+    """
+    return stat.S_ISREG(path.stat().st_mode)
+
+
+def canonical(content: Any) -> str:
+    """Return the text that a manifest of some content has, and no other."""
+    return json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n"
+
+
+def _problems(error: ValidationError) -> str:
+    """Say what is wrong with which fields."""
+    lines = []
+    for line in error.errors(include_url=False)[:_MOST_TOLD]:
+        where = ".".join(map(str, line["loc"]))
+        if line["type"] == "extra_forbidden":
+            known = Manifest.model_fields if len(line["loc"]) == 1 else ()
+            lines.append(f"{where} is no field of a manifest{did_you_mean(where, known)}"[:200])
+            continue
+        shown = repr(line["input"])
+        shown = shown if len(shown) <= _MOST_SHOWN else f"{shown[:_MOST_SHOWN]}…"
+        lines.append(f"{where}: {line['msg']}, found {shown}"[:300])
+    more = error.error_count() - len(lines)
+    return "; ".join([*lines, *([f"and {more} more"] if more > 0 else [])]).replace(".;", ";")
 
 
 def _damaged(path: Path, reason: str) -> RunDirectoryError:
     return RunDirectoryError(
-        f"{path} is damaged ({reason}): copy the run again from where it was whole, "
+        f"{path} is damaged ({reason.rstrip('.')}): copy the run again from where it was whole, "
         "or run the scenario again"
     )
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.digest import digest_table, digest_tables, run_digest
-from fleet2d.artifacts.manifest import FILE_NAME, Manifest, plain
+from fleet2d.artifacts.files import PARTIAL
+from fleet2d.artifacts.manifest import FILE_NAME, Manifest
+from fleet2d.artifacts.prefix import Prefix
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.leaves import leaf
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,7 +88,7 @@ class Run:
     ) -> None:
         """Read nothing yet; `open_run` and `RunStore.run` make runs."""
         self.directory = directory
-        self.manifest: dict[str, Any] = plain(asdict(manifest))
+        self.manifest: dict[str, Any] = manifest.content()
         self.tables = Tables(names, read)
         self.notes = [*manifest.notes, *notes]
         self._plan: FloorPlan | None = None
@@ -125,7 +127,14 @@ class Run:
             path = Path() if self.directory is None else self.directory / FLOORPLAN_NAME
             if not path.is_file():
                 raise ArtifactError(f"{path} is missing: the run can't be shown in its home")
-            self._plan = read_native(path, self.manifest["scenario"]["floorplan"]["cell"])
+            source = self.manifest["scenario"].get("floorplan")
+            cell = source.get("cell") if isinstance(source, dict) else None
+            if not isinstance(cell, int | float) or isinstance(cell, bool) or not 0 < cell < 10:
+                raise ArtifactError(
+                    f"{self.directory}/{FILE_NAME}: scenario.floorplan.cell should be the size of"
+                    f" a cell [m], found {str(cell)[:60]}"
+                )
+            self._plan = read_native(path, cell)
         return self._plan
 
     @plan.setter
@@ -146,6 +155,38 @@ class Run:
         from fleet2d.engine.rebuild import rebuild_path
 
         return rebuild_path(self, self.plan, entity, every)
+
+    def draw(self, at: str | int | None = None, ax: Any = None) -> Any:
+        """Draw the run, or a moment of it; needs the extra `viz`.
+
+        Args:
+            at: A moment, such as "day 3 18:30", or a step; None for the whole run.
+            ax: Matplotlib axes to draw the moment on (the last one, if `at` is None).
+
+        Returns:
+            A matplotlib figure, or `ax`.
+
+        Raises:
+            InputError: `at` names no moment of the run, or matplotlib is not installed.
+            ArtifactError: The run stored no floor plan or no key frames.
+        """
+        return leaf("viewer.notebook").draw_run(self, at, ax)
+
+    def view(self, height: int = 720) -> Any:
+        """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
+
+        Args:
+            height: Of the widget [pixels].
+
+        Raises:
+            InputError: anywidget is not installed.
+            ArtifactError: The run stored no floor plan.
+        """
+        return leaf("viewer.widget").run_widget(self, height)
+
+    def _repr_html_(self) -> str:
+        """Show the run in a notebook."""
+        return str(leaf("viewer.notebook").run_html(self))
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as Arrow has it.
@@ -227,15 +268,23 @@ def open_run(directory: Path | str) -> Run:
     Raises:
         RunDirectoryError: There is no run in that directory, or its manifest is damaged.
     """
-    from fleet2d.artifacts.arrow import PARTIAL, count_rows, read_parquet
+    from fleet2d.artifacts.arrow import count_rows, read_parquet
 
     root = Path(directory)
     if not root.is_dir():
         what = "is a file" if root.exists() else "does not exist"
         raise RunDirectoryError(f"{root} {what}: give the directory that `fleet2d run --out` wrote")
     manifest = Manifest.read(root)
+    if manifest.digest is None:
+        prefix = Prefix.find(root)
+        if prefix is not None:
+            return _open_prefix(root, manifest, prefix)
+    notes = _state_notes(root, manifest)
     on_disk = {path.name.removesuffix(".parquet") for path in root.glob("*.parquet")}
-    notes = _state_notes(root, manifest, sorted(root.glob(f"*.parquet{PARTIAL}")))
+    if manifest.digest is not None:
+        foreign = sorted(f"{name}.parquet" for name in on_disk - manifest.tables.keys())
+        notes += [f"no part of the run: {', '.join(foreign)}"] if foreign else []
+        on_disk = set()
     names = sorted(on_disk | manifest.tables.keys())
     readable = []
     for name in names:
@@ -246,14 +295,30 @@ def open_run(directory: Path | str) -> Run:
             if name not in manifest.tables:
                 continue
         else:
-            said = manifest.tables.get(name, {}).get("rows", rows)
-            if rows != said:
-                notes.append(f"table {name!r} has {rows} rows, but {said} were stored")
+            stored = manifest.tables[name].rows if name in manifest.tables else rows
+            if rows != stored:
+                notes.append(f"table {name!r} has {rows} rows, but {stored} were stored")
         readable.append(name)
     return Run(root, manifest, readable, lambda name: read_parquet(root / f"{name}.parquet"), notes)
 
 
-def _state_notes(root: Path, manifest: Manifest, partial: list[Path]) -> list[str]:
+def _open_prefix(root: Path, manifest: Manifest, prefix: Prefix) -> Run:
+    """Return a run that isn't complete, up to the last commit."""
+    manifest.steps = prefix.commit.step
+    manifest.simulated_s = manifest.steps * manifest.step_us / 1e6
+    how = {
+        "running": "is unfinished: it crashed, or is still going on",
+        "failed": "failed",
+        "interrupted": "was interrupted",
+    }
+    note = (
+        f"{root} {how.get(manifest.status, 'is unfinished')}; everything before step"
+        f" {prefix.commit.step} can be read, and `fleet2d resume {root}` goes on with it"
+    )
+    return Run(root, manifest, prefix.names, prefix.read, [note])
+
+
+def _state_notes(root: Path, manifest: Manifest) -> list[str]:
     """Say what a run lacks that did not end as it should."""
     notes = []
     if manifest.status == "running":
@@ -265,6 +330,7 @@ def _state_notes(root: Path, manifest: Manifest, partial: list[Path]) -> list[st
         notes.append(f"{root} was interrupted: it holds what was stored until then")
     if manifest.status == "failed":
         notes.append(f"{root} failed: it holds what was stored until then")
+    partial = sorted(root.glob(f"*.parquet{PARTIAL}"))
     if partial:
         notes.append(f"cut off and not readable: {', '.join(path.name for path in partial)}")
     return notes

@@ -51,3 +51,11 @@ class ArtifactSettings(Settings):
         description="Store what each algorithm has learned at the end, learned/NAME.npz: another "
         "run can start from it.",
     )
+    checkpoint: Annotated[
+        PositiveDuration | Literal["auto", "off"], BeforeValidator(_off_is_a_word)
+    ] = Field(
+        default="auto",
+        description="Write the state of the run this often in simulated time, so that `fleet2d "
+        "resume` can go on from there; `auto`: after every 10 s or more of computing; or not at "
+        "all (`off`).",
+    )

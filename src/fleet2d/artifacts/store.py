@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.buffer import FLUSH_ROWS, TableBuffer
+from fleet2d.artifacts.buffer import FLUSH_ROWS, Checked, TableBuffer
 from fleet2d.artifacts.chunk import Chunk
 from fleet2d.artifacts.digest import TableDigest, run_digest
 from fleet2d.artifacts.directory import (
@@ -17,11 +17,21 @@ from fleet2d.artifacts.directory import (
     is_disk_full,
     make_directories,
     remove_directories,
-    sync_directory,
 )
-from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status
+from fleet2d.artifacts.files import sync_directory, write_atomically
+from fleet2d.artifacts.journal import Commit
+from fleet2d.artifacts.ledger import Ledger, columns_of
+from fleet2d.artifacts.lock import LOCK_NAME
+from fleet2d.artifacts.manifest import (
+    FILE_NAME,
+    ColumnRecord,
+    Manifest,
+    Status,
+    TableRecord,
+)
+from fleet2d.artifacts.seal import make_seal
 from fleet2d.artifacts.table import TableSpec
-from fleet2d.errors import ArtifactError
+from fleet2d.errors import ArtifactError, RunDirectoryError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -38,6 +48,7 @@ class _Table:
     digest: TableDigest
     kept: list[tuple[Chunk, int]] = field(default_factory=list)
     file: ParquetTable | None = None
+    logged: int = 0  # rows in the buffer that the journal has
 
 
 class RunStore:
@@ -80,6 +91,7 @@ class RunStore:
         self._digests: dict[str, str] | None = None
         self._is_open = directory is None
         self._failure: ArtifactError | None = None
+        self._ledger = None if self._root is None else Ledger(self._root)
         for spec in specs:
             self.add_table(spec)
 
@@ -111,12 +123,82 @@ class RunStore:
         self.check()
         try:
             self._made = make_directories(self._root)
+            self._take_directory(self._root)
             self._is_open = True
+            self._ledger_of().begin()
             self.manifest.status = "running"
             self.manifest.write(self._root)
         except OSError as error:
             self.discard()
             raise cannot_write(self.directory, error) from error
+
+    def _take_directory(self, root: Path) -> None:
+        """Lock the directory, and see that no other run has begun there since it was checked."""
+        ledger = self._ledger_of()
+        ledger.lock()
+        if any(path.name != LOCK_NAME for path in root.iterdir()):
+            ledger.release()
+            raise RunDirectoryError(f"another run was stored in {self.directory} just now")
+
+    def reopen(self, ledger: Ledger, commit: Commit | None) -> None:
+        """Go on in the directory of an unfinished run, behind a commit of its journal.
+
+        Args:
+            ledger: What the run wrote down, locked for this process.
+            commit: Where to go on; None begins anew.
+
+        Raises:
+            ArtifactError: The journal is damaged, or the directory can't be written.
+        """
+        assert self._root is not None
+        self._ledger, self._is_open = ledger, True
+        with self._writing("the directory"):
+            self.manifest.status = "running"
+            self.manifest.write(self._root)
+            for path in (*self._root.glob("*.parquet"), *self._root.glob("*.parquet.partial")):
+                path.unlink()  # as they were when the run ended early
+            for entry in ledger.go_on(commit):
+                self.add_table(entry.spec)
+                table = self._tables[entry.spec.name]
+                table.buffer.learn_words(entry.words)
+                self._fill(table, table.buffer.check(columns_of(entry)), log=False)
+
+    def keep(self, name: str, content: str) -> None:
+        """Write a file beside the tables, at one stroke.
+
+        Raises:
+            ArtifactError: It can't be written.
+        """
+        assert self._root is not None
+        with self._writing(name):
+            write_atomically(self._root / name, content.encode())
+
+    def keep_checkpoint(self, content: bytes) -> None:
+        """Replace the checkpoint of the run.
+
+        Raises:
+            ArtifactError: It can't be written; the run is marked as failed.
+        """
+        with self._writing("the checkpoint"):
+            self._ledger_of().keep_checkpoint(content)
+
+    def commit(self, step: int, *, sync: bool = False) -> Commit | None:
+        """Let all rows so far survive the end of this process; nothing for a run in memory.
+
+        Args:
+            step: The step before which they are.
+            sync: Whether they must survive a power cut too.
+
+        Raises:
+            ArtifactError: They can't be written; the run is marked as failed.
+        """
+        if self._root is None:
+            return None
+        self._check_usable()
+        with self._writing("the journal"):
+            for entry in self._tables.values():
+                self._log(entry)
+            return self._ledger_of().commit(step, sync=sync)
 
     def add_table(self, spec: TableSpec) -> None:
         """Add a table, at any time before the run is closed; one that is there may come again.
@@ -154,10 +236,15 @@ class RunStore:
         if table not in self._tables:
             raise ArtifactError(f"there is no table {table!r}: add_table() it first")
         entry = self._tables[table]
-        checked = entry.buffer.check(columns)
+        self._fill(entry, entry.buffer.check(columns))
+
+    def _fill(self, entry: _Table, checked: Checked, *, log: bool = True) -> None:
+        """Take rows; those that the journal has already are not logged."""
         start = 0
         while start < checked.rows:
             start = entry.buffer.fill(checked, start)
+            if not log:
+                entry.logged = entry.buffer.rows
             if entry.buffer.is_full:
                 self._flush(entry)
 
@@ -214,8 +301,10 @@ class RunStore:
         self.manifest.digest = run_digest(digests)
         if self._root is not None:
             with self._writing(FILE_NAME):
+                self.manifest.seal = make_seal(self.manifest, self._root)
                 self.manifest.write(self._root)
                 sync_directory(self._root)
+            self._ledger_of().end(keep=status != "complete")
         return digests
 
     def abandon(self) -> dict[str, str]:
@@ -229,6 +318,7 @@ class RunStore:
                 entry.file.abandon()
         if self._root is not None and self._is_open:
             names = [name for table in self._tables for name in _file_names(table)]
+            self._ledger_of().end()
             for name in (FILE_NAME, f"{FILE_NAME}.partial", *names):
                 with suppress(OSError):
                     (self._root / name).unlink()
@@ -250,7 +340,10 @@ class RunStore:
         rows = entry.buffer.rows
         if not rows:
             return
+        with self._writing("the journal"):
+            self._log(entry)
         chunk = entry.buffer.take(reuse=self._root is not None)
+        entry.logged = 0
         entry.digest.update(chunk, rows)
         if self._root is None:
             entry.kept.append((chunk, rows))
@@ -258,6 +351,19 @@ class RunStore:
         name = entry.buffer.spec.name
         with self._writing(f"{name}.parquet", entry):
             self._file_of(entry, self._root).write(chunk, rows, entry.buffer.words)
+
+    def _log(self, entry: _Table) -> None:
+        """Write the rows of a table to the journal that it doesn't have yet."""
+        first, buffer = entry.logged, entry.buffer
+        if self._ledger is None or first == buffer.rows:
+            return
+        chunk = buffer.peek(first)
+        self._ledger.journal.add(buffer.spec, chunk, buffer.rows - first, buffer.words)
+        entry.logged = buffer.rows
+
+    def _ledger_of(self) -> Ledger:
+        assert self._ledger is not None, "a run in memory has no ledger"
+        return self._ledger
 
     def _file_of(self, entry: _Table, root: Path) -> ParquetTable:
         from fleet2d.artifacts.arrow import ParquetTable
@@ -277,15 +383,15 @@ class RunStore:
         with self._writing("the directory"):
             sync_directory(root)
 
-    def _described(self, name: str) -> dict[str, Any]:
+    def _described(self, name: str) -> TableRecord:
         """Return what the manifest says about a table."""
         entry = self._tables[name]
         columns = [
-            {"name": column.name, "kind": column.kind, "unit": column.unit}
+            ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
             for column in entry.buffer.spec.columns
         ]
         digest = self._digests[name] if self._digests else None
-        return {"rows": entry.digest.rows, "digest": digest, "columns": columns}
+        return TableRecord(rows=entry.digest.rows, digest=digest, columns=columns)
 
     def _check_usable(self) -> None:
         self._check_failure()
@@ -307,8 +413,8 @@ class RunStore:
             if is_disk_full(error):
                 reason = f"the disk is full: {what} can't be written"
                 advice = (
-                    "Free some space, or store less (`artifacts:` in the scenario), and run "
-                    "again with another --out"
+                    f"Free some space and go on by `fleet2d resume {self.directory}`, or store less"
+                    " (`artifacts:` in the scenario) and run again with another --out"
                 )
             marked = self._mark_failed(reason, entry)
             self._failure = ArtifactError(
@@ -322,6 +428,7 @@ class RunStore:
         for other in self._tables.values():
             if other.file is not None:
                 other.file.abandon()
+        self._ledger_of().end(keep=True, undo=True)
         self.manifest.status = "failed"
         self.manifest.notes.append(reason)
         return self._try_manifest() or (

@@ -4,7 +4,9 @@ import inspect
 from collections.abc import Iterator
 from pathlib import Path
 
+from fleet2d.artifacts.manifest import Manifest, file_record, is_regular
 from fleet2d.component import Component
+from fleet2d.errors import RunDirectoryError
 from fleet2d.scenario.model import Scenario
 
 
@@ -14,7 +16,7 @@ def input_files(scenario: Scenario) -> list[Path]:
     A component says by `files` what it reads; the paths among its fields are noted anyway.
     """
     files: set[Path] = set()
-    for component in _components(scenario):
+    for component in components_of(scenario):
         reads = getattr(component, "files", None)
         files |= set(reads()) if reads else set()
         files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}
@@ -25,7 +27,31 @@ def input_files(scenario: Scenario) -> list[Path]:
     return sorted(files)
 
 
-def _components(scenario: Scenario) -> Iterator[Component]:
+def changed_inputs(manifest: Manifest) -> list[str]:
+    """Return the files that a run read and that hold something else now.
+
+    Raises:
+        RunDirectoryError: One is gone, or is no file.
+    """
+    changed = []
+    for record in manifest.inputs:
+        path = Path(record.path)
+        try:
+            if not is_regular(path):
+                raise RunDirectoryError(
+                    f"the run read {path}, which is no file now: put the file back"
+                )
+            if file_record(path)["sha256"] != record.sha256:
+                changed.append(record.path)
+        except (OSError, ValueError) as error:
+            raise RunDirectoryError(
+                f"the run read {path}, which is gone or can't be read: put it back"
+            ) from error
+    return changed
+
+
+def components_of(scenario: Scenario) -> Iterator[Component]:
+    """Yield all components of a scenario, and those within others."""
     outer: list[Component] = [scenario.floorplan, scenario.sight.method]
     for entity in (*scenario.users.values(), *scenario.robots.values()):
         outer += entity.behaviors

@@ -1,6 +1,7 @@
 """What a run keeps besides its tables: the manifest, the floor plan, a way to be stopped."""
 
 import json
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -8,14 +9,25 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.manifest import Manifest, file_record, versions
+from fleet2d.artifacts.manifest import Entities, InputRecord, Manifest, file_record, versions
 from fleet2d.artifacts.reader import FLOORPLAN_NAME
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
+from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.scenario.model import Scenario
+
+SLOW = "simulation.speedup asked for"
+"""How the note begins that a run was slower than it should be."""
+
+# Ctrl-C, and what systemd, Docker and Slurm send before they kill.
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
+_HEARD = {
+    signal.SIGINT: b"interrupted: storing what was simulated; Ctrl-C again stops at once\n",
+    signal.SIGTERM: b"told to stop: storing what was simulated\n",
+}
 
 
 def describe_start(
@@ -27,9 +39,9 @@ def describe_start(
     manifest.seed = seed
     manifest.step_us = clock.step_us
     manifest.start = clock.start.isoformat()
-    manifest.entities = {"users": list(scenario.users), "robots": list(scenario.robots)}
+    manifest.entities = Entities(users=list(scenario.users), robots=list(scenario.robots))
     manifest.versions = versions()
-    manifest.inputs = [file_record(path) for path in input_files(scenario)]
+    manifest.inputs = [InputRecord(**file_record(path)) for path in input_files(scenario)]
     manifest.notes = list(plan.notes)
     for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
         manifest.notes += [
@@ -55,7 +67,7 @@ def describe_end(
     reached = pace.reached(manifest.simulated_s) if pace else 0.0
     if pace and reached < 0.98 * pace.speedup:
         manifest.notes.append(
-            f"simulation.speedup asked for {pace.speedup:g} times real time;"
+            f"{SLOW} {pace.speedup:g} times real time;"
             f" {reached:.0f} was reached, for computing took that long"
         )
 
@@ -70,30 +82,49 @@ def open_store(store: RunStore, plan: FloorPlan) -> None:
     store.open()
     if store.directory is None:
         return
-    file = store.directory / FLOORPLAN_NAME
     try:
-        file.write_text(json.dumps(plan.to_native()), encoding="utf-8")
-    except OSError as error:
-        with suppress(OSError):
-            file.unlink(missing_ok=True)
+        keep_plan(store, plan)
+    except ArtifactError as error:
         store.discard()
-        raise cannot_write(store.directory, error) from error
+        reason = error.__cause__
+        raise (
+            cannot_write(store.directory, reason) if isinstance(reason, OSError) else error
+        ) from reason
+
+
+def keep_plan(store: RunStore, plan: FloorPlan) -> None:
+    """Put the floor plan into the run directory.
+
+    Raises:
+        ArtifactError: It can't be written.
+    """
+    store.keep(FLOORPLAN_NAME, json.dumps(plan.to_native()))
 
 
 @contextmanager
 def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
-    """Call `stop` on the first Ctrl-C, so that no row is half stored; a second one acts at once."""
+    """Call `stop` on the first Ctrl-C or SIGTERM, so that no row is half stored.
+
+    It says on stderr that it was heard; a second one acts at once.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in _STOPPING}
 
-    def on_interrupt(*_: Any) -> None:
+    def put_back() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    def on_signal(number: int, _: Any) -> None:
         stop()
-        signal.signal(signal.SIGINT, before)
+        put_back()
+        with suppress(OSError):  # not by sys.stderr, which may be at work just now
+            os.write(2, _HEARD[signal.Signals(number)])
 
-    signal.signal(signal.SIGINT, on_interrupt)
+    for number in _STOPPING:
+        signal.signal(number, on_signal)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        put_back()

@@ -9,14 +9,16 @@ import hashlib
 import io
 import json
 import pickle
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from types import FunctionType
+from types import BuiltinFunctionType, FunctionType
 from typing import Any, BinaryIO
 
 from fleet2d import __version__
 from fleet2d.artifacts.chunk import ColumnChunk
 from fleet2d.artifacts.manifest import plain
+from fleet2d.engine import arrays
+from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
 from fleet2d.entities.plan import Track, Walk
 from fleet2d.errors import ArtifactError
@@ -26,6 +28,7 @@ from fleet2d.floorplan.space import Space
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.outside import is_scenario_module
 from fleet2d.routines.persona import Persona
+from fleet2d.scenario.model import Scenario
 
 _HASH = type(hashlib.sha256())
 
@@ -51,18 +54,42 @@ _KNOWN = {
         "slice",
         "str",
         "tuple",
-    },  # fmt: skip
+    },
     "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
     "copyreg": {"_reconstructor"},
     "datetime": {"date", "datetime", "time", "timedelta"},
     "decimal": {"Decimal"},
     "fractions": {"Fraction"},
-    "numpy": {"dtype", "ndarray"},
-    "numpy._core.multiarray": {"_reconstruct", "scalar"},
-    "numpy._core.numeric": {"_frombuffer"},
     "shapely.io": {"from_wkb"},
     "pathlib": {"Path", "PosixPath", "PurePosixPath", "PureWindowsPath", "WindowsPath"},
 }
+
+# Functions of our own that make values from plain ones.
+_MAKERS = frozenset({"object_array", "plain_array", "plain_scalar", "plain_type"})
+
+# Packages of which no class is part of a state: to make one would read, write or run something.
+_NO_STATE = (
+    "fleet2d.artifacts.arrow",
+    "fleet2d.artifacts.journal",
+    "fleet2d.artifacts.ledger",
+    "fleet2d.artifacts.lock",
+    "fleet2d.artifacts.reader",
+    "fleet2d.calibrate",
+    "fleet2d.cli",
+    "fleet2d.component",
+    "fleet2d.engine.checkpoint",
+    "fleet2d.engine.resume",
+    "fleet2d.engine.run",
+    "fleet2d.engine.simulation",
+    "fleet2d.engine.snapshot",
+    "fleet2d.fit",
+    "fleet2d.outside",
+    "fleet2d.paper",
+    "fleet2d.scenario",
+    "fleet2d.testing",
+    "fleet2d.trust",
+    "fleet2d.view",
+)
 
 MAGIC = b"fleet2d simulation"
 
@@ -86,7 +113,9 @@ def write_state(state: State, constants: Constants, file: BinaryIO) -> None:
     """
     try:
         _Writer(file, constants, None).dump(state)
-    except (pickle.PicklingError, TypeError, AttributeError) as error:
+    except ArtifactError:
+        raise
+    except Exception as error:  # a component's own way to be pickled raises almost anything
         raise ArtifactError(f"the state of the run can't be written: {error}") from error
 
 
@@ -161,6 +190,9 @@ class _Writer(pickle.Pickler):
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self._names = {id(value): name for name, value in constants.items()}
         self._shared = shared
+        if shared is None:
+            self.dispatch_table = arrays.REDUCERS
+        self._packages = frozenset() if shared is not None else _packages_of(constants)
 
     def persistent_id(self, obj: Any) -> object:
         name = self._names.get(id(obj))
@@ -172,11 +204,21 @@ class _Writer(pickle.Pickler):
                 return ("sha256",)
             obj = obj.copy()
         elif self._shared is None:
+            if isinstance(obj, type | FunctionType | BuiltinFunctionType):
+                self._check_reference(obj)
             return ("space", obj.key) if kind is Space else None
         elif kind not in _SHARED:
             return None
         self._shared.append(obj)
         return len(self._shared) - 1
+
+    def _check_reference(self, obj: Any) -> None:
+        """Refuse now what the reader would refuse."""
+        module, name = obj.__module__ or "builtins", obj.__qualname__
+        if not may_refer(module, name, self._packages) and obj is not type(None):
+            raise ArtifactError(
+                f"the state of the run can't be written: it refers to {module}.{name}"
+            )
 
 
 class _Reader(pickle.Unpickler):
@@ -185,6 +227,7 @@ class _Reader(pickle.Unpickler):
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
         super().__init__(file)
         self._constants, self._shared = constants, shared
+        self._packages = frozenset() if shared is not None else _packages_of(constants)
 
     def state(self) -> State:
         """Return the state."""
@@ -205,10 +248,41 @@ class _Reader(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         if self._shared is not None:
             return super().find_class(module, name)
-        if name in _KNOWN.get(module, ()):
-            return super().find_class(module, name)
-        if module.partition(".")[0] == "fleet2d" or is_scenario_module(module):
-            found = super().find_class(module, name)
-            if isinstance(found, type):
-                return found
-        raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
+        if not may_refer(module, name, self._packages):
+            raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
+        found = super().find_class(module, name)
+        known = name in _KNOWN.get(module, ()) or module == arrays.__name__
+        # A module's own class, not one that it imports: that might be anything.
+        own = isinstance(found, type) and (found.__module__, found.__qualname__) == (module, name)
+        if not known and not own:
+            raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
+        return found
+
+
+def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
+    """Whether a file of a state may refer to something by this name.
+
+    Args:
+        module: Where it is.
+        name: What it is called there.
+        packages: Those of the scenario's own components.
+
+    Example:
+        >>> may_refer("fleet2d.engine.state", "State"), may_refer("os", "system")
+        (True, False)
+    """
+    if name in _KNOWN.get(module, ()) or (module == arrays.__name__ and name in _MAKERS):
+        return True
+    if f"{module}.".startswith(tuple(f"{package}." for package in _NO_STATE)):
+        return False
+    top = module.partition(".")[0]
+    return top == "fleet2d" or top in packages or is_scenario_module(module)
+
+
+def _packages_of(constants: Constants) -> frozenset[str]:
+    """Return the packages outside Fleet2D that a scenario's components come from."""
+    scenario = constants.get("scenario")
+    if not isinstance(scenario, Scenario):
+        return frozenset()
+    names = (type(component).__module__ for component in components_of(scenario))
+    return frozenset(name.partition(".")[0] for name in names) - {"fleet2d"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.furniture import seat_at
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
@@ -112,8 +113,12 @@ class Plan:
 
         A robot takes the cheapest path where the home has a costmap.
 
-        In a room, the place is a spot drawn from its free cells; `purpose` names the random stream.
+        In a room, the place is a spot drawn from its free cells by the stream `purpose`. Furniture
+        is used by people; robots stop where one steps up to it.
         """
+        thing = seat_at(self._actor, place)
+        if thing is not None:
+            return self.use(thing)
         return self.go_to_point(*self._actor.find(place, self.time_us, purpose))
 
     def go_to_point(self, x: int, y: int, *, route: I64 | None = None) -> Self:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import shapely
@@ -79,6 +79,14 @@ class Home:
     def constants(self) -> dict[str, object]:
         """What of it never changes during a run, by name."""
         return {"plan": self.plan, "walls": self.plan.mesh, "shapes": self._shapes}
+
+    def draw(self, ax: Any = None) -> Any:
+        """Draw the floor plan; see `FloorPlan.draw`."""
+        return self.plan.draw(ax)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the floor plan in a notebook, where matplotlib is installed."""
+        return self.plan._repr_png_()
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return what `make` returns, once for all runs in this home.

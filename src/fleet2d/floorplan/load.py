@@ -70,13 +70,7 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
         return native_plan(content, path, usual)
     if kind is not None:
         return _load_foreign(kind, path, cell)
-    from fleet2d.floorplan.geojson_file import COLLECTION
-    from fleet2d.floorplan.valetudo_file import MAP_CLASS
-
-    raise FloorPlanError(
-        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
-        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
-    )
+    raise _unknown_format(path)
 
 
 def _load_foreign(kind: str, path: Path, cell: float | None) -> FloorPlan:
@@ -114,6 +108,31 @@ def is_floorplan(plan: str | Path) -> bool:
     except FloorPlanError:
         return False
     return _format_of(content) is not None or "image" in content
+
+
+def format_of_file(path: Path) -> str:
+    """Return the `type` of a floor plan in a scenario that reads a file.
+
+    Raises:
+        FloorPlanError: It can't be read, or is no floor plan that Fleet2D knows.
+    """
+    content = read_document(path)
+    kind = _format_of(content)
+    if kind is None and path.suffix.lower() in YAML and "image" in content:
+        return "ros"
+    if kind is None:
+        raise _unknown_format(path)
+    return kind
+
+
+def _unknown_format(path: Path) -> FloorPlanError:
+    from fleet2d.floorplan.geojson_file import COLLECTION
+    from fleet2d.floorplan.valetudo_file import MAP_CLASS
+
+    return FloorPlanError(
+        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
+        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
+    )
 
 
 def _format_of(content: dict[str, Any]) -> str | None:

@@ -1,0 +1,217 @@
+"""The seal of a run: one digest over all that it stored, and what differs from it.
+
+The seal recognises a run; it is no signature. Who changes a run can seal it anew, and then its
+digest is another: keep the digest elsewhere to be sure of that too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fleet2d.artifacts.journal import FOLDER
+from fleet2d.artifacts.lock import LOCK_NAME
+from fleet2d.artifacts.manifest import (
+    FILE_NAME,
+    FileRecord,
+    Manifest,
+    Seal,
+    canonical,
+    is_regular,
+    json_of,
+)
+from fleet2d.errors import ArtifactError, RunDirectoryError
+
+# Files that may be added to a run later: pictures of it.
+_PICTURES = frozenset({"picture.png", "picture.svg"})
+_LEARNED = "learned"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What was found when a run was compared with its seal.
+
+    Attributes:
+        differing: Files and fields of the manifest that are not as they were stored, with how.
+        foreign: Files in the directory that are no part of the run.
+        notes: What could not be compared, in plain words.
+        digest: The seal's digest; None for a run that has none.
+    """
+
+    differing: dict[str, str]
+    foreign: list[str]
+    notes: list[str] = field(default_factory=list)
+    digest: str | None = None
+
+    @property
+    def same(self) -> bool:
+        """Whether all that could be compared is as it was stored."""
+        return not self.differing
+
+
+def make_seal(manifest: Manifest, directory: Path) -> Seal:
+    """Return the seal of a run whose files are all written but the manifest.
+
+    Raises:
+        OSError: A file can't be read.
+    """
+    paths = {path.name: path for path in directory.iterdir() if path.suffix == ".parquet"}
+    paths = {name: path for name, path in paths.items() if path.stem in manifest.tables}
+    learned = directory / _LEARNED
+    if learned.is_dir():
+        paths |= {f"{_LEARNED}/{path.name}": path for path in learned.glob("*.npz")}
+    plan = directory / "floorplan.json"
+    if plan.exists():
+        paths[plan.name] = plan
+    files = {name: _file_record(path) for name, path in sorted(paths.items())}
+    fields = digest_fields(manifest.content())
+    return Seal(digest=_digest_of(fields, files), fields=fields, files=files)
+
+
+def verify_run(directory: Path | str) -> Verification:
+    """Compare a stored run with its seal, without running or unpacking anything.
+
+    Raises:
+        RunDirectoryError: There is no run, or its manifest can't be understood.
+        ArtifactError: The run has no digest, for it was never closed.
+
+    Example:
+        >>> import fleet2d, tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> run = fleet2d.run(None, "simulation.duration=1 h", seed=4, out=f"{folder}/run")
+        >>> verify_run(f"{folder}/run").same
+        True
+    """
+    root = Path(directory)
+    if not root.is_dir():
+        raise RunDirectoryError(f"{root} is no directory: give one that `fleet2d run --out` wrote")
+    manifest = Manifest.read(root)
+    if manifest.digest is None:
+        raise ArtifactError(
+            f"{root} has no digest, for its status is {manifest.status}: there is nothing to"
+            " compare with; `fleet2d resume` goes on with it"
+        )
+    if manifest.seal is None:
+        return _without_seal(root, manifest)
+    try:
+        text = (root / FILE_NAME).read_bytes()
+        differing = _differing_fields(root, text, manifest.seal)
+        for name, record in manifest.seal.files.items():
+            how = _difference(root / name, record)
+            if how:
+                differing[name] = how
+        differing |= _unsealed_tables(manifest)
+        foreign = foreign_files(root, manifest.seal.files.keys() | {FILE_NAME})
+    except OSError as error:
+        raise ArtifactError(f"{root} can't be read: {error.strerror or error}") from error
+    return Verification(differing, foreign, digest=manifest.seal.digest)
+
+
+def foreign_files(root: Path, own: set[str]) -> list[str]:
+    """Return what is in a run directory besides what belongs there.
+
+    Raises:
+        OSError: It can't be read.
+    """
+    names = {path.name for path in root.iterdir()}
+    learned = root / _LEARNED
+    if learned.is_dir() and not learned.is_symlink():
+        names |= {f"{_LEARNED}/{path.name}" for path in learned.iterdir()}
+        names.discard(_LEARNED)
+    return sorted(names - own - _PICTURES - {FOLDER, LOCK_NAME})
+
+
+def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return the SHA-256 of each field of a manifest but the seal; of a mapping, of each entry.
+
+    Example:
+        >>> sorted(digest_fields({"seed": 4, "metrics": {"distance": {}, "sightings": {}}}))
+        ['metrics.distance', 'metrics.sightings', 'seed']
+    """
+    parts: dict[str, Any] = {}
+    for name, value in content.items():
+        if name == "seal":
+            continue
+        if isinstance(value, Mapping) and value:
+            parts |= {f"{name}.{key}": entry for key, entry in value.items()}
+        else:
+            parts[name] = value
+    return {name: _sha256_of(value) for name, value in parts.items()}
+
+
+def _differing_fields(root: Path, text: bytes, seal: Seal) -> dict[str, str]:
+    """Return the fields of a manifest that are not as they were sealed."""
+    content = json_of(root / FILE_NAME, text)
+    fields = digest_fields(content)
+    differing = {}
+    for name in sorted(fields.keys() | seal.fields.keys()):
+        if name not in fields:
+            differing[f"{FILE_NAME}: {name}"] = "was removed"
+        elif name not in seal.fields:
+            differing[f"{FILE_NAME}: {name}"] = "was added"
+        elif fields[name] != seal.fields[name]:
+            differing[f"{FILE_NAME}: {name}"] = "was changed"
+    if _digest_of(seal.fields, seal.files) != seal.digest:
+        differing[f"{FILE_NAME}: seal"] = "was changed"
+    elif not differing and text != canonical(content).encode():
+        differing[FILE_NAME] = "is written in another way"
+    return differing
+
+
+def _unsealed_tables(manifest: Manifest) -> dict[str, str]:
+    """Return the tables that the manifest names and the seal doesn't cover."""
+    assert manifest.seal is not None
+    files = manifest.seal.files
+    return {
+        f"{name}.parquet": "is not covered by the seal"
+        for name in manifest.tables
+        if f"{name}.parquet" not in files
+    }
+
+
+def _without_seal(root: Path, manifest: Manifest) -> Verification:
+    """Compare what there is to compare in a run of format 1: the content of its tables."""
+    from fleet2d.artifacts.reader import open_run
+
+    changed = {
+        name if name == FILE_NAME else f"{name}.parquet": "was changed"
+        for name in open_run(root).verify()
+    }
+    own = {f"{name}.parquet" for name in manifest.tables} | {FILE_NAME, "floorplan.json"}
+    learned = {f"{_LEARNED}/{name}.npz" for name in manifest.scenario.get("algorithms", {})}
+    notes = [
+        f"{root} has no seal (format {manifest.format}): the content of its tables was compared,"
+        " not its metrics, floor plan, learned state and the rest of the manifest"
+    ]
+    return Verification(changed, foreign_files(root, own | learned), notes)
+
+
+def _difference(path: Path, record: FileRecord) -> str:
+    """Say how a file differs from what was sealed; empty if it doesn't."""
+    try:
+        if path.is_symlink() or not is_regular(path):
+            return "is no file any more"
+        if path.stat().st_size != record.bytes:
+            return f"has {path.stat().st_size} bytes, {record.bytes} were stored"
+        return "" if _file_record(path) == record else "was changed"
+    except FileNotFoundError:
+        return "is missing"
+
+
+def _file_record(path: Path) -> FileRecord:
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        return FileRecord(bytes=file.tell(), sha256=digest)
+
+
+def _digest_of(fields: Mapping[str, str], files: Mapping[str, FileRecord]) -> str:
+    return _sha256_of([dict(fields), {name: record.model_dump() for name, record in files.items()}])
+
+
+def _sha256_of(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,56 @@
+"""JSON as the standard has it: no NaN, no key twice, of a bounded size and depth."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any, NoReturn
+
+MOST_BYTES = 64 << 20
+"""Size of a text that is read."""
+
+
+def read_json(text: bytes) -> Any:
+    """Return the content of a JSON text.
+
+    Raises:
+        ValueError: It is no JSON, or goes beyond a bound.
+
+    Example:
+        >>> read_json(b'{"steps": 3}')
+        {'steps': 3}
+        >>> read_json(b'{"steps": 3, "steps": 4}')
+        Traceback (most recent call last):
+        ValueError: the key 'steps' is there twice
+    """
+    if len(text) > MOST_BYTES:
+        raise ValueError(f"it has {len(text)} bytes, and at most {MOST_BYTES} are read")
+    try:
+        return json.loads(
+            text.decode(),
+            object_pairs_hook=_once,
+            parse_constant=_refuse,
+            parse_float=_finite,
+        )
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice[:60]!r} is there twice")
+    return content
+
+
+def _refuse(word: str) -> NoReturn:
+    raise ValueError(f"{word} is no number")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:60]} is too large a number")
+    return number

@@ -1,0 +1,27 @@
+"""The command that runs a stored run again: reproduce."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleet2d.cli.arguments import TrustFiles, TrustFolders, trust_of
+
+
+def reproduce(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
+) -> None:
+    """Run a stored run again from its manifest, and compare."""
+    from fleet2d.engine.reproduce import reproduce_trusting
+
+    result = reproduce_trusting(directory, trust_of(trust, trust_dir))
+    for cause in result.causes:
+        typer.echo(f"note: {cause}")
+    typer.echo(f"not compared: {', '.join(result.not_compared)}")
+    if result.same:
+        typer.echo(f"reproduced: digest {result.digest}")
+        return
+    typer.echo(f"not reproduced: {', '.join(result.differing)} came out different", err=True)
+    raise typer.Exit(1)

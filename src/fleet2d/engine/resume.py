@@ -1,0 +1,107 @@
+"""Going on with a run that was interrupted, killed or failed, from its last checkpoint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from fleet2d.artifacts.directory import cannot_write
+from fleet2d.artifacts.journal import JOURNAL_NAME, last_commit
+from fleet2d.artifacts.ledger import Ledger, remove_leftovers
+from fleet2d.artifacts.manifest import FILE_NAME, Manifest
+from fleet2d.artifacts.reader import Run
+from fleet2d.artifacts.store import RunStore
+from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
+from fleet2d.engine.inputs import changed_inputs
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import RunDirectoryError
+from fleet2d.scenario.model import load_scenario
+from fleet2d.trust import Trust, refuse_untrusted, restricted
+
+
+def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:
+    """Go on with an unfinished run to its end; its digest is that of an undisturbed run.
+
+    Args:
+        directory: Of the run.
+        trust: Files and folders of code that may be run, if the scenario has components of its
+            own that aren't loaded yet.
+
+    Raises:
+        RunDirectoryError: There is no run, it is complete, another process writes it, an input is
+            not what it was, or code isn't trusted.
+        ArtifactError: Its journal is damaged, or it can't be written.
+
+    Example:
+        >>> import fleet2d, tempfile
+        >>> folder = f"{tempfile.mkdtemp()}/run"
+        >>> simulation = fleet2d.Simulation(None, "simulation.duration=2 h", seed=4, out=folder)
+        >>> simulation.advance(3600)
+        >>> simulation.finish().status
+        'interrupted'
+        >>> resume(folder).digest == fleet2d.run(None, "simulation.duration=2 h", seed=4).digest
+        True
+    """
+    return reopen(directory, Trust.of(trust))[0].run()
+
+
+def reopen(directory: str | Path, trust: Trust) -> tuple[Simulation, str]:
+    """Return an unfinished run at its last checkpoint, or at its first step, and which it is.
+
+    Raises:
+        RunDirectoryError: See `resume`.
+        ArtifactError: See `resume`.
+    """
+    root = Path(directory)
+    Manifest.read(root)  # before anything is written there
+    ledger = Ledger(root)
+    try:
+        ledger.lock()
+    except OSError as error:
+        raise cannot_write(root, error) from error
+    try:
+        return _reopen(root, ledger, trust)
+    except BaseException:
+        ledger.release()
+        raise
+
+
+def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
+    manifest = Manifest.read(root)
+    if manifest.status == "complete":
+        remove_leftovers(root)
+        raise RunDirectoryError(f"{root} holds a complete run: there is nothing to go on with")
+    if not manifest.scenario:
+        raise RunDirectoryError(f"{root}/{FILE_NAME} has no scenario: run the scenario again")
+    changed = changed_inputs(manifest)
+    if changed:
+        raise RunDirectoryError(
+            f"{changed[0]} has changed since the run began: put it back as it was, or run the"
+            " scenario again"
+        )
+    refuse_untrusted(root, manifest.scenario, trust)
+    with restricted(trust):
+        scenario = load_scenario(manifest.scenario)
+        try:
+            checkpoint = _checkpoint(ledger, manifest)
+            run = Simulation.reopened(scenario, RunStore(root), ledger, checkpoint)
+        except UnusableCheckpointError as error:
+            remark = f"beginning anew, for {error}"
+            run = Simulation.reopened(scenario, RunStore(root), ledger, None)
+        else:
+            remark = f"going on from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
+    run.catch_up(manifest.interventions)
+    return run, remark
+
+
+def _checkpoint(ledger: Ledger, manifest: Manifest) -> Checkpoint:
+    """Return the last checkpoint, whose rows are all there.
+
+    Raises:
+        UnusableCheckpointError: There is none to go on from, and why.
+    """
+    checkpoint = Checkpoint.open(ledger.checkpoint, manifest)
+    last = last_commit(ledger.folder / JOURNAL_NAME)
+    if last is None or last.end < checkpoint.commit.end:
+        raise UnusableCheckpointError("the journal is shorter than the checkpoint says")
+    return checkpoint

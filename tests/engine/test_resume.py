@@ -1,0 +1,421 @@
+"""A run that ended early, however it did, is gone on with to the digest of an undisturbed one."""
+
+import multiprocessing
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.scenes import digests, everything, fleet2d_process, scenario
+
+import fleet2d
+from fleet2d import Algorithm
+from fleet2d.artifacts import arrow, files, lock
+from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME
+from fleet2d.artifacts.ledger import CHECKPOINT_NAME
+from fleet2d.artifacts.seal import verify_run
+from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+
+KILLS = int(os.environ.get("FLEET2D_KILLS", "30"))
+"""Random moments at which a run is killed; more before a release."""
+
+CHECKPOINTED = {"checkpoint": "10 min"}
+
+
+def content(duration: str = "1 h", **artifacts: Any) -> dict[str, Any]:
+    found = everything(duration)
+    found["artifacts"] = {**found["artifacts"], **CHECKPOINTED, **artifacts}
+    return found
+
+
+@cache
+def undisturbed(duration: str = "1 h") -> dict[str, Any]:
+    return digests(fleet2d.run(everything(duration)))
+
+
+def cut_off(simulation: fleet2d.Simulation) -> Path:
+    """Leave a run as the end of its process would."""
+    ledger = simulation._store._ledger
+    assert ledger is not None
+    ledger.journal.close()
+    assert ledger._lock is not None
+    os.close(ledger._lock._handle)
+    assert simulation.directory is not None
+    return simulation.directory
+
+
+@pytest.mark.parametrize("minutes", [0, 1, 9, 10, 11, 37, 59, 60])
+def test_a_run_that_was_cut_off_goes_on_from_its_checkpoint(tmp_path: Path, minutes: int) -> None:
+    simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
+    simulation.run_until(60 * minutes)
+    directory = cut_off(simulation)
+    done = fleet2d.resume(directory)
+    assert undisturbed() == digests(done)
+    assert ([600 * (minutes // 10)] if minutes >= 10 else []) == done.manifest["resumed"]
+    assert verify_run(directory).same
+    assert [] == verify_run(directory).foreign
+
+
+def test_a_run_may_be_cut_off_many_times(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
+    for minute in (12, 25, 31, 44, 58):
+        simulation.run_until(60 * minute)
+        directory = cut_off(simulation)
+        from fleet2d.engine.resume import reopen
+        from fleet2d.trust import Trust
+
+        simulation, remark = reopen(directory, Trust())
+        assert f"step {600 * (minute // 10)}" in remark
+    assert undisturbed() == digests(simulation.run())
+    assert [600, 1200, 1800, 2400, 3000] == fleet2d.open_run(directory).manifest["resumed"]
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(content(checkpoint="auto"), out=tmp_path / "run")
+    simulation.advance(1234)
+    stored = simulation.finish()
+    assert "interrupted" == stored.status
+    assert [] == stored.verify()
+    assert verify_run(tmp_path / "run").same
+    done = fleet2d.resume(tmp_path / "run")
+    assert undisturbed() == digests(done)
+    assert [1234] == done.manifest["resumed"]
+
+
+def test_without_a_checkpoint_a_run_begins_anew(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(content(checkpoint="off"), out=tmp_path / "run")
+    simulation.run_until(2000)
+    assert undisturbed() == digests(fleet2d.resume(cut_off(simulation)))
+
+
+@pytest.mark.parametrize("damage", ["checkpoint", "journal", "version"])
+def test_with_a_damaged_checkpoint_a_run_begins_anew(tmp_path: Path, damage: str) -> None:
+    simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
+    simulation.run_until(2000)
+    folder = cut_off(simulation) / FOLDER
+    if damage == "journal":
+        os.truncate(folder / JOURNAL_NAME, 1000)
+    else:
+        path = folder / CHECKPOINT_NAME
+        old, new = (b"0.1.0", b"0.0.1") if damage == "version" else (b"\0", b"\1")
+        path.write_bytes(path.read_bytes().replace(old, new, 1))
+    assert undisturbed() == digests(fleet2d.resume(tmp_path / "run"))
+
+
+def test_what_was_done_to_a_run_is_done_again(tmp_path: Path) -> None:
+    def steered(**more: Any) -> fleet2d.Simulation:
+        simulation = fleet2d.Simulation(content(), **more)
+        simulation.run_until(700)
+        simulation.put("ana", "kitchen")
+        simulation.run_until(1500)
+        simulation.replan("astro")
+        return simulation
+
+    expected = digests(steered().run())
+    assert expected != undisturbed()
+    simulation = steered(out=tmp_path / "run")
+    simulation.run_until(1600)
+    assert simulation._keeper is not None
+    simulation._keeper.commit(simulation._state)  # the checkpoint is of step 1200
+    assert expected == digests(fleet2d.resume(cut_off(simulation)))
+
+
+def test_what_can_not_be_gone_on_with_says_why(tmp_path: Path) -> None:
+    fleet2d.run(scenario("1 min"), out=tmp_path / "whole")
+    with pytest.raises(RunDirectoryError, match="complete run: there is nothing"):
+        fleet2d.resume(tmp_path / "whole")
+    with pytest.raises(RunDirectoryError, match=r"no manifest\.json"):
+        fleet2d.resume(tmp_path)
+    simulation = fleet2d.Simulation(content(), out=tmp_path / "going")
+    with pytest.raises(RunDirectoryError, match="is being written by process"):
+        fleet2d.resume(tmp_path / "going")
+    assert "interrupted" == simulation.finish().status
+
+
+def test_an_input_that_changed_is_not_gone_on_with(tmp_path: Path) -> None:
+    found = content()
+    plan = Path(shutil.copy(found["floorplan"]["path"], tmp_path / "plan.json"))
+    found["floorplan"]["path"] = str(plan)
+    simulation = fleet2d.Simulation(found, out=tmp_path / "run")
+    simulation.run_until(2000)
+    directory = cut_off(simulation)
+    plan.write_text(plan.read_text() + " ")
+    with pytest.raises(RunDirectoryError, match=r"plan\.json has changed since"):
+        fleet2d.resume(directory)
+
+
+class KeepsAFile(Algorithm):
+    """Keeps what no file can hold."""
+
+    def start(self, home: Any) -> None:
+        self.log = sys.stdin
+
+    def update(self, history: Any, state: Any) -> None:
+        """Do nothing."""
+
+
+def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_path: Path) -> None:
+    own = {"algorithms": {"mine": {"type": f"{__name__}:KeepsAFile"}}}
+    found = scenario("1 h", users={"ana": {"type": "meander"}}, artifacts=CHECKPOINTED, **own)
+    simulation = fleet2d.Simulation(found, out=tmp_path / "run")
+    simulation.run_until(2000)
+    directory = cut_off(simulation)
+    done = fleet2d.resume(directory)
+    assert fleet2d.run(found).digest == done.digest
+    assert any("no checkpoint from step 600 on" in note for note in done.notes)
+
+
+# Kills
+
+
+@pytest.fixture(scope="module")
+def forks() -> Any:
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["fleet2d.engine.run", "fleet2d.artifacts.arrow"])
+    return context
+
+
+def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, forks: Any) -> None:
+    found, rng = content("6 h", checkpoint="30 min"), random.Random(14)
+
+    def begin(out: Path) -> Any:
+        run = forks.Process(target=fleet2d.run, args=(found,), kwargs={"out": out})
+        run.start()
+        return run
+
+    began = time.perf_counter()
+    begin(tmp_path / "whole").join()
+    took = time.perf_counter() - began
+    expected = digests(fleet2d.open_run(tmp_path / "whole"))
+    resumed = set()
+    for number in range(KILLS):
+        out = tmp_path / str(number)
+        run = begin(out)
+        time.sleep(rng.uniform(0, took))
+        run.kill()
+        run.join()
+        if not (out / "manifest.json").exists():
+            continue  # it had not begun
+        if fleet2d.open_run(out).status != "complete":
+            fleet2d.resume(out)
+        stored = fleet2d.open_run(out)
+        assert expected == digests(stored), number
+        assert verify_run(out).same, number
+        assert [] == verify_run(out).foreign
+        resumed.add(tuple(stored.manifest["resumed"]))
+        shutil.rmtree(out)
+    assert len(resumed) > 1 or KILLS < 10
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path: Path, number: int) -> None:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = ["-m", "fleet2d.cli", "run", "simulation.duration=20000 d", "--seed", "4"]
+    run = subprocess.Popen(
+        [sys.executable, *command, "--out", str(tmp_path / "run")],
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment,
+    )  # fmt: skip
+    while not (tmp_path / "run" / FOLDER / JOURNAL_NAME).exists():
+        time.sleep(0.05)
+        assert run.poll() is None
+    time.sleep(1)
+    run.send_signal(number)
+    _, heard = run.communicate(timeout=120)
+    assert 130 == run.returncode
+    first, last = heard.splitlines()
+    assert "storing what was simulated" in first
+    assert "interrupted at 2026" in last
+    assert "fleet2d resume" in last
+    stored = fleet2d.open_run(tmp_path / "run")
+    assert "interrupted" == stored.status
+    assert [] == stored.verify()
+    day, clock = last.split()[2:4]
+    assert f"{day} {clock.rstrip(';')}" in str(
+        stored.tables["events"]["time"][-1].as_py()
+    ) or stored.manifest["steps"]
+
+
+# Faults
+
+
+class Crash(BaseException):
+    """The process is gone: nothing that it would still do is done."""
+
+
+class Disk:
+    """Counts what is done to the disk, fails at one operation, and knows what is on the disk.
+
+    Attributes:
+        count: Operations so far.
+        fails_at: The first that fails.
+        dies: Whether the process ends with it, so that all later ones fail too.
+    """
+
+    def __init__(self, patch: pytest.MonkeyPatch, fails_at: int, *, dies: bool) -> None:
+        self.count, self.fails_at, self.dies = 0, fails_at, dies
+        self.synced: dict[Path, int] = {}
+        self.written: set[Path] = set()
+        self.locks: list[lock.RunLock] = []
+        self.is_dead = False
+        write_all, sync, replace = files.write_all, files.sync, files.replace
+        parquet, take = arrow.ParquetTable.write, lock.RunLock.__init__
+
+        def counted_write(handle: int, data: bytes) -> None:
+            self.written.add(self.path(handle))
+            if self.operation():
+                write_all(handle, data[: len(data) // 2])
+                self.fail()
+            write_all(handle, data)
+
+        def counted_sync(handle: int) -> None:
+            if self.operation():
+                self.fail()
+            sync(handle)
+            self.synced[self.path(handle)] = os.fstat(handle).st_size
+
+        def counted_replace(path: Path, by: Path) -> None:
+            if self.operation():
+                self.fail()
+            replace(path, by)
+            self.written.add(path)
+            self.synced[path] = self.synced.pop(by, 0)
+
+        def counted_parquet(table: Any, *rows: Any) -> None:
+            if self.operation():
+                self.fail()
+            parquet(table, *rows)
+
+        def kept_lock(taken: lock.RunLock, directory: Path) -> None:
+            take(taken, directory)
+            self.locks.append(taken)
+
+        patch.setattr(files, "write_all", counted_write)
+        patch.setattr(files, "sync", counted_sync)
+        patch.setattr(files, "replace", counted_replace)
+        patch.setattr(arrow.ParquetTable, "write", counted_parquet)
+        patch.setattr(lock.RunLock, "__init__", kept_lock)
+
+    @staticmethod
+    def path(handle: int) -> Path:
+        return Path(os.readlink(f"/proc/self/fd/{handle}"))
+
+    def operation(self) -> bool:
+        self.count += 1
+        return self.is_dead or self.count == self.fails_at
+
+    def fail(self) -> None:
+        if self.dies:
+            self.is_dead = True
+            raise Crash
+        raise OSError(5, "Input/output error")
+
+    def end(self, *, drop: bool) -> None:
+        """Let go of the locks as the system does; drop what was never synced."""
+        for taken in self.locks:
+            if taken._handle >= 0:
+                os.close(taken._handle)
+                taken._handle = -1
+        for path in self.written if drop else ():
+            if path.exists():
+                os.truncate(path, min(self.synced.get(path, 0), path.stat().st_size))
+
+
+def short() -> dict[str, Any]:
+    return content("20 min", checkpoint="5 min")
+
+
+def run_with_fault(out: Path, fails_at: int, *, dies: bool, drop: bool = False) -> int:
+    """Run with a fault; return the number of operations."""
+    with pytest.MonkeyPatch.context() as patch:
+        disk = Disk(patch, fails_at, dies=dies)
+        try:
+            fleet2d.run(short(), out=out)
+        except (Fleet2DError, Crash) as error:
+            if isinstance(error, Fleet2DError):
+                assert "can't be" in str(error), str(error)
+        else:
+            assert disk.count < fails_at or not dies
+        disk.end(drop=drop)
+    return disk.count
+
+
+@pytest.fixture(scope="module")
+def operations(tmp_path_factory: pytest.TempPathFactory) -> int:
+    return run_with_fault(tmp_path_factory.mktemp("count") / "run", 10**9, dies=False)
+
+
+def each(operations: int) -> Iterator[int]:
+    yield from range(1, operations + 1)
+
+
+@pytest.mark.parametrize(
+    ("dies", "drop"), [(False, False), (True, False), (True, True)], ids=["fails", "dies", "drops"]
+)
+def test_after_a_fault_at_any_operation_a_run_is_gone_on_with(
+    tmp_path: Path, operations: int, dies: bool, drop: bool
+) -> None:
+    expected, resumed = undisturbed("20 min"), 0
+    assert operations > 40
+    for fails_at in each(operations):
+        out = tmp_path / str(fails_at)
+        run_with_fault(out, fails_at, dies=dies, drop=drop)
+        if not (out / "manifest.json").exists():
+            continue  # before the first step: nothing is lost
+        stored = fleet2d.open_run(out)
+        for name in stored.tables:
+            assert stored.tables[name].num_rows >= 0
+        if stored.status != "complete":
+            fleet2d.resume(out)
+            resumed += 1
+        assert expected == digests(fleet2d.open_run(out)), fails_at
+        assert verify_run(out).same, fails_at
+        shutil.rmtree(out)
+    assert resumed > 30
+
+
+def test_a_fault_while_resuming_loses_nothing(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(short(), out=tmp_path / "first")
+    simulation.run_until(700)
+    first = cut_off(simulation)
+    expected = undisturbed("20 min")
+    fails_at, failed = 1, True
+    while failed:
+        out = shutil.copytree(first, tmp_path / str(fails_at))
+        with pytest.MonkeyPatch.context() as patch:
+            disk = Disk(patch, fails_at, dies=fails_at % 2 == 0)
+            try:
+                fleet2d.resume(out)
+            except (ArtifactError, RunDirectoryError, Crash):
+                pass
+            else:
+                failed = disk.count >= fails_at
+            disk.end(drop=False)
+        if fleet2d.open_run(out).status != "complete":
+            fleet2d.resume(out)
+        assert expected == digests(fleet2d.open_run(out)), fails_at
+        shutil.rmtree(out)
+        fails_at += 1
+    assert fails_at > 20
+
+
+def test_resume_on_the_command_line(tmp_path: Path) -> None:
+    changes = ("simulation.duration=2 d", "artifacts.checkpoint=6 h")
+    simulation = fleet2d.Simulation(None, *changes, seed=4, out=tmp_path / "run")
+    simulation.run_until(100_000)
+    cut_off(simulation)
+    done = fleet2d_process("resume", "run", cwd=tmp_path)
+    assert 0 == done.returncode, done.stderr
+    assert "going on from 2026-01-06 00:00:00, step 86400" in done.stderr
+    expected = fleet2d.run(None, *changes, seed=4).digest
+    assert expected == fleet2d.open_run(tmp_path / "run").digest
+    again = fleet2d_process("resume", "run", cwd=tmp_path)
+    assert 2 == again.returncode
+    assert "complete run" in again.stderr
