@@ -66,12 +66,6 @@ void move(const Breakpoints& track, i64 i, i64 moment, i64 step, i64 j, i64 stop
     std::fill(out.away.begin() + j, out.away.begin() + stop, track.away[i]);
 }
 
-// now + the least whole number of microseconds that is not below `us`.
-i64 later(i64 now, f64 us) {
-    us = std::ceil(us);
-    return us < static_cast<f64>(LATEST - now) ? now + static_cast<i64>(us) : LATEST;
-}
-
 // A body that wanders about in a space.
 struct Wanderer {
     const Mesh& walls;
@@ -100,6 +94,11 @@ struct Wanderer {
 };
 
 }  // namespace
+
+i64 later(i64 now, f64 us) {
+    us = std::ceil(us);
+    return us < static_cast<f64>(LATEST - now) ? now + static_cast<i64>(us) : LATEST;
+}
 
 i64 last_breakpoint(View<const i64> time, i64 moment) {
     i64 low = 0, high = time.size();

@@ -50,6 +50,9 @@ bool is_traceable(const Breakpoints& track);
 // Write the poses at times begin, begin + step, ... [us] to `out`. The track is traceable.
 void trace_track(const Breakpoints& track, i64 begin, i64 step, const PosesToFill& out);
 
+// now + the least whole number of microseconds that is not below `us`; LATEST at most.
+i64 later(i64 now, f64 us);
+
 // Turn a polyline into breakpoints: turn on the spot towards each leg, then walk it.
 //
 // `route` is (n, 2) lattice points, `begin` [us] and `heading` the state at route[0], `speed` in

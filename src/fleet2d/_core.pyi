@@ -1025,6 +1025,49 @@ def sum_places(chains: numpy.typing.NDArray[numpy.float64], unknown: numpy.typin
         and of 1.
     """
 
+class Legs:
+    """The breakpoints of a plan, gathered while it is built leg by leg."""
+
+    def __init__(self) -> None: ...
+
+    def __len__(self) -> int: ...
+
+    def mark(self, time: int, x: int, y: int, heading: int, away: int) -> None:
+        """
+        Add a breakpoint: time [us], x, y [lattice], heading [1/4096 turn], away.
+        """
+
+    def add(self, rows: numpy.typing.NDArray[numpy.int64]) -> None:
+        """Add breakpoints, int64 (n, 5)."""
+
+    def turn(self, time: int, x: int, y: int, heading: int, away: int, headings: int, turn_rate: float) -> tuple[int, int, int, int, int]:
+        """
+        Turn on the spot by a number of headings, counter-clockwise if positive.
+
+        Returns:
+            time, x, y, heading, away when that is done.
+        """
+
+    def walk(self, time: int, heading: int, route: numpy.typing.NDArray[numpy.int64], speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:
+        """
+        Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
+
+        Returns:
+            time, x, y, heading, away when that is done.
+        """
+
+    def rows(self) -> numpy.typing.NDArray[numpy.int64]:
+        """Return all breakpoints: int64 (n, 5)."""
+
+    def track(self) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Return all breakpoints by column: time, x, y, heading, int64 (n,), and away, uint8 (n,).
+        """
+
+    def __getstate__(self) -> numpy.typing.NDArray[numpy.int64]: ...
+
+    def __setstate__(self, arg: numpy.typing.NDArray[numpy.int64], /) -> None: ...
+
 WHOLE_PATCH: int = 255
 
 def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], seen: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:

@@ -29,6 +29,7 @@ NB_MODULE(_core, m) {
     bind_routes(m);
     bind_presence(m);
     bind_evidence(m);
+    bind_legs(m);
     bind_stays(m);
     bind_smoothing(m);
     bind_timelines(m);

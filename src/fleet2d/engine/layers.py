@@ -114,6 +114,8 @@ class LayerBook:
 
     def next_due(self, step: int) -> int | None:
         """Return the next step after `step` before which a layer is stored; None for none."""
+        if not self._home.layers:  # asked for at every span
+            return None
         periods = [self._period(layer) for layer in self._home.layers.values()]
         return min((every * (step // every + 1) for every in periods if every), default=None)
 

@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d._core import time_route, trace_meander, trace_track
+from fleet2d._core import Legs, time_route, trace_meander, trace_track
 
 __all__ = [
     "Breakpoints",
+    "Legs",
     "Poses",
     "WalkRule",
     "empty_poses",
