@@ -33,27 +33,29 @@ def cluster() -> Iterator[Any]:
 
 
 class KillsANode(SilentObserver):
-    """Kills a node of a cluster when three variants are done."""
+    """Kills a node of a cluster as soon as workers on both nodes are at work."""
 
-    def __init__(self, cluster: Any) -> None:
-        self.cluster, self.ended_count = cluster, 0
+    def __init__(self, cluster: Any, executor: Any) -> None:
+        self.cluster, self.executor, self.has_killed = cluster, executor, False
 
     def ended(self, record: Record) -> None:
-        self.ended_count += 1
-        if self.ended_count == 3:
+        at_work = sum(bool(actor.tasks) for actor in self.executor._crew)
+        if at_work == 2 and not self.has_killed:
+            self.has_killed = True
             self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)
 
 
 def test_a_node_that_dies_loses_only_what_it_ran(
     cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = small(base=base("30 min"), replicates=10)
+    study = small(base=base("30 min"), replicates=20)
     monkeypatch.setenv("RAY_ADDRESS", cluster.address)
     executor = api.make_executor("ray")
     assert 2 == executor.workers
-    observer = KillsANode(cluster)
+    observer = KillsANode(cluster, executor)
     counts, killed = run(study, tmp_path / "killed", executor, observer=observer)
-    assert (20, 0) == (counts.complete, counts.failed)
+    assert (40, 0) == (counts.complete, counts.failed)
+    assert observer.has_killed
     _, undisturbed = run(study, tmp_path / "undisturbed")
     assert digests(undisturbed) == digests(killed)
     assert killed.variants["attempts"].max() >= 2  # what the node ran was run again

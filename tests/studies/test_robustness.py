@@ -13,6 +13,7 @@ import yaml
 from tests.studies.scenes import SPEED, base, digests, run, small
 
 from fleet2d.studies.directory import StudyDirectory
+from fleet2d.studies.execution import cores
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import count
 
@@ -113,8 +114,9 @@ def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
     _, err = process.communicate(timeout=30)
     took = time.monotonic() - began
     code = -9 if sign == signal.SIGKILL else 130
-    assert (code, True) == (process.returncode, took < 1.0)
-    deadline = time.monotonic() + 1.0
+    patience = max(1.0, os.getloadavg()[0] / cores())  # where others compute, too, all takes longer
+    assert (code, True) == (process.returncode, took < patience)
+    deadline = time.monotonic() + patience
     while any(map(is_running, workers)) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not any(map(is_running, workers))
