@@ -11,7 +11,6 @@ import argparse
 import json
 import os
 import platform
-import shutil
 import statistics
 import subprocess
 import sys
@@ -130,21 +129,6 @@ def measure_process(plan: Path, runs: int) -> Row:
     return row
 
 
-def measure_first(plan: Path, runs: int) -> Row:
-    """Measure the first run ever on a machine: no kernel is compiled yet."""
-    content = scenario(plan, {"ana": SCHEDULE}, PATROL, 30)
-    times = []
-    for _ in range(runs):
-        cache = tempfile.mkdtemp()
-        times.append(run_once(content, {"NUMBA_CACHE_DIR": cache})["process_s"])
-        shutil.rmtree(cache)
-    row = Row(
-        "first run ever, kernels compiled", statistics.median(times), min(times), max(times), 30, 10
-    )
-    print(row, flush=True)
-    return row
-
-
 def measure_regions(plan: Path, runs: int) -> Row:
     """Measure the visibility regions of all free cells."""
     import numpy as np
@@ -216,7 +200,6 @@ def main() -> None:
         measure("the same with a sampled routine", routine, runs),
         measure("the same with meander for both", walks, runs, 1.5, 0.4),
         measure_process(plan, runs),
-        measure_first(plan, min(runs, 3)),
         measure("50 users on schedules", crowd, runs, 20, 5),
         measure_regions(plan, runs),
         *measure_growth(plan, min(runs, 3)),

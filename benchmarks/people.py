@@ -1,16 +1,21 @@
 """How true the people are: simulated time use beside the American Time Use Survey.
 
     python benchmarks/people.py compare [--people 1000] [--weeks 1] [--figure FILE] [--json FILE]
+    python benchmarks/people.py visits --data FOLDER [--days 28]   # moving about, as real people
     python benchmarks/people.py rooms [--figure FILE]      # room_sampling: shares over time
     python benchmarks/people.py speed [--users N]          # how long people take
     python benchmarks/people.py derive SURVEY_FOLDER       # writes routines/survey.json anew
 
 `compare` draws the days of that many people of each group of `population`, and prints how far the
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
-the largest difference of each activity. `rooms` simulates a user who samples rooms and prints how
-far the shares of time are from the given ones after 1, 2, 4, … days. `speed` times the planning of
-days, the base month with a routine beside the one with a schedule (in processor time: other work
-on the machine doesn't count), and a month of N people. `derive` makes the table that `population`
+the largest difference of each activity. `visits` prints how often each persona visits bathrooms,
+goes somewhere for less than three minutes, and comes back, and how long it stays in which kind of
+room, and how its hours differ from the survey's, beside the real homes of CASAS and UCI ADL and the
+simulated one of HOMER+; it fails where a persona is outside the spread of the real ones. `rooms`
+simulates a user who samples rooms and prints how far the shares of time are from the given ones
+after 1, 2, 4, … days. `speed` times the planning of days, the base month with a routine beside the
+one with a schedule (in processor time: other work on the machine doesn't count), and a month of N
+people. `derive` makes the table that `population`
 draws from of the survey's summary files.
 """
 
@@ -31,10 +36,27 @@ import numpy as np
 
 import fleet2d
 import fleet2d.routines.survey as survey
+from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
+from fleet2d.fit.visits import Visits, count_visits, spread, stays
+from fleet2d.routines.interruptions import uninterrupted
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import bundled, bundled_persona
 from fleet2d.streams import Draws, stream_key
 
+LOGS = {
+    "CASAS AL": "casas_al/events_10_days.txt",
+    "UCI ADL A": "uci_adl_a",
+    "HOMER+ A": "homer_plus_a",
+}
+REAL = ("CASAS AL", "UCI ADL A")
+# Which group of the survey a persona is most like, and which category an activity counts for there.
+LIKE = {"works_outside": "workers", "retired": "retired", "works_from_home": "workers"}
+CATEGORY_OF = {
+    "sleep": "sleeping", "nap": "sleeping", "work": "work", "work_at_home": "work",
+    "cook": "food_prep",
+    "breakfast": "eating", "lunch": "eating", "dinner": "eating", "snack": "eating", "tv": "tv",
+    "laundry": "laundry", "exercise": "exercise", "sport": "exercise", "walk": "exercise",
+}  # fmt: skip
 MONDAY = date(2026, 1, 5).toordinal()
 GROUPS = {"O1": "workers", "O2": "retired", "O3": "working_parents", "O4": "at_home"}
 # Codes of the survey's lexicon, longest prefix first, and the category or activity that they are.
@@ -240,6 +262,65 @@ def rooms_over_time(days: int, seeds: int) -> list[tuple[int, float, float]]:
     ]
 
 
+def show_visits(data: Path, days: int, seed: int) -> bool:
+    """Print the table of visits; return whether every persona is within the real homes' spread."""
+    homes = {name: trace_of_log(data / path) for name, path in LOGS.items()}
+    lives = {name: trace_of_persona(name, days, seed) for name in bundled()}
+    print(f"personas: {days} days from Monday, 2026-01-05, seed {seed}, bundled home, furnished")
+    print("per day: mean [lowest to highest day]")
+    print(f"{'':18}" + "".join(f"{name.replace('_', ' '):>20}" for name in Visits._fields))
+    counted = {name: count_visits(*trace) for name, trace in (homes | lives).items()}
+    for name, visits in counted.items():
+        cells = [f"{statistics.mean(v):.1f} [{min(v)} to {max(v)}]" for v in visits]
+        print(f"{name:18}" + "".join(f"{cell:>20}" for cell in cells))
+    low, high = spread([counted[name] for name in REAL])
+    cells = [f"{a} to {b}" for a, b in zip(low, high, strict=True)]
+    print(f"{'spread, real homes':18}" + "".join(f"{cell:>20}" for cell in cells))
+    show_dwell(homes | lives)
+    show_hours(days, seed)
+    good = True
+    for name in bundled():
+        for field, a, b, values in zip(Visits._fields, low, high, counted[name], strict=True):
+            if not a <= statistics.mean(values) <= b:
+                print(f"{name}: {field} {statistics.mean(values):.1f} is outside {a} to {b}")
+                good = False
+    return good
+
+
+def show_dwell(traces: dict[str, Trace]) -> None:
+    """Print visits per day and the quartiles of their lengths, by kind of room."""
+    print("\nvisits a day x median minutes [quartiles]")
+    for name, (trace, kinds) in traces.items():
+        found = stays(trace, kinds)
+        print(name)
+        for kind in sorted({stay.kind for stay in found}):
+            minutes = [stay.length / 60 for stay in found if stay.kind == kind]
+            low, middle, high = np.quantile(minutes, (0.25, 0.5, 0.75))
+            count = len(minutes) * 86_400 / len(trace)
+            print(f"  {kind:14}{count:6.1f} x {middle:6.1f} [{low:.1f} to {high:.1f}]")
+
+
+def show_hours(days: int, seed: int) -> None:
+    """Print how far personas' hours are from the survey's group that is most like them."""
+    print("\ntotal variation from the survey's group, per hour of weekdays: median, worst")
+    print("(personas claim no group; `population` does: see compare)")
+    for name, group in LIKE.items():
+        life = Life(bundled_persona(name), seed, "users.ana")
+        counts = [Counter[str]() for _ in range(24)]
+        for ordinal in range(MONDAY, MONDAY + days):
+            if date.fromordinal(ordinal).weekday() > 4:
+                continue
+            for doing in uninterrupted(life.day(ordinal)):
+                first = -(-(doing.begin - 1800) // 3600)
+                for hour in range(first, (doing.end - 1 - 1800) // 3600 + 1):
+                    counts[hour % 24][CATEGORY_OF.get(doing.activity, "other")] += 1
+        tvs = []
+        for hour, count in enumerate(counts):
+            wanted, total = survey.shares(group, "weekday")[hour], sum(count.values())
+            tvs.append(sum(abs(count[c] / total - wanted[c]) for c in survey.CATEGORIES) / 2)
+        print(f"{name:18}{group:18}{statistics.median(tvs):8.3f}{max(tvs):8.3f}")
+
+
 def draw_rooms(found: list[tuple[int, float, float]], path: Path) -> None:
     """Draw the error of the shares over time."""
     import matplotlib.pyplot as plt
@@ -318,6 +399,10 @@ def main() -> None:
     one.add_argument("--json", type=Path, help="write the rows to this file, too")
     two = commands.add_parser("derive")
     two.add_argument("folder", type=Path)
+    five = commands.add_parser("visits")
+    five.add_argument("--data", type=Path, required=True, help="the folder of the three logs")
+    five.add_argument("--days", type=int, default=28)
+    five.add_argument("--seed", type=int, default=4)
     three = commands.add_parser("rooms")
     three.add_argument("--days", type=int, default=64)
     three.add_argument("--seeds", type=int, default=8)
@@ -326,6 +411,10 @@ def main() -> None:
     four.add_argument("--users", type=int, default=50)
     four.add_argument("--days", type=int, default=30)
     arguments = parser.parse_args()
+    if arguments.command == "visits":
+        if not show_visits(arguments.data, arguments.days, arguments.seed):
+            raise SystemExit(1)
+        return
     if arguments.command == "rooms":
         rooms = rooms_over_time(arguments.days, arguments.seeds)
         print("days   error of a share   to be expected")

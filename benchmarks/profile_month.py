@@ -16,11 +16,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from fleet2d.engine.loop import Loop
+
 import fleet2d
 from fleet2d.engine import loop
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.loop import Loop
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.actor import Actor

@@ -243,6 +243,7 @@ def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:
 def compiled_lines() -> Callable[..., int]:
     """Return a loop over pairs as the engine's: it locates the eye, then follows the line."""
     from fleet2d.kernels._jit import kernel
+
     from fleet2d.kernels.mesh import locate
     from fleet2d.kernels.sight import walk_line_of_sight
 

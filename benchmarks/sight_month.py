@@ -86,6 +86,7 @@ def algorithms() -> tuple[Any, Any]:
 def in_the_loop() -> float:
     """Return what it takes to decide whether a user is in view, over the month [ns]."""
     from fleet2d.engine.buckets import Eye
+
     from fleet2d.engine.simulation import Simulation
 
     class Timed(Eye):

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from fleet2d.kernels._jit import kernel
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
@@ -26,7 +27,6 @@ from fleet2d.floorplan.gates import Gates
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels._jit import kernel
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh, locate
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import region_contains_points, visible_region

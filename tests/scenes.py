@@ -119,7 +119,7 @@ def everything(duration: str = "2 h", **changes: Any) -> dict[str, Any]:
                     ],
                 },
                 "bolt": {
-                    "camera": {**unsure, "detection": 1, "lost_after": "3.5 s"},
+                    "camera": {**unsure, "detection": 1, "lost_after": "4 s"},
                     "behaviors": [{"type": f"{OWN}:Greet", "patience": "40 s"}, {"type": "patrol"}],
                 },
                 "curio": {

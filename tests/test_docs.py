@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 from fleet2d.cli import app
 from fleet2d.engine.simulation import Simulation
@@ -137,3 +138,46 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
 def test_index_names_every_page() -> None:
     linked = set(LINK.findall((ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
     assert set() == {page.name for page in PAGES[1:]} - linked - {"index.md"}
+
+
+def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> None:
+    """Up to five minutes nobody; up to a quarter of an hour some, by two hundredths at most."""
+    text = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    table = text[text.index("| routine | 0.9") :].split("\n\n")[0]
+    rows = {row.split("|")[1].strip(): row.split("|")[2:5] for row in table.splitlines()}
+    naive = [float(cell) for cell in rows.pop("naive")]
+    best = [max(float(row[i]) for row in rows.values()) for i in range(3)]
+    assert best[0] < naive[0]
+    assert best[1] < naive[1]
+    assert naive[2] < best[2] < naive[2] + 0.02
+
+
+def test_readme_names_the_seed_of_the_bundled_scenario() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"fixes seed {load_scenario().simulation.seed}" in text
+
+
+def test_concepts_deny_nothing_that_there_is() -> None:
+    text = (ROOT / "docs" / "concepts.md").read_text(encoding="utf-8")
+    for denial in ("no furniture", "no doors", "no false detections", "don't react to the robot"):
+        assert denial not in text
+
+
+def test_commands_of_the_command_line_page_run_in_its_folder(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that need nothing but the page's own file, in order, at a day instead of sixty."""
+    page = ROOT / "docs" / "cli.md"
+    write_titled_blocks(page, folder)
+    ran = 0
+    for words in (param.values[0] for param in commands()):
+        if words[0] == "run" and "--out" in words and "runs/sixty" in words:
+            words = [w.replace("=60", "=1") for w in words]
+        elif words[0] not in ("show", "export") or "runs/sixty" not in words:
+            continue
+        if words[:2] == ["show", "home.yaml"]:
+            continue
+        result = CliRunner().invoke(app, words)
+        assert result.exception is None, (words, result.exception)
+        ran += 1
+    assert ran >= 4

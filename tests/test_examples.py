@@ -8,11 +8,13 @@ import yaml
 from tests.scenes import fleet2d_process, process
 
 import fleet2d
+from fleet2d.studies.driver import check_study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(EXAMPLES.rglob("*.py"))
 RUNNABLE = [path for path in SCRIPTS if '__name__ == "__main__"' in path.read_text()]
-SCENARIOS = sorted(EXAMPLES.rglob("*.yaml"))
+STUDIES = sorted((EXAMPLES / "studies").glob("*.yaml"))
+SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - set(STUDIES))
 
 
 @pytest.fixture
@@ -55,8 +57,15 @@ def test_a_scenario_runs_from_anywhere(examples: Path, path: Path) -> None:
         assert name in stored.tables
 
 
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
+def test_a_study_is_as_it_should_be(path: Path) -> None:
+    checked = check_study(path)
+    assert len(checked.plan.variants) > 10
+    assert checked.specification.file.compare or checked.specification.file.tune
+
+
 @pytest.mark.parametrize(
-    "path", [*SCRIPTS, *SCENARIOS], ids=lambda path: str(path.relative_to(EXAMPLES))
+    "path", [*SCRIPTS, *SCENARIOS, *STUDIES], ids=lambda path: str(path.relative_to(EXAMPLES))
 )
 def test_an_example_begins_by_saying_what_it_is(path: Path) -> None:
     first = path.read_text().splitlines()[0]

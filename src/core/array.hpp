@@ -42,8 +42,7 @@ struct View {
     // A view that may be written to is also one that may be read.
     template <class U>
         requires(std::is_const_v<T> && std::is_same_v<const U, T>)
-    constexpr View(const View<U, N>& other)
-        : data(other.data), shape(other.shape), stride(other.stride) {}
+    constexpr View(const View<U, N>& other) : data(other.data), shape(other.shape), stride(other.stride) {}
 
     constexpr i64 size() const { return shape[0]; }
 

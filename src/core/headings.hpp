@@ -69,8 +69,6 @@ constexpr i64 heading_of(i64 dx, i64 dy) {
 }
 
 // The shorter signed turn from `start` to `end`, in [-2048, 2047].
-constexpr i64 turn_between(i64 start, i64 end) {
-    return ((end - start + HALF_TURN) & (TURN - 1)) - HALF_TURN;
-}
+constexpr i64 turn_between(i64 start, i64 end) { return ((end - start + HALF_TURN) & (TURN - 1)) - HALF_TURN; }
 
 }  // namespace fleet2d

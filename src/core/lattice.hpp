@@ -7,8 +7,9 @@
 
 namespace fleet2d {
 
-inline constexpr i64 SUB = 64;          // lattice units per cell
-inline constexpr i64 CELL_CENTRE = 33;  // of a cell's centre from its corner: odd, so no axis-parallel wall runs through
+inline constexpr i64 SUB = 64;  // lattice units per cell
+inline constexpr i64 CELL_CENTRE =
+    33;  // of a cell's centre from its corner: odd, so no axis-parallel wall runs through
 
 // The largest integer that is not above a / b, b > 0.
 constexpr i64 floor_div(i64 a, i64 b) {

@@ -8,24 +8,24 @@ namespace fleet2d {
 
 // The constants of a robot's cameras, (cameras,) unless it says otherwise.
 struct Lenses {
-    View<const i64> near_squared;   // lattice units squared
-    View<const i64> far_squared;    // lattice units squared
-    View<const i64> half_angle;     // 1/8192 of a turn; 4096 and more is all round
-    View<const i64> chance;         // probability of noticing a user in view, times 2**53
-    View<const i64> moves;          // 0 if it is at the robot's centre and looks straight ahead
-    View<const i64> forward;        // where it sits, in the robot's frame [lattice units]
-    View<const i64> left;           // the same, to the left
-    View<const i64> heading;        // where it looks, from the robot's heading
-    View<const i64, 2> pans;        // (cameras, headings): added to `heading`, one after the other
-    View<const i64> pan_count;      // how many of them
-    View<const i64> pan_us;         // how long it looks in each
-    View<const i64> period;         // steps from look to look
-    View<const i64> latency;        // steps until a sighting is known
-    View<const i64> errs;           // 1 where what is perceived can be wrong
-    View<const i64> points;         // points of a user's body besides its centre that are looked at
-    View<const i64, 4> bodies;      // (cameras, users, points + 1, 2): where they are, from the centre; it is first
-    View<const i64, 2> reach;       // (cameras, users): how far they are from it
-    View<const i64, 2> widest;      // (cameras, users): farthest distance of a centre in view, squared
+    View<const i64> near_squared;  // lattice units squared
+    View<const i64> far_squared;   // lattice units squared
+    View<const i64> half_angle;    // 1/8192 of a turn; 4096 and more is all round
+    View<const i64> chance;        // probability of noticing a user in view, times 2**53
+    View<const i64> moves;         // 0 if it is at the robot's centre and looks straight ahead
+    View<const i64> forward;       // where it sits, in the robot's frame [lattice units]
+    View<const i64> left;          // the same, to the left
+    View<const i64> heading;       // where it looks, from the robot's heading
+    View<const i64, 2> pans;       // (cameras, headings): added to `heading`, one after the other
+    View<const i64> pan_count;     // how many of them
+    View<const i64> pan_us;        // how long it looks in each
+    View<const i64> period;        // steps from look to look
+    View<const i64> latency;       // steps until a sighting is known
+    View<const i64> errs;          // 1 where what is perceived can be wrong
+    View<const i64> points;        // points of a user's body besides its centre that are looked at
+    View<const i64, 4> bodies;     // (cameras, users, points + 1, 2): where they are, from the centre; it is first
+    View<const i64, 2> reach;      // (cameras, users): how far they are from it
+    View<const i64, 2> widest;     // (cameras, users): farthest distance of a centre in view, squared
 };
 
 struct Pose {
@@ -71,8 +71,8 @@ inline Pose camera_pose(const Lenses& lenses, i64 camera, Pose robot, i64 moment
 
 // How many points of a user's body are in view of the camera at `eye`, the user's centre being at (dx, dy)
 // from it. `triangle` holds the eye.
-inline i64 points_in_view(const Mesh& walls, const Lenses& lenses, i64 camera, i64 user, Pose eye, i64 triangle,
-                          i64 dx, i64 dy) {
+inline i64 points_in_view(const Mesh& walls, const Lenses& lenses, i64 camera, i64 user, Pose eye, i64 triangle, i64 dx,
+                          i64 dy) {
     const i64 near = lenses.near_squared[camera], far = lenses.far_squared[camera];
     const i64 half_angle = lenses.half_angle[camera];
     i64 shown = 0;

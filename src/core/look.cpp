@@ -14,11 +14,11 @@ constexpr i64 UNKNOWN = -1;
 struct Interval {
     i64 begin, end;  // steps; the last one is end - 1
     i64 camera, user;
-    Pose eye;        // of the camera
-    i64 dx, dy;      // the user, from there [lattice units]
-    i64 faces;       // 1/4096 turn
+    Pose eye;    // of the camera
+    i64 dx, dy;  // the user, from there [lattice units]
+    i64 faces;   // 1/4096 turn
     i64 posture;
-    i64 shown;       // points of the body in view, above 0
+    i64 shown;             // points of the body in view, above 0
     i64 steady = UNKNOWN;  // steady_chance of all this, once that is known
 
     bool comes_before(const Interval& other) const {
@@ -135,7 +135,7 @@ private:
     const Onlooker onlooker_;
     const View<const u8, 3> shown_;
     std::vector<Interval> found_;
-    Pose located_{};             // the camera that was located last
+    Pose located_{};              // the camera that was located last
     i64 triangle_ = UNKNOWN - 1;  // that holds it
 };
 
@@ -144,8 +144,15 @@ class Watch {
 public:
     Watch(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
           Onlooker onlooker, const Memory& memory, std::vector<Interval> intervals)
-        : walls_(walls), lenses_(lenses), errors_(errors), rule_(rule), window_(window), onlooker_(onlooker),
-          memory_(memory), intervals_(std::move(intervals)), cameras_(lenses.widest.shape[0]),
+        : walls_(walls),
+          lenses_(lenses),
+          errors_(errors),
+          rule_(rule),
+          window_(window),
+          onlooker_(onlooker),
+          memory_(memory),
+          intervals_(std::move(intervals)),
+          cameras_(lenses.widest.shape[0]),
           users_(lenses.widest.shape[1]) {
         for (const i64 seen : memory.seen) identities_in_view_ += seen;
         for (i64 c = 0; c < cameras_; ++c) {
@@ -186,7 +193,8 @@ private:
         if (!active_.empty() || is_haunted_) return step;
         i64 next = next_interval_ < intervals_.size() ? intervals_[next_interval_].begin : window_.end;
         for (i64 c = 0; c < cameras_; ++c) {
-            if (memory_.waiting(c, 1) > 0) next = std::min(next, read(memory_.backlog[c][memory_.waiting(c, 0) % memory_.backlog.shape[1]]).step);
+            if (memory_.waiting(c, 1) > 0)
+                next = std::min(next, read(memory_.backlog[c][memory_.waiting(c, 0) % memory_.backlog.shape[1]]).step);
         }
         if (identities_in_view_ > 0) {
             for (i64 i = 0; i < memory_.seen.size(); ++i) {
@@ -215,8 +223,18 @@ private:
         if (errs ? !pays_attention(target) : !is_detected(camera, target.user)) return;
         ++at(about, About::NOTICED);
         const i64 x = target.eye.x + target.dx, y = target.eye.y + target.dy;
-        Sighting sighting{now_ + lenses_.latency[camera], camera, target.user, target.user, x, y, target.faces,
-                          target.posture, x, y, target.faces, target.posture};
+        Sighting sighting{now_ + lenses_.latency[camera],
+                          camera,
+                          target.user,
+                          target.user,
+                          x,
+                          y,
+                          target.faces,
+                          target.posture,
+                          x,
+                          y,
+                          target.faces,
+                          target.posture};
         if (errs) perceive(target, sighting);
         record(camera, sighting);
     }
@@ -244,9 +262,8 @@ private:
         const i64 camera = target.camera;
         const View<const i64> table = errors_.table[camera];
         const View<const u64> keys = errors_.keys[camera][target.user];
-        sighting.identity = identify(table, errors_.whom[camera][target.user], keys,
-                                     memory_.about[camera][target.user], target.user, now_,
-                                     distance_bin(table, target.dx, target.dy), rule_.patience);
+        sighting.identity = identify(table, errors_.whom[camera][target.user], keys, memory_.about[camera][target.user],
+                                     target.user, now_, distance_bin(table, target.dx, target.dy), rule_.patience);
         const Offset offset = blurred(table, keys, now_, target.dx, target.dy);
         sighting.x += offset.dx - target.dx;
         sighting.y += offset.dy - target.dy;
@@ -265,8 +282,13 @@ private:
         const i64 draw = random_share(stream(keys, GhostDraw::COUNT), now_);
         const i64 count = pick(errors_.ghosts[camera], draw);
         if (count == 0) return;
-        const Sector sector{eye.x, eye.y, locate(walls_, eye.x, eye.y), eye.heading, lenses_.half_angle[camera],
-                            lenses_.near_squared[camera], lenses_.far_squared[camera]};
+        const Sector sector{eye.x,
+                            eye.y,
+                            locate(walls_, eye.x, eye.y),
+                            eye.heading,
+                            lenses_.half_angle[camera],
+                            lenses_.near_squared[camera],
+                            lenses_.far_squared[camera]};
         // The draws about ghost k of a look have counter k, in a stream of that look.
         const auto key_of = [&](GhostDraw purpose) {
             return random_bits(stream(keys, purpose), static_cast<u64>(now_));

@@ -12,7 +12,7 @@ namespace fleet2d {
 // One sighting, as it stands in a row of an array. Where a camera was wrong about a person, `user` is NOBODY;
 // where it didn't recognize one, `identity` is. What isn't true_ is as perceived.
 struct Sighting {
-    i64 step;    // when it becomes known
+    i64 step;  // when it becomes known
     i64 camera;
     i64 user;
     i64 identity;

@@ -9,9 +9,9 @@
 
 namespace fleet2d {
 
-inline constexpr i64 BUCKET = 256;   // side of the square buckets that find the triangle of a point, lattice units
-inline constexpr i64 OUTSIDE = -1;   // the triangle of a point that lies in no triangle
-inline constexpr i64 WALL = -1;      // the neighbor across an edge that is a wall
+inline constexpr i64 BUCKET = 256;     // side of the square buckets that find the triangle of a point, lattice units
+inline constexpr i64 OUTSIDE = -1;     // the triangle of a point that lies in no triangle
+inline constexpr i64 WALL = -1;        // the neighbor across an edge that is a wall
 inline constexpr i64 LIMIT = 1 << 20;  // the largest coordinate: products of two differences fit in 2**42
 
 // The edge of a triangle that follows edge k, counter-clockwise; and the one before.
@@ -32,14 +32,14 @@ struct Beyond {
 
 // A triangulation of free space without extra points; may have holes and several components.
 struct Mesh {
-    View<const i64, 2> vertices;   // (n, 2) lattice units
-    View<const i32, 2> triangles;  // (t, 3) vertices, counter-clockwise
-    View<const i32, 2> neighbors;  // (t, 3) the triangle across edge k (vertex k to k + 1), WALL for a wall
+    View<const i64, 2> vertices;       // (n, 2) lattice units
+    View<const i32, 2> triangles;      // (t, 3) vertices, counter-clockwise
+    View<const i32, 2> neighbors;      // (t, 3) the triangle across edge k (vertex k to k + 1), WALL for a wall
     View<const i32> bucket_start;      // (rows * columns + 1,) where each bucket begins in bucket_triangles
     View<const i32> bucket_triangles;  // the triangles that overlap each bucket, ascending
     i64 bucket_columns = 0;
     i64 bucket_rows = 0;
-    View<const Beyond> beyond;         // (3 t,) what lies beyond each edge
+    View<const Beyond> beyond;  // (3 t,) what lies beyond each edge
 
     i64 vertex_count() const { return vertices.size(); }
     i64 triangle_count() const { return triangles.size(); }

@@ -66,12 +66,6 @@ void move(const Breakpoints& track, i64 i, i64 moment, i64 step, i64 j, i64 stop
     std::fill(out.away.begin() + j, out.away.begin() + stop, track.away[i]);
 }
 
-// now + the least whole number of microseconds that is not below `us`.
-i64 later(i64 now, f64 us) {
-    us = std::ceil(us);
-    return us < static_cast<f64>(LATEST - now) ? now + static_cast<i64>(us) : LATEST;
-}
-
 // A body that wanders about in a space.
 struct Wanderer {
     const Mesh& walls;
@@ -101,6 +95,11 @@ struct Wanderer {
 
 }  // namespace
 
+i64 later(i64 now, f64 us) {
+    us = std::ceil(us);
+    return us < static_cast<f64>(LATEST - now) ? now + static_cast<i64>(us) : LATEST;
+}
+
 i64 last_breakpoint(View<const i64> time, i64 moment) {
     i64 low = 0, high = time.size();
     while (high - low > 1) {
@@ -124,8 +123,8 @@ bool is_traceable(const Breakpoints& track) {
         if (i == 0) continue;
         if (track.time[i] < track.time[i - 1]) return false;
         const i64 turn = turn_between(track.heading[i - 1], track.heading[i]);
-        const i64 change = std::max({std::abs(track.x[i] - track.x[i - 1]), std::abs(track.y[i] - track.y[i - 1]),
-                                     std::abs(turn)});
+        const i64 change =
+            std::max({std::abs(track.x[i] - track.x[i - 1]), std::abs(track.y[i] - track.y[i - 1]), std::abs(turn)});
         const f64 whole = static_cast<f64>(track.time[i] - track.time[i - 1]);
         if (static_cast<f64>(change) * whole > static_cast<f64>(LATEST)) return false;
     }
@@ -193,7 +192,7 @@ void trace_meander(const Mesh& walls, const Mesh& space, const WalkRule& rule, i
         // A stride is in 1/256 lattice units and a cosine in 2**-30; rounded to nearest.
         const i64 dx = (rule.stride * cosine(ahead) + (i64{1} << 37)) >> 38;
         const i64 dy = (rule.stride * sine(ahead) + (i64{1} << 37)) >> 38;
-        if (body.go({body.at.x + dx, body.at.y + dy})) {
+        if (body.go({body.at.x + dx, body.at.y + dy}) || rule.stays != 0) {
             heading = ahead;
         } else {
             const u64 choices = static_cast<u64>(2 * rule.turn_limit + 1);

@@ -50,6 +50,9 @@ bool is_traceable(const Breakpoints& track);
 // Write the poses at times begin, begin + step, ... [us] to `out`. The track is traceable.
 void trace_track(const Breakpoints& track, i64 begin, i64 step, const PosesToFill& out);
 
+// now + the least whole number of microseconds that is not below `us`; LATEST at most.
+i64 later(i64 now, f64 us);
+
 // Turn a polyline into breakpoints: turn on the spot towards each leg, then walk it.
 //
 // `route` is (n, 2) lattice points, `begin` [us] and `heading` the state at route[0], `speed` in
@@ -63,6 +66,7 @@ struct WalkRule {
     i64 stride;      // 1/256 lattice units forward
     i64 sway;        // standard deviation of the turn, in 2**-16 headings per unit of random_bell
     i64 turn_limit;  // headings, half a turn at most
+    i64 stays;       // 1: where a wall is in the way it only sways, as the published Fleet2D does
 };
 
 // Walk at random from `start` and `heading`, where the body is at step `first`; out[j] is the pose at

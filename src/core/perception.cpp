@@ -11,15 +11,11 @@ namespace {
 constexpr i64 TRIES = 64;  // points of a sector that are tried before nothing is taken to be in view
 
 // whole * part / 2**20, rounded down, for any whole below 2**62 and part below 2**20.
-constexpr i64 scaled(i64 whole, i64 part) {
-    return (whole >> 20) * part + (((whole & ((1 << 20) - 1)) * part) >> 20);
-}
+constexpr i64 scaled(i64 whole, i64 part) { return (whole >> 20) * part + (((whole & ((1 << 20) - 1)) * part) >> 20); }
 
 }  // namespace
 
-i64 distance_bin(View<const i64> table, i64 dx, i64 dy) {
-    return std::min(length(dx, dy) >> table[SHIFT], BINS - 1);
-}
+i64 distance_bin(View<const i64> table, i64 dx, i64 dy) { return std::min(length(dx, dy) >> table[SHIFT], BINS - 1); }
 
 i64 lasting(View<const i64> table, i64 steps) {
     i64 share = ONE;

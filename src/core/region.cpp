@@ -35,7 +35,7 @@ i64 append_region(const Mesh& mesh, i64 x, i64 y, const Pieces& pieces, PieceLis
     const i64 first = first_by_angle(mesh, x, y, pieces);
     lists.right.grow(used + pieces.count(), used);
     lists.wall.grow(used + pieces.count(), used);
-    const View<const i32> &right = pieces.right, &wall = pieces.wall;
+    const View<const i32>&right = pieces.right, &wall = pieces.wall;
     std::rotate_copy(right.begin(), right.begin() + first, right.end(), lists.right.data() + used);
     std::rotate_copy(wall.begin(), wall.begin() + first, wall.end(), lists.wall.data() + used);
     return used + pieces.count();

@@ -188,11 +188,11 @@ private:
         const auto [ux, uy] = piece.along;
         i64 dy = first_row * SUB + centre - eye_y;
         // The right border: up to its column, less what is right on it and not before its corner.
-        Stepper right = ry > 0 ? Stepper::of((eye_x - centre) * ry + dy * rx, SUB * rx, SUB * ry)
-                               : Stepper::constant(FAR_OUT);
+        Stepper right =
+            ry > 0 ? Stepper::of((eye_x - centre) * ry + dy * rx, SUB * rx, SUB * ry) : Stepper::constant(FAR_OUT);
         // The left border: beyond its column.
-        Stepper left = ly > 0 ? Stepper::of((eye_x - centre) * ly + dy * lx, SUB * lx, SUB * ly)
-                              : Stepper::constant(-FAR_OUT);
+        Stepper left =
+            ly > 0 ? Stepper::of((eye_x - centre) * ly + dy * lx, SUB * lx, SUB * ly) : Stepper::constant(-FAR_OUT);
         // The wall: up to its column for a wall to the right, beyond it for one to the left.
         const i64 height = first_row * SUB + centre - piece.wall.y;
         const i64 numerator = (piece.wall.x - centre) * uy + ux * height;
@@ -251,7 +251,11 @@ bool is_beside(const Piece& piece, const HalfPlane& plane) {
 }  // namespace
 
 CellFinder::CellFinder(const Mesh& mesh, i64 rows, i64 columns)
-    : mesh_(mesh), rows_(rows), columns_(columns), lookout_(mesh), low_(Array<i64>::empty({rows})),
+    : mesh_(mesh),
+      rows_(rows),
+      columns_(columns),
+      lookout_(mesh),
+      low_(Array<i64>::empty({rows})),
       high_(Array<i64>::empty({rows})) {}
 
 const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& reach) {

@@ -67,8 +67,8 @@ bool line_of_sight(const Mesh& mesh, i64 qx, i64 qy, i64 triangle, i64 px, i64 p
     }
 }
 
-i64 look_through(const Mesh& mesh, i64 x, i64 y, i64 triangle, i64 edge, View<i32> right, View<i32> wall,
-                 i64 count, View<i32, 2> stack) {
+i64 look_through(const Mesh& mesh, i64 x, i64 y, i64 triangle, i64 edge, View<i32> right, View<i32> wall, i64 count,
+                 View<i32, 2> stack) {
     stack(0, 0) = static_cast<i32>(3 * triangle + edge);
     stack(0, 1) = mesh.triangles(triangle, edge);
     stack(0, 2) = mesh.triangles(triangle, following_edge(edge));
@@ -156,8 +156,8 @@ i64 vertices_seen_from_vertex(const Mesh& mesh, const Fans& fans, i64 vertex, Vi
         const i64 triangle = fans.triangles[i];
         i64 corner = 0;
         while (mesh.corner(triangle, corner) != vertex) ++corner;
-        count = look_through(mesh, at.x, at.y, triangle, following_edge(corner), seen, scratch.wall, count,
-                             scratch.stack);
+        count =
+            look_through(mesh, at.x, at.y, triangle, following_edge(corner), seen, scratch.wall, count, scratch.stack);
         const i64 last = previous_edge(corner);
         if (mesh.neighbor(triangle, last) == WALL) {
             check_room(count, seen);

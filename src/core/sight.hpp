@@ -25,8 +25,8 @@ struct Scratch {
 
 // Append the pieces seen from (x, y) through one edge of its triangle, from right to left, to
 // `right` and `wall`; the new number of pieces. `stack` is scratch space.
-i64 look_through(const Mesh& mesh, i64 x, i64 y, i64 triangle, i64 edge, View<i32> right, View<i32> wall,
-                 i64 count, View<i32, 2> stack);
+i64 look_through(const Mesh& mesh, i64 x, i64 y, i64 triangle, i64 edge, View<i32> right, View<i32> wall, i64 count,
+                 View<i32, 2> stack);
 
 // The triangles around each vertex.
 struct Fans {

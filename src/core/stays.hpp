@@ -29,9 +29,7 @@ struct Stretches {
 };
 
 // What part of a patch is in view, from 0 to 1.
-inline f64 part_in_view(u8 shown) {
-    return shown * (1.0 / WHOLE_PATCH);
-}
+inline f64 part_in_view(u8 shown) { return shown * (1.0 / WHOLE_PATCH); }
 
 struct Range {
     i64 begin, end;

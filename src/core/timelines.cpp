@@ -131,7 +131,9 @@ BodyPose drawn_pose(const WalkPiece& walk, i64 step) {
 }  // namespace
 
 Window OwnedWindow::view() const {
-    return {first, end, view_of(start), view_of(step), view_of(x), view_of(y), view_of(heading), view_of(away), view_of(posture)};
+    return {first,           end,        view_of(start),   view_of(step),
+            view_of(x),      view_of(y), view_of(heading), view_of(away),
+            view_of(posture)};
 }
 
 void Timelines::put(i64 body, Piece piece) {
@@ -190,7 +192,8 @@ void Timelines::forget(i64 before) {
         WalkPiece& walk = *pieces.front().walk;
         const i64 drop = std::min(before - walk.drawn_from, static_cast<i64>(walk.x.size()) - 1);
         if (drop > 0) {
-            for (auto* values : {&walk.x, &walk.y, &walk.heading}) values->erase(values->begin(), values->begin() + drop);
+            for (auto* values : {&walk.x, &walk.y, &walk.heading})
+                values->erase(values->begin(), values->begin() + drop);
             walk.drawn_from += drop;
         }
     }

@@ -25,13 +25,13 @@ struct BodyPose {
 struct Window {
     i64 first = 0;
     i64 end = 0;
-    View<const i64> start;      // (bodies + 1,)
-    View<const i64> step;       // (runs,) at which each begins
-    View<const i64> x;          // lattice units
-    View<const i64> y;          // lattice units
-    View<const i64> heading;    // 1/4096 turn
-    View<const u8> away;        // not 0 while the body isn't at home
-    View<const i8> posture;     // number of the posture
+    View<const i64> start;    // (bodies + 1,)
+    View<const i64> step;     // (runs,) at which each begins
+    View<const i64> x;        // lattice units
+    View<const i64> y;        // lattice units
+    View<const i64> heading;  // 1/4096 turn
+    View<const u8> away;      // not 0 while the body isn't at home
+    View<const i8> posture;   // number of the posture
 
     i64 bodies() const { return start.size() - 1; }
     // The step before which a run of a body ends.

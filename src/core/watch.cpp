@@ -63,17 +63,16 @@ void count_cells(i64 patch, i64 count, View<i32> cells) {
 class Looker {
 public:
     explicit Looker(const Watched& watched)
-        : watched_(watched),
-          finder_(watched.walls, watched.patch_of_cell.shape[0], watched.patch_of_cell.shape[1]) {}
+        : watched_(watched), finder_(watched.walls, watched.patch_of_cell.shape[0], watched.patch_of_cell.shape[1]) {}
 
     // The cells that one camera shows from a pose of the robot; valid until the next call.
     const std::vector<Span>& look(i64 camera, View<const i64> pose, i64 step) {
         const Lenses& lenses = watched_.lenses;
         const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FAR_AWAY, FAR_AWAY); };
         const Pose robot{clamped(pose[0]), clamped(pose[1]), pose[2] & (TURN - 1)};
-        return finder_.cells_in_view(camera_pose(lenses, camera, robot, step * watched_.step_us),
-                                     {lenses.near_squared[camera], lenses.far_squared[camera],
-                                      lenses.half_angle[camera]});
+        return finder_.cells_in_view(
+            camera_pose(lenses, camera, robot, step * watched_.step_us),
+            {lenses.near_squared[camera], lenses.far_squared[camera], lenses.half_angle[camera]});
     }
 
 private:
@@ -85,7 +84,8 @@ void settle(const Watched& watched, const Glances& glances, View<i64, 2> seen, L
     for (i64 slot = 0; slot < glances.slots(); ++slot) {
         const i64 step = glances.last[slot];
         if (step == glances.settled[slot]) continue;
-        if (step < 0 || step > LAST_MOMENT / watched.step_us) throw std::invalid_argument("last must hold steps, or -1");
+        if (step < 0 || step > LAST_MOMENT / watched.step_us)
+            throw std::invalid_argument("last must hold steps, or -1");
         glances.settled[slot] = step;
         for (i64 camera = 0; camera < watched.cameras(); ++camera) {
             for (const Span& span : looker.look(camera, glances.pose[slot], step)) {

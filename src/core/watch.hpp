@@ -42,11 +42,11 @@ struct Record {
 // What doesn't change while a robot watches.
 struct Watched {
     Mesh walls;
-    Lenses lenses;                      // the robot's cameras
-    View<const i16, 2> patch_of_cell;   // (rows, columns) -1 for a cell of no patch
-    i64 step_us;                        // length of a step
-    i64 every;                          // it looks at the steps that this divides; each look stands for so many
-    i64 bin_steps;                      // steps of a bin of Record::binned; bins begin at step 0
+    Lenses lenses;                     // the robot's cameras
+    View<const i16, 2> patch_of_cell;  // (rows, columns) -1 for a cell of no patch
+    i64 step_us;                       // length of a step
+    i64 every;                         // it looks at the steps that this divides; each look stands for so many
+    i64 bin_steps;                     // steps of a bin of Record::binned; bins begin at step 0
 
     i64 cameras() const { return lenses.near_squared.size(); }
 };

@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from fleet2d.scenario.model import load_scenario as load_scenario
     from fleet2d.sight.fov import FieldOfView as FieldOfView
     from fleet2d.sight.region import VisibleRegion as VisibleRegion
+    from fleet2d.studies.api import map_runs as map_runs
+    from fleet2d.studies.api import study as study
+    from fleet2d.studies.reader import Study as Study
+    from fleet2d.studies.reader import open_study as open_study
     from fleet2d.units import Duration as Duration
     from fleet2d.units import Length as Length
     from fleet2d.units import Share as Share
@@ -67,14 +71,18 @@ _HOME_OF = {
     "Share": "units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
+    "Study": "studies.reader",
     "VisibleRegion": "sight.region",
     "load_floorplan": "floorplan.load",
     "load_scenario": "scenario.model",
+    "map_runs": "studies.api",
     "open_run": "artifacts.reader",
+    "open_study": "studies.reader",
     "register": "component",
     "reproduce": "engine.reproduce",
     "resume": "engine.resume",
     "run": "engine.run",
+    "study": "studies.api",
 }
 
 __all__ = sorted([*_HOME_OF, "__version__"])

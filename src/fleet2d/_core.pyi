@@ -994,13 +994,131 @@ def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64]
         float64 (replicates, values), each the sum of as many days as there are.
     """
 
+def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], patch_cells: numpy.typing.NDArray[numpy.int64], room_cells: numpy.typing.NDArray[numpy.int64], bin_steps: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+    """
+    Return how much was in view, bin by bin; of several robots, that of the one that saw most.
+
+    Args:
+        cells: int64 (bins, robots, 2, patches), cells in view, summed over the steps of a bin, and at most at one.
+        room: int64 (patches,), the room of each patch, ascending, none left out.
+        patch_cells: int64 (patches,), how many cells each has.
+        room_cells: int64 (rooms,), how many cells each room has, 1 at least.
+        bin_steps: Steps of a bin.
+
+    Returns:
+        Shares of the cells in view, averaged over the steps: float64 (bins, rooms), and (bins, patches); at most at
+        one step: float64 (bins, patches); and that in parts of 255: uint8 (bins, patches).
+    """
+
+def sum_places(chains: numpy.typing.NDArray[numpy.float64], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sum what presence adds up, by hour, in the order of NumPy's add.reduceat over the first axis.
+
+    Args:
+        chains: float64 (users, bins, places), probability of each place, away last.
+        unknown: bool (bins, places - 1), where somebody was perceived who is no user.
+        users: How many users there are; 0: `chains` holds one person, who is anyone.
+        first: int64 (hours,), the bins at which hours begin, the first 0.
+
+    Returns:
+        float64 (hours, users + 1, 2 places + 1), anyone last: sums of the probability p of each place, of p (1 - p),
+        and of 1.
+    """
+
+class Legs:
+    """The breakpoints of a plan, gathered while it is built leg by leg."""
+
+    def __init__(self) -> None: ...
+
+    def __len__(self) -> int: ...
+
+    def mark(self, time: int, x: int, y: int, heading: int, away: int) -> None:
+        """
+        Add a breakpoint: time [us], x, y [lattice], heading [1/4096 turn], away.
+        """
+
+    def add(self, rows: numpy.typing.NDArray[numpy.int64]) -> None:
+        """Add breakpoints, int64 (n, 5)."""
+
+    def turn(self, time: int, x: int, y: int, heading: int, away: int, headings: int, turn_rate: float) -> tuple[int, int, int, int, int]:
+        """
+        Turn on the spot by a number of headings, counter-clockwise if positive.
+
+        Returns:
+            time, x, y, heading, away when that is done.
+        """
+
+    def walk(self, time: int, heading: int, route: numpy.typing.NDArray[numpy.int64], speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:
+        """
+        Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
+
+        Returns:
+            time, x, y, heading, away when that is done.
+        """
+
+    def rows(self) -> numpy.typing.NDArray[numpy.int64]:
+        """Return all breakpoints: int64 (n, 5)."""
+
+    def track(self) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Return all breakpoints by column: time, x, y, heading, int64 (n,), and away, uint8 (n,).
+        """
+
+    def __getstate__(self) -> numpy.typing.NDArray[numpy.int64]: ...
+
+    def __setstate__(self, arg: numpy.typing.NDArray[numpy.int64], /) -> None: ...
+
 WHOLE_PATCH: int = 255
 
-def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], seen: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]: ...
+def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], seen: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """Take together bins that are alike; see `fleet2d.kernels.stays`."""
 
-def follow(ways: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]: ...
+def follow(ways: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Return where a person was, given the evidence up to each stretch; see `smooth`.
 
-def smooth(ways: tuple[Any, ...], stretches: tuple[Any, ...], dawn: numpy.typing.NDArray[numpy.float64], dusk: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
+    Args:
+        ways: How the person goes on.
+        stretches: The evidence, of one stretch at least.
+        now: float64 (2, stages, patches), probability before the first stretch, of states in view and
+            of hidden ones; becomes that after the last.
+        shown: int64 (patches,), what part of each patch was in view before, in 1/255, -1 if that isn't
+            known; becomes that of the last.
+
+    Returns:
+        P(room), away last, in each stretch: float64 (stretches, rooms + 1).
+
+    Raises:
+        ValueError: Arrays aren't of one person, or hold numbers of patches or sightings that aren't.
+    """
+
+def smooth(ways: tuple[Any, ...], stretches: tuple[Any, ...], dawn: numpy.typing.NDArray[numpy.float64], dusk: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return where a person was, given all evidence of some stretches.
+
+    Between two stretches a person may go on once: leave a stage, with the chance to do so within the
+    later one, or change patch within the room. With stretches of one bin that is a hidden Markov chain;
+    with longer ones, what happens within a stretch is taken to happen as it begins. A person who comes
+    to a patch of which a part is in view is in that part with the chance of its size, and stays in it
+    or out of it until the person moves or what is in view of it changes. In view the person isn't
+    perceived in any of n bins with (1 - detection)^n; out of view never, unless nothing of the patch
+    was in view where somebody was perceived: positions may be noisy.
+
+    Args:
+        ways: How the person goes on.
+        stretches: The evidence.
+        dawn: float64 (stages, patches), probability before the first stretch.
+        dusk: float64 (stages, patches), how likely each makes what comes after the last.
+        moments: To add to.
+
+    Returns:
+        P(room) in each stretch, float64 (stretches, rooms + 1); the probability of stage and patch
+        after the last, given what was before, and how likely each before the first makes the
+        evidence, largest 1: float64 (stages, patches) each.
+
+    Raises:
+        ValueError: Arrays aren't of one person, or hold numbers of patches or sightings that aren't.
+    """
 
 class Window:
     """

@@ -1,7 +1,7 @@
 """Events: what happens in a run, as its tables, its algorithms and its scripts hear of it."""
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 from typing import NamedTuple, Protocol
 
@@ -25,8 +25,10 @@ class EventKind(StrEnum):
     # Of people.
     ACTIVITY = "activity"
     CAME_HOME = "came_home"
+    KNOWN = "known"
     LEFT_HOME = "left_home"
     REACTS = "reacts"
+    UNKNOWN = "unknown"
     USES = "uses"
     # Of robots.
     APPROACHES = "approaches"
@@ -39,11 +41,13 @@ class EventKind(StrEnum):
     FIND_BEGINS = "find_begins"
     FOLLOWS = "follows"
     FOUND = "found"
+    GAVE_UP = "gave_up"
     GIVES_UP = "gives_up"
     GIVES_WAY = "gives_way"
     INTERACTION_OVER = "interaction_over"
     INTERACTS = "interacts"
     LOST = "lost"
+    NOT_AT_HOME = "not_at_home"
     RELOCATES = "relocates"
     REPLAY = "replay"
     RETRACED = "retraced"
@@ -100,6 +104,17 @@ class EventSink(Protocol):
         """Take events, in the order in which they became known, not by step."""
 
 
+class Listener:
+    """A function that takes the events of a run."""
+
+    def __init__(self, function: Callable[[Sequence[Event]], None]) -> None:
+        self.function = function
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Call the function."""
+        self.function(events)
+
+
 class EventStream:
     """The events of a run: each is made once, and handed to all sinks.
 
@@ -113,6 +128,11 @@ class EventStream:
         self.sinks = list(sinks)
         self._recent: deque[Event] = deque(maxlen=self.KEPT)
         self._dropped_until = 0  # every event from this step on is still there
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out functions that listen: they belong to who called, not to the run."""
+        sinks = [sink for sink in self.sinks if not isinstance(sink, Listener)]
+        return {**self.__dict__, "sinks": sinks}
 
     def emit(self, events: Sequence[Event]) -> None:
         """Hand events to all sinks."""

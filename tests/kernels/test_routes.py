@@ -229,9 +229,7 @@ def test_routes_keep_their_mesh_and_can_be_pickled() -> None:
         ("simple", lambda a: a[:-1]),
     ],
 )
-def test_routes_refuse_corners_that_are_none(
-    field: str, change: Callable[[Int64], Int64]
-) -> None:
+def test_routes_refuse_corners_that_are_none(field: str, change: Callable[[Int64], Int64]) -> None:
     home = crowded(1)
     corners = corners_of(home)
 

@@ -1,18 +1,13 @@
-"""What the results share: intervals that hold the truth, and months that don't mind each other."""
+"""What the results share: intervals that hold the truth, and studies of months."""
+
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from fleet2d.paper import ltp_gap
-from fleet2d.paper.months import Request, cores, interval, run_all, silent
-
-ONE_DAY = [ltp_gap.robot_month(number, 1) for number in range(3)]
-
-
-def doubled(number: int) -> int:
-    if number == 13:
-        raise ValueError("13")
-    return 2 * number
+from fleet2d.errors import ComponentError
+from fleet2d.paper.months import Request, interval, month, run_study, silent
 
 
 def test_intervals_hold_the_true_mean_as_often_as_they_say() -> None:
@@ -26,31 +21,45 @@ def test_an_interval_holds_its_mean_and_is_the_same_each_time() -> None:
     values = [0.1, 0.4, 0.2, 0.9]
     mean, low, high = interval(values)
     assert mean == pytest.approx(0.4)
-    assert 0.1 <= low < mean < high <= 0.9
+    assert low < mean < high
     assert (mean, low, high) == interval(values)
 
 
-def test_all_is_run_in_order_and_told_of() -> None:
+def days(**keys: Any) -> dict[str, Any]:
+    robot = {"type": "patrol"}
+    base = month(robot, algorithms={}, metrics={"sightings": {}}, days=1)
+    return {"base": base, "axes": {"robots.astro.speed": [0.3, 0.6]}, **keys}
+
+
+def test_progress_is_told(tmp_path: Path) -> None:
     told: list[tuple[str, int, int]] = []
-    found = run_all(
-        doubled, [3, 1, 2], Request(), lambda what, done, of: told.append((what, done, of)), "cases"
+    request = Request(workers=1, folder=tmp_path)
+    run_study("days", days(), request, lambda *one: told.append(one))
+    assert [("months", done, 2) for done in range(3)] == told[-3:]
+
+
+def test_months_that_are_there_are_not_run_again(tmp_path: Path) -> None:
+    request = Request(workers=1, folder=tmp_path)
+    once = run_study("days", days(), request, silent)
+    told: list[tuple[str, int, int]] = []
+    again = run_study("days", days(), request, lambda *one: told.append(one))
+    assert [("months", 2, 2)] == told
+    assert once.variants["digest"].to_list() == again.variants["digest"].to_list()
+
+
+def test_a_month_that_fails_is_told(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from fleet2d import Metric\n"
+        "class Fails(Metric):\n"
+        "    def update(self, history, state):\n        raise ValueError('thirteen')\n"
     )
-    assert [6, 2, 4] == found
-    assert [("cases", done, 3) for done in range(4)] == told
-
-
-def test_what_goes_wrong_in_a_process_is_raised_here() -> None:
-    with pytest.raises(ValueError, match="13"):
-        run_all(doubled, [1, 13, 2, 3], Request(workers=2), silent)
-
-
-def test_months_are_the_same_whatever_the_number_of_processes() -> None:
-    alone = run_all(ltp_gap.gaps, ONE_DAY, Request(workers=1), silent)
-    assert alone == run_all(ltp_gap.gaps, ONE_DAY, Request(workers=2), silent)
+    own = {"type": f"{tmp_path.as_posix()}/mine:Fails"}
+    rules = [{"set": {"metrics.own": own}}]
+    with pytest.raises(ComponentError, match="thirteen"):
+        run_study("days", days(rules=rules), Request(workers=1), silent)
 
 
 def test_a_request_says_how_large_or_leaves_it() -> None:
     assert (30, 60) == Request().size(30, 60, 2, 3)
     assert (2, 3) == Request(quick=True).size(30, 60, 2, 3)
     assert (7, 3) == Request(quick=True, seeds=7).size(30, 60, 2, 3)
-    assert cores() >= 1

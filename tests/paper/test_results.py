@@ -15,6 +15,8 @@ from fleet2d.paper.result import Result, Table, make_directory
 from fleet2d.paper.results import RESULTS, chosen, reproduce
 from fleet2d.paper.watched import Watching
 from fleet2d.scenario.model import load_scenario
+from fleet2d.studies.design import Design, build_design
+from fleet2d.studies.specification import read_specification
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TINY = Request(quick=True, seeds=1, days=2)
@@ -79,29 +81,27 @@ def test_differences_are_paired_by_seed(found: dict[str, Result]) -> None:
             assert expected == values
 
 
-@pytest.mark.parametrize("policy", feedback.POLICIES)
-def test_a_robot_goes_by_the_estimator_of_its_column_only(policy: str) -> None:
-    one, other = (feedback.watched_month(policy, (e,), 3, 1) for e in ("likelihood", "fremen"))
-    sources = [
-        b.get("source") for b in one["robots"]["astro"]["behaviors"] if b["type"] == "hangout"
-    ]
-    assert (["likelihood"] if feedback.POLICIES[policy].acts else []) == sources
-    assert one["users"] == other["users"]
-    assert load_scenario(one) is not None
+def design_of(seeds: int) -> Design:
+    return build_design(read_specification(feedback.study_of(seeds, 1)))
+
+
+def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
+    design = design_of(1)
+    for index in range(len(design)):
+        labels, scenario = design.parameters(index), design.scenario(index).resolved()
+        behaviors = scenario["robots"]["astro"]["behaviors"]
+        sources = [b["source"] for b in behaviors if b["type"] == "hangout"]
+        acts = feedback.POLICIES[str(labels["robot"])].acts
+        assert ([labels["estimator"]] if acts else []) == sources
+        expected = {labels["estimator"]} if acts else set(feedback.ESTIMATORS)
+        assert expected == set(scenario["algorithms"])
+        assert len(expected) == len(scenario["metrics"])
 
 
 def test_estimators_share_a_month_unless_the_robot_acts_on_them() -> None:
-    asked: list[dict[str, Any]] = []
-    original = feedback.run_all
-    feedback.run_all = lambda collect, cases, *rest: (
-        asked.extend(cases) or [dict.fromkeys(c["algorithms"], 0.5) for c in cases]
-    )  # type: ignore[assignment, func-returns-value]
-    try:
-        feedback.reproduce(Request(seeds=3), silent)
-    finally:
-        feedback.run_all = original
     acting = sum(policy.acts for policy in feedback.POLICIES.values())
-    assert 3 * (acting * len(feedback.ESTIMATORS) + len(feedback.POLICIES) - acting) == len(asked)
+    months = acting * len(feedback.ESTIMATORS) + len(feedback.POLICIES) - acting
+    assert 3 * months == len(design_of(3))
 
 
 # --- Speed --------------------------------------------------------------------------------------

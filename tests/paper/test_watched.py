@@ -5,8 +5,8 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from fleet2d.engine.simulation import Simulation
+from fleet2d.palette import ROBOT_COLORS, USER_COLORS
 from fleet2d.paper.watched import LiveView, Watching, watch
-from fleet2d.view.traces import ROBOT_COLORS, USER_COLORS
 
 Frame = NDArray[np.uint8]
 

@@ -10,6 +10,7 @@ from tests.routines.days import DAY_S, MONDAY, violations
 
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.household import LONG_GONE_S, WELCOME, Household, Lives
+from fleet2d.routines.interruptions import uninterrupted
 from fleet2d.routines.planner import Doing
 
 CROWD = {
@@ -69,7 +70,8 @@ def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
     times = []
     for i in range(100):
         day = home.day(MONDAY + i)
-        found = {(d.begin, d.end) for name in day for d in day[name] if d.task == "dinner"}
+        planned = [doing for name in day for doing in uninterrupted(day[name])]
+        found = {(d.begin, d.end) for d in planned if d.task == "dinner"}
         assert len(found) == 1
         times += found
     assert len({begin for begin, _ in times}) > 50
@@ -92,7 +94,7 @@ def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home() 
             welcomes = [doing for doing in doings if doing.activity == WELCOME]
             assert all(doing.begin in comings for doing in welcomes)
             welcomed += len(welcomes)
-    assert 0 < came < welcomed
+    assert came / 2 < welcomed  # who comes home goes to the bathroom first at times
 
 
 def test_nobody_comes_to_the_door_unless_asked_for() -> None:

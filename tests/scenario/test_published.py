@@ -101,11 +101,11 @@ USUAL = [
     "floorplan.he.ppm: the grid's cells are 0.05 m; walls and poses are not rounded to them",
     "floorplan.he.border_pad: left out: the grid has a margin of its own",
     f"{', '.join(f'{walk}.pose_config.meander_strategy.lin_speed' for walk in WALKS)}: metres per"
-    " step there, a speed here, and the same walk at this step; at a wall it turns away, where the"
-    " published Fleet2D kept to small turns, and a move across a wall is never made, where that one"
-    " looked at the end of the move only",
+    " step there, a speed here, and the same rule of walking at this step, with at_walls: stay; a"
+    " move across a wall is never made, where the published Fleet2D looked at the end of the move"
+    " only",
     f"{', '.join(f'{walk}.pose_config.meander_strategy.ang_speed' for walk in WALKS)}: degrees"
-    " per step there, per square root of a second here, and the same walk at this step; turns"
+    " per step there, per square root of a second here, and the same law at this step; turns"
     " are cut at 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
     "simulation.seed: the same seed draws other numbers here: the walks are of the same kind, not"
     " the same",
@@ -313,15 +313,28 @@ def test_visualization_is_left_out(folder: Path, true: str) -> None:
     ] == extra(folder, ("visualize: False", f"visualize: {true}"))
 
 
+def test_flashlight_is_kept_as_the_method_of_sight(folder: Path) -> None:
+    change = ("show_progress: True", "show_progress: True\n  fov_provider: Flashlight")
+    _, scenario = converted(folder, change)
+    assert "flashlight" == scenario.sight.model_dump()["method"]["type"]
+
+
+def test_walks_stay_at_walls_as_there(folder: Path) -> None:
+    _, scenario = converted(folder)
+    bodies = [*scenario.users.values(), *scenario.robots.values()]
+    walks = [behavior for body in bodies for behavior in body.behaviors]
+    assert {"stay"} == {walk.at_walls for walk in walks}
+
+
 def test_progress_and_provider_and_prefix_are_left_out(folder: Path) -> None:
     assert [
         "simulation.show_progress: left out: `fleet2d run --quiet` shows none",
-        "simulation.fov_provider: left out: there is one way of seeing here, and it is exact",
+        "simulation.fov_provider: left out: lines of sight are worked out exactly here",
         "simulation.outputs.output_dir, simulation.outputs.prefix: left out: `fleet2d run --out"
         " DIR` says where a run is stored",
     ] == extra(
         folder,
-        ("show_progress: True", "show_progress: False\n  fov_provider: Flashlight"),
+        ("show_progress: True", "show_progress: False\n  fov_provider: Rays"),
         ("prefix: null", "prefix: mine"),
     )
 

@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from fleet2d.errors import InputError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.view.floorplan import ROOM_COLORS, WALL_COLOR, draw_floorplan, floorplan_axes
+from fleet2d.palette import ROOM_COLORS, WALL_COLOR
+from fleet2d.view.floorplan import draw_floorplan, floorplan_axes
 
 
 @pytest.fixture(scope="module")
@@ -115,9 +116,9 @@ def test_empty_tiny_long_slanted_and_large_plans_are_drawn(
     assert (tmp_path / "plan.png").stat().st_size > 5_000
 
 
-@pytest.mark.parametrize("name", ["plan.pdf", "plan", "plan.png.txt"])
+@pytest.mark.parametrize("name", ["plan.bmp", "plan", "plan.png.txt"])
 def test_another_ending_is_refused(home: FloorPlan, tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=r"a picture is written as \.png or \.svg"):
+    with pytest.raises(InputError, match=r"a picture is written as \.png, \.svg or \.pdf"):
         draw_floorplan(home, tmp_path / name)
 
     assert [] == list(tmp_path.iterdir())

@@ -92,5 +92,5 @@ def test_check_up_is_drawn_with_numbers_and_sentences(tmp_path: Path) -> None:
 def test_check_up_in_another_format_is_refused(name: str, tmp_path: Path) -> None:
     from fleet2d.errors import InputError
 
-    with pytest.raises(InputError, match=r"\.png or \.svg"):
+    with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
         draw_checkup(home(), [], tmp_path / name)

@@ -72,5 +72,5 @@ def test_what_is_no_presence_is_refused(stored: Any, name: str, why: str, tmp_pa
 
 
 def test_another_ending_is_refused(stored: Any, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"\.png or \.svg"):
+    with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
         draw_reliability(stored, "rtp", tmp_path / "x.gif")

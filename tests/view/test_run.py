@@ -157,7 +157,7 @@ def test_run_that_lost_its_floor_plan_says_so(tmp_path: Path) -> None:
 
 
 def test_picture_of_another_kind_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"written as \.png or"):
+    with pytest.raises(InputError, match=r"written as \.png, \.svg or"):
         draw_run(base(), tmp_path / "run.jpg")
 
 

@@ -8,15 +8,16 @@
 namespace fleet2d {
 
 void bind_chambers(nb::module_& m) {
-    m.def("see_each",
-          [](const Mesh& mesh, View<const i64, 2> eyes, View<const i64, 2> places) {
-              check_points(eyes);
-              check_points(places);
-              require(eyes.size() == places.size(), "there must be as many places as eyes");
-              return see_each(mesh, eyes, places);
-          },
-          "mesh"_a, "eyes"_a, "places"_a, Unlocked(),
-          R"(Return for each pair whether the two see each other: what is on a wall sees nothing.
+    m.def(
+        "see_each",
+        [](const Mesh& mesh, View<const i64, 2> eyes, View<const i64, 2> places) {
+            check_points(eyes);
+            check_points(places);
+            require(eyes.size() == places.size(), "there must be as many places as eyes");
+            return see_each(mesh, eyes, places);
+        },
+        "mesh"_a, "eyes"_a, "places"_a, Unlocked(),
+        R"(Return for each pair whether the two see each other: what is on a wall sees nothing.
 
 Fastest if pairs of the same eye follow each other.
 
@@ -27,13 +28,14 @@ Args:
 
 Returns:
     bool (n,).)");
-    m.def("label_frames",
-          [](View<const i32, 2> labels, i64 count) {
-              require(0 <= count && count <= i64{1} << 31, "count must be in 0 to 2**31");
-              require(all_in_range(labels, NO_LABEL, count), "labels must be in -1 to count - 1");
-              return label_frames(labels, count);
-          },
-          "labels"_a, "count"_a, Unlocked(), R"(Return the smallest box of cells around each label.
+    m.def(
+        "label_frames",
+        [](View<const i32, 2> labels, i64 count) {
+            require(0 <= count && count <= i64{1} << 31, "count must be in 0 to 2**31");
+            require(all_in_range(labels, NO_LABEL, count), "labels must be in -1 to count - 1");
+            return label_frames(labels, count);
+        },
+        "labels"_a, "count"_a, Unlocked(), R"(Return the smallest box of cells around each label.
 
 Args:
     labels: int32 (rows, columns), below `count`, -1 for none.
@@ -52,13 +54,14 @@ Args:
 
 Returns:
     Labels, int16 (rows, columns).)");
-    m.def("spread_labels",
-          [](View<const i32, 2> labels, View<const bool, 2> mask) {
-              require(labels.shape == mask.shape, "labels and mask must have one shape");
-              return spread_labels(labels, mask);
-          },
-          "labels"_a, "mask"_a, Unlocked(),
-          R"(Give every cell of a mask that has no label the nearest one, in steps across sides.
+    m.def(
+        "spread_labels",
+        [](View<const i32, 2> labels, View<const bool, 2> mask) {
+            require(labels.shape == mask.shape, "labels and mask must have one shape");
+            return spread_labels(labels, mask);
+        },
+        "labels"_a, "mask"_a, Unlocked(),
+        R"(Give every cell of a mask that has no label the nearest one, in steps across sides.
 
 Of labels that are equally near the lowest is taken.
 

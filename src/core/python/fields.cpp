@@ -37,13 +37,14 @@ Args:
 Returns:
     Squared distances in cells, int64 (rows, columns); 0 outside the mask, and
     (rows + columns)² everywhere in a mask that has no outside.)");
-    m.def("walking_distance",
-          [](View<const bool, 2> mask, View<const i64, 2> goals) {
-              require(goals.shape[1] == 2, "goals must be (n, 2)");
-              return walking_distance(mask, goals);
-          },
-          "mask"_a, "goals"_a, Unlocked(),
-          R"(Return how far each cell is from the nearest goal, walking from cell to cell.
+    m.def(
+        "walking_distance",
+        [](View<const bool, 2> mask, View<const i64, 2> goals) {
+            require(goals.shape[1] == 2, "goals must be (n, 2)");
+            return walking_distance(mask, goals);
+        },
+        "mask"_a, "goals"_a, Unlocked(),
+        R"(Return how far each cell is from the nearest goal, walking from cell to cell.
 
 A step to a side costs 5 and one across a corner 7, which is open only if both cells beside it
 are.
@@ -54,13 +55,14 @@ Args:
 
 Returns:
     int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.)");
-    m.def("cost_distance",
-          [](View<const i32, 2> cost, Cell goal, Cell start) {
-              check_costs(cost);
-              return cost_distance(cost, cell_of(cost, goal), grid_cell(start));
-          },
-          "cost"_a, "goal"_a, "start"_a, Unlocked(),
-          R"(Return what the cheapest way from each cell to a goal costs, walking from cell to cell.
+    m.def(
+        "cost_distance",
+        [](View<const i32, 2> cost, Cell goal, Cell start) {
+            check_costs(cost);
+            return cost_distance(cost, cell_of(cost, goal), grid_cell(start));
+        },
+        "cost"_a, "goal"_a, "start"_a, Unlocked(),
+        R"(Return what the cheapest way from each cell to a goal costs, walking from cell to cell.
 
 A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
 are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
@@ -74,20 +76,22 @@ Args:
 
 Returns:
     int64 (rows, columns), in 1/1000 of a cell's side at no cost; -1 where no way is known.)");
-    m.def("step_cost",
-          [](View<const i32, 2> cost, i64 row, i64 column, i64 r, i64 c) {
-              return step_cost(cost, cell_of(cost, {row, column}), cell_of(cost, {r, c}));
-          },
-          "cost"_a, "row"_a, "column"_a, "r"_a, "c"_a,
-          "Return what a step between two neighboring cells costs, [1/1000 of a cell's side].");
-    m.def("descend",
-          [](View<const i32, 2> cost, View<const i64, 2> distance, Cell start) {
-              check_costs(cost);
-              require(cost.shape == distance.shape, "cost and distance must have one shape");
-              return descend(cost, distance, cell_of(cost, start));
-          },
-          "cost"_a, "distance"_a, "start"_a, Unlocked(),
-          R"(Return the cells of a cheapest way from a cell to the goal; ties: the first neighbor.
+    m.def(
+        "step_cost",
+        [](View<const i32, 2> cost, i64 row, i64 column, i64 r, i64 c) {
+            return step_cost(cost, cell_of(cost, {row, column}), cell_of(cost, {r, c}));
+        },
+        "cost"_a, "row"_a, "column"_a, "r"_a, "c"_a,
+        "Return what a step between two neighboring cells costs, [1/1000 of a cell's side].");
+    m.def(
+        "descend",
+        [](View<const i32, 2> cost, View<const i64, 2> distance, Cell start) {
+            check_costs(cost);
+            require(cost.shape == distance.shape, "cost and distance must have one shape");
+            return descend(cost, distance, cell_of(cost, start));
+        },
+        "cost"_a, "distance"_a, "start"_a, Unlocked(),
+        R"(Return the cells of a cheapest way from a cell to the goal; ties: the first neighbor.
 
 Args:
     cost: int32 (rows, columns), as for `cost_distance`.

@@ -18,22 +18,24 @@ void bind_lens(nb::module_& m) {
           "Return whether anything within `reach` of (dx, dy) may lie in a wedge; exact at reach 0.");
     m.def("in_wedge", &in_wedge, "heading"_a, "half_angle"_a, "dx"_a, "dy"_a,
           "Return whether (dx, dy) lies within `half_angle` [1/8192 turn] of a heading, or on the border.");
-    m.def("camera_pose",
-          [](const Lenses& lenses, i64 camera, i64 x, i64 y, i64 heading, i64 moment_us) {
-              check_camera(lenses, camera);
-              const Pose pose = camera_pose(lenses, camera, {x, y, heading}, moment_us);
-              return std::tuple(pose.x, pose.y, pose.heading);
-          },
-          "lenses"_a, "camera"_a, "x"_a, "y"_a, "heading"_a, "moment_us"_a,
-          "Return where a camera is and where it looks; the offset is rounded to the lattice.");
-    m.def("points_in_view",
-          [](const Mesh& walls, const Lenses& lenses, i64 camera, i64 user, i64 x, i64 y, i64 heading, i64 dx, i64 dy) {
-              check_camera(lenses, camera);
-              require(0 <= user && user < lenses.bodies.shape[1], "there is no such user");
-              return points_in_view(walls, lenses, camera, user, {x, y, heading}, locate(walls, x, y), dx, dy);
-          },
-          "walls"_a, "lenses"_a, "camera"_a, "user"_a, "x"_a, "y"_a, "heading"_a, "dx"_a, "dy"_a,
-          "Return how many points of a user's body are in view of a camera, the user's centre being at (dx, dy).");
+    m.def(
+        "camera_pose",
+        [](const Lenses& lenses, i64 camera, i64 x, i64 y, i64 heading, i64 moment_us) {
+            check_camera(lenses, camera);
+            const Pose pose = camera_pose(lenses, camera, {x, y, heading}, moment_us);
+            return std::tuple(pose.x, pose.y, pose.heading);
+        },
+        "lenses"_a, "camera"_a, "x"_a, "y"_a, "heading"_a, "moment_us"_a,
+        "Return where a camera is and where it looks; the offset is rounded to the lattice.");
+    m.def(
+        "points_in_view",
+        [](const Mesh& walls, const Lenses& lenses, i64 camera, i64 user, i64 x, i64 y, i64 heading, i64 dx, i64 dy) {
+            check_camera(lenses, camera);
+            require(0 <= user && user < lenses.bodies.shape[1], "there is no such user");
+            return points_in_view(walls, lenses, camera, user, {x, y, heading}, locate(walls, x, y), dx, dy);
+        },
+        "walls"_a, "lenses"_a, "camera"_a, "user"_a, "x"_a, "y"_a, "heading"_a, "dx"_a, "dy"_a,
+        "Return how many points of a user's body are in view of a camera, the user's centre being at (dx, dy).");
 }
 
 }  // namespace fleet2d

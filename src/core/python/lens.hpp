@@ -9,19 +9,19 @@ namespace fleet2d {
 template <>
 struct border::Fields<Lenses> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(
-        &Lenses::near_squared, &Lenses::far_squared, &Lenses::half_angle, &Lenses::chance, &Lenses::moves,
-        &Lenses::forward, &Lenses::left, &Lenses::heading, &Lenses::pans, &Lenses::pan_count, &Lenses::pan_us,
-        &Lenses::period, &Lenses::latency, &Lenses::errs, &Lenses::points, &Lenses::bodies, &Lenses::reach,
-        &Lenses::widest);
+    static constexpr auto members =
+        std::tuple(&Lenses::near_squared, &Lenses::far_squared, &Lenses::half_angle, &Lenses::chance, &Lenses::moves,
+                   &Lenses::forward, &Lenses::left, &Lenses::heading, &Lenses::pans, &Lenses::pan_count,
+                   &Lenses::pan_us, &Lenses::period, &Lenses::latency, &Lenses::errs, &Lenses::points, &Lenses::bodies,
+                   &Lenses::reach, &Lenses::widest);
 };
 
 // All arrays must be of one set of cameras (and users).
 inline void check_lenses(const Lenses& lenses) {
     const i64 cameras = lenses.near_squared.size();
-    for (const auto& values : {lenses.far_squared, lenses.half_angle, lenses.chance, lenses.moves, lenses.forward,
-                               lenses.left, lenses.heading, lenses.pan_count, lenses.pan_us, lenses.period,
-                               lenses.latency, lenses.errs, lenses.points}) {
+    for (const auto& values :
+         {lenses.far_squared, lenses.half_angle, lenses.chance, lenses.moves, lenses.forward, lenses.left,
+          lenses.heading, lenses.pan_count, lenses.pan_us, lenses.period, lenses.latency, lenses.errs, lenses.points}) {
         require(values.size() == cameras, "all arrays of lenses must have one length, that of the cameras");
     }
     require(lenses.pans.size() == cameras && lenses.bodies.size() == cameras && lenses.reach.size() == cameras &&

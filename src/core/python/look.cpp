@@ -16,14 +16,14 @@ namespace fleet2d {
 template <>
 struct border::Fields<Memory> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Memory::noticed, &Memory::seen, &Memory::about, &Memory::backlog,
-                                               &Memory::waiting);
+    static constexpr auto members =
+        std::tuple(&Memory::noticed, &Memory::seen, &Memory::about, &Memory::backlog, &Memory::waiting);
 };
 template <>
 struct border::Fields<Rule> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Rule::patience, &Rule::step_us, &Rule::start_us, &Rule::burst,
-                                               &Rule::stop_lost, &Rule::stop_seen);
+    static constexpr auto members =
+        std::tuple(&Rule::patience, &Rule::step_us, &Rule::start_us, &Rule::burst, &Rule::stop_lost, &Rule::stop_seen);
 };
 
 namespace {
@@ -59,7 +59,8 @@ void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables&
     const i64 rows = memory.backlog.shape[1];
     for (i64 c = 0; c < cameras; ++c) {
         const i64 burst = users + (errors.haunted[c] != 0 ? MOST_GHOSTS : 0);
-        require((lenses.latency[c] / lenses.period[c] + 1) * burst <= rows, "backlog must have room for all that waits");
+        require((lenses.latency[c] / lenses.period[c] + 1) * burst <= rows,
+                "backlog must have room for all that waits");
         for (i64 u = 0; u < users; ++u) {
             const i64 identity = at(memory.about[c][u], About::TAKEN_FOR);
             require(NOBODY <= identity && identity < users, "about must hold numbers of users, or NOBODY");
@@ -96,39 +97,41 @@ is. X to POSTURE are as perceived.)")
     m.attr("USER_LOST") = static_cast<i64>(SightEvent::LOST);
     m.attr("USER_SEEN") = static_cast<i64>(SightEvent::SEEN);
 
-    m.def("look",
-          [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
-             i64 body, i64 first_other, const Memory& memory, std::optional<View<const u8, 3>> shown) {
-              check_lenses(lenses);
-              const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
-              require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
-              require(all_in_range(lenses.latency, 0, LAST_STEP), "latency must be 0 or more");
-              check_errors(errors, lenses.errs, users);
-              check_window(window, {body, first_other}, users);
-              check_memory(memory, lenses, errors, cameras, users);
-              const View<const u8, 3> given = shown.value_or(View<const u8, 3>());
-              if (shown) {
-                  require(given.shape == std::array{cameras, users, window.end - window.first},
-                          "shown must be (cameras, users, steps)");
-                  require(all_in_range(given, 0, MOST_SHOWN), "shown must be below MOST_SHOWN");
-              }
-              LookResult result;
-              {
-                  const nb::gil_scoped_release unlocked;
-                  result = look(walls, lenses, errors, rule, window, {body, first_other}, memory, given);
-              }
-              const i64 count = static_cast<i64>(result.events.size());
-              auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});
-              auto kind = Array<i64>::empty({count});
-              for (i64 i = 0; i < count; ++i) {
-                  const IdentityEvent& event = result.events[static_cast<std::size_t>(i)];
-                  step[i] = event.step, identity[i] = event.identity, kind[i] = static_cast<i64>(event.kind);
-              }
-              return std::tuple(result.steps, rows_of(result.sightings), std::move(step), std::move(identity),
-                                std::move(kind));
-          },
-          "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
-          "shown"_a = nb::none(), R"(Look at all others in the steps of a window, up to the first with an event that stops it.
+    m.def(
+        "look",
+        [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
+           i64 body, i64 first_other, const Memory& memory, std::optional<View<const u8, 3>> shown) {
+            check_lenses(lenses);
+            const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
+            require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
+            require(all_in_range(lenses.latency, 0, LAST_STEP), "latency must be 0 or more");
+            check_errors(errors, lenses.errs, users);
+            check_window(window, {body, first_other}, users);
+            check_memory(memory, lenses, errors, cameras, users);
+            const View<const u8, 3> given = shown.value_or(View<const u8, 3>());
+            if (shown) {
+                require(given.shape == std::array{cameras, users, window.end - window.first},
+                        "shown must be (cameras, users, steps)");
+                require(all_in_range(given, 0, MOST_SHOWN), "shown must be below MOST_SHOWN");
+            }
+            LookResult result;
+            {
+                const nb::gil_scoped_release unlocked;
+                result = look(walls, lenses, errors, rule, window, {body, first_other}, memory, given);
+            }
+            const i64 count = static_cast<i64>(result.events.size());
+            auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});
+            auto kind = Array<i64>::empty({count});
+            for (i64 i = 0; i < count; ++i) {
+                const IdentityEvent& event = result.events[static_cast<std::size_t>(i)];
+                step[i] = event.step, identity[i] = event.identity, kind[i] = static_cast<i64>(event.kind);
+            }
+            return std::tuple(result.steps, rows_of(result.sightings), std::move(step), std::move(identity),
+                              std::move(kind));
+        },
+        "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
+        "shown"_a = nb::none(),
+        R"(Look at all others in the steps of a window, up to the first with an event that stops it.
 
 Args:
     walls: The free space.

@@ -15,13 +15,14 @@ Args:
 
 Returns:
     Each pixel's part, int32 (rows, columns); -1 outside the mask.)");
-    m.def("count_steps",
-          [](View<const bool, 2> start, View<const bool, 2> mask) {
-              require(start.shape == mask.shape, "start and mask must have one shape");
-              return count_steps(start, mask);
-          },
-          "start"_a, "mask"_a, Unlocked(),
-          R"(Count the steps from pixel to pixel across sides, inside a mask, from the nearest start.
+    m.def(
+        "count_steps",
+        [](View<const bool, 2> start, View<const bool, 2> mask) {
+            require(start.shape == mask.shape, "start and mask must have one shape");
+            return count_steps(start, mask);
+        },
+        "start"_a, "mask"_a, Unlocked(),
+        R"(Count the steps from pixel to pixel across sides, inside a mask, from the nearest start.
 
 Args:
     start: Where to start, bool (rows, columns); pixels outside the mask don't count.
@@ -29,13 +30,14 @@ Args:
 
 Returns:
     Steps, int32 (rows, columns); 0 at the start, -1 where no way leads.)");
-    m.def("trace_rings",
-          [](View<const bool, 2> mask) {
-              Rings rings = trace_rings(mask);
-              return std::tuple(std::move(rings.corners), std::move(rings.start));
-          },
-          "mask"_a, Unlocked(),
-          R"(Return the rings between a mask and what is not in it, along the sides of the pixels.
+    m.def(
+        "trace_rings",
+        [](View<const bool, 2> mask) {
+            Rings rings = trace_rings(mask);
+            return std::tuple(std::move(rings.corners), std::move(rings.start));
+        },
+        "mask"_a, Unlocked(),
+        R"(Return the rings between a mask and what is not in it, along the sides of the pixels.
 
 Rings have the mask on their left: outer ones run counter-clockwise, holes clockwise (x is the
 column, y is the row). Where two pixels of the mask share only a corner, a ring turns right, so

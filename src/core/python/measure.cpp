@@ -25,27 +25,29 @@ Args:
 
 Returns:
     int16 (n,).)");
-    m.def("count_rooms",
-          [](const Poses& poses, View<const i16, 2> room_of_place, View<i64> counts) {
-              check_poses(poses);
-              const Array<i16> rooms = checked_rooms_at(room_of_place, poses.x, poses.y);
-              require(counts.size() > 0 && all_in_range(rooms.view(), -1, counts.size() - 1),
-                      "counts must have an entry for each room, and one more");
-              count_rooms(rooms, poses.away, counts);
-          },
-          "poses"_a, "room_of_place"_a, "counts"_a, Unlocked(),
-          R"(Add the number of poses in each room to `counts`.
+    m.def(
+        "count_rooms",
+        [](const Poses& poses, View<const i16, 2> room_of_place, View<i64> counts) {
+            check_poses(poses);
+            const Array<i16> rooms = checked_rooms_at(room_of_place, poses.x, poses.y);
+            require(counts.size() > 0 && all_in_range(rooms.view(), -1, counts.size() - 1),
+                    "counts must have an entry for each room, and one more");
+            count_rooms(rooms, poses.away, counts);
+        },
+        "poses"_a, "room_of_place"_a, "counts"_a, Unlocked(),
+        R"(Add the number of poses in each room to `counts`.
 
 Args:
     poses: Poses.
     room_of_place: int16 (rows, columns), the room of each cell, -1 for none.
     counts: int64 (rooms + 1,), to be added to; the last entry is away, or in no room.)");
-    m.def("sum_moves",
-          [](const Poses& poses) {
-              check_poses(poses);
-              return sum_moves(poses);
-          },
-          "poses"_a, Unlocked(), "Return the summed length of the moves from pose to pose [lattice units].");
+    m.def(
+        "sum_moves",
+        [](const Poses& poses) {
+            check_poses(poses);
+            return sum_moves(poses);
+        },
+        "poses"_a, Unlocked(), "Return the summed length of the moves from pose to pose [lattice units].");
 }
 
 }  // namespace fleet2d

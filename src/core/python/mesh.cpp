@@ -31,8 +31,8 @@ OwnedMesh::OwnedMesh(View<const i64, 2> vertices, View<const i32, 2> triangles, 
     triangles_ = Array<i32, 2>::copy_of(triangles);
     neighbors_ = Array<i32, 2>::copy_of(neighbors);
     buckets_ = build_buckets(vertices_, triangles_);
-    mesh_ = {vertices_, triangles_, neighbors_, buckets_.start, buckets_.triangles, buckets_.columns, buckets_.rows,
-             {}};
+    mesh_ = {vertices_,          triangles_,       neighbors_,    buckets_.start,
+             buckets_.triangles, buckets_.columns, buckets_.rows, {}};
     beyond_ = build_beyond(mesh_);
     mesh_.beyond = beyond_;
 }
@@ -74,23 +74,32 @@ Args:
 Raises:
     ValueError: An array has another shape, or a number in it is none of a vertex or triangle.)")
         .def(nb::init<Vertices, Triangles, Triangles>(), "vertices"_a, "triangles"_a, "neighbors"_a)
-        .def_prop_ro("vertices", read_only<&Mesh::vertices>(), nb::sig("def vertices(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (n, 2), lattice units, sorted by (x, y).")
-        .def_prop_ro("triangles", read_only<&Mesh::triangles>(), nb::sig("def triangles(self) -> numpy.typing.NDArray[numpy.int32]"), "int32 (t, 3), numbers of vertices, counter-clockwise.")
-        .def_prop_ro("neighbors", read_only<&Mesh::neighbors>(), nb::sig("def neighbors(self) -> numpy.typing.NDArray[numpy.int32]"),
+        .def_prop_ro("vertices", read_only<&Mesh::vertices>(),
+                     nb::sig("def vertices(self) -> numpy.typing.NDArray[numpy.int64]"),
+                     "int64 (n, 2), lattice units, sorted by (x, y).")
+        .def_prop_ro("triangles", read_only<&Mesh::triangles>(),
+                     nb::sig("def triangles(self) -> numpy.typing.NDArray[numpy.int32]"),
+                     "int32 (t, 3), numbers of vertices, counter-clockwise.")
+        .def_prop_ro("neighbors", read_only<&Mesh::neighbors>(),
+                     nb::sig("def neighbors(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (t, 3), the triangle across edge k (vertex k to vertex k + 1), -1 for a wall.")
-        .def_prop_ro("bucket_start", read_only<&Mesh::bucket_start>(), nb::sig("def bucket_start(self) -> numpy.typing.NDArray[numpy.int32]"),
+        .def_prop_ro("bucket_start", read_only<&Mesh::bucket_start>(),
+                     nb::sig("def bucket_start(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (rows * columns + 1,), where each square bucket begins in `bucket_triangles`.")
-        .def_prop_ro("bucket_triangles", read_only<&Mesh::bucket_triangles>(), nb::sig("def bucket_triangles(self) -> numpy.typing.NDArray[numpy.int32]"),
+        .def_prop_ro("bucket_triangles", read_only<&Mesh::bucket_triangles>(),
+                     nb::sig("def bucket_triangles(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32, the triangles that overlap each square bucket, ascending.")
-        .def_prop_ro("bucket_columns", [](const OwnedMesh& self) { return self.mesh().bucket_columns; },
-                     "Number of buckets along x.")
-        .def_prop_ro("bucket_rows", [](const OwnedMesh& self) { return self.mesh().bucket_rows; },
-                     "Number of buckets along y.")
-        .def("with_neighbors",
-             [](const OwnedMesh& self, Triangles neighbors) {
-                 return OwnedMesh(self.mesh().vertices, self.mesh().triangles, neighbors);
-             },
-             "neighbors"_a, "Return the mesh with other walls: `neighbors` as for the class.")
+        .def_prop_ro(
+            "bucket_columns", [](const OwnedMesh& self) { return self.mesh().bucket_columns; },
+            "Number of buckets along x.")
+        .def_prop_ro(
+            "bucket_rows", [](const OwnedMesh& self) { return self.mesh().bucket_rows; }, "Number of buckets along y.")
+        .def(
+            "with_neighbors",
+            [](const OwnedMesh& self, Triangles neighbors) {
+                return OwnedMesh(self.mesh().vertices, self.mesh().triangles, neighbors);
+            },
+            "neighbors"_a, "Return the mesh with other walls: `neighbors` as for the class.")
         .def("__getstate__", &arrays_of, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
         .def("__setstate__", [](OwnedMesh& self, std::tuple<Vertices, Triangles, Triangles> state) {
             new (&self) OwnedMesh(std::get<0>(state), std::get<1>(state), std::get<2>(state));
@@ -100,12 +109,13 @@ Raises:
           "Return the lowest triangle that holds the point (borders included), or -1 outside.");
     m.def("orient", &orient, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a,
           "Return twice the signed area of (a, b, c): positive when c lies left of the line from a to b.");
-    m.def("contains_triangle",
-          [](const Mesh& mesh, i64 triangle, i64 x, i64 y) {
-              require(0 <= triangle && triangle < mesh.triangle_count(), "there is no such triangle");
-              return contains_triangle(mesh, triangle, x, y);
-          },
-          "mesh"_a, "triangle"_a, "x"_a, "y"_a, "Return whether the closed triangle holds the point.");
+    m.def(
+        "contains_triangle",
+        [](const Mesh& mesh, i64 triangle, i64 x, i64 y) {
+            require(0 <= triangle && triangle < mesh.triangle_count(), "there is no such triangle");
+            return contains_triangle(mesh, triangle, x, y);
+        },
+        "mesh"_a, "triangle"_a, "x"_a, "y"_a, "Return whether the closed triangle holds the point.");
     m.def("strictly_inside", &strictly_inside, "mesh"_a, "x"_a, "y"_a,
           "Return whether the point lies in free space and on no wall.");
     m.def("rasterize_cells", &rasterize_cells, "mesh"_a, "rows"_a, "columns"_a, Unlocked(),
@@ -114,13 +124,14 @@ Raises:
 Returns:
     int32 (rows, columns): the lowest triangle that holds the centre; -1 for a centre outside or
     on a wall.)");
-    m.def("label_triangles",
-          [](View<const i32, 2> neighbors) {
-              require(neighbors.shape[1] == 3 && all_in_range(neighbors, WALL, neighbors.size()),
-                      "neighbors must be (t, 3), numbers of triangles or -1");
-              return label_triangles(neighbors);
-          },
-          "neighbors"_a, "Number the connected parts of a mesh; returns each triangle's part, int32 (triangles,).");
+    m.def(
+        "label_triangles",
+        [](View<const i32, 2> neighbors) {
+            require(neighbors.shape[1] == 3 && all_in_range(neighbors, WALL, neighbors.size()),
+                    "neighbors must be (t, 3), numbers of triangles or -1");
+            return label_triangles(neighbors);
+        },
+        "neighbors"_a, "Number the connected parts of a mesh; returns each triangle's part, int32 (triangles,).");
 }
 
 }  // namespace fleet2d

@@ -28,6 +28,8 @@ NB_MODULE(_core, m) {
     bind_look(m);
     bind_routes(m);
     bind_presence(m);
+    bind_evidence(m);
+    bind_legs(m);
     bind_stays(m);
     bind_smoothing(m);
     bind_timelines(m);

@@ -10,8 +10,8 @@ namespace fleet2d {
 template <>
 struct border::Fields<Breakpoints> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Breakpoints::time, &Breakpoints::x, &Breakpoints::y,
-                                               &Breakpoints::heading, &Breakpoints::away);
+    static constexpr auto members =
+        std::tuple(&Breakpoints::time, &Breakpoints::x, &Breakpoints::y, &Breakpoints::heading, &Breakpoints::away);
 };
 
 template <>
@@ -25,7 +25,7 @@ template <>
 struct border::Fields<WalkRule> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
     static constexpr auto members =
-        std::tuple(&WalkRule::key, &WalkRule::stride, &WalkRule::sway, &WalkRule::turn_limit);
+        std::tuple(&WalkRule::key, &WalkRule::stride, &WalkRule::sway, &WalkRule::turn_limit, &WalkRule::stays);
 };
 
 }  // namespace fleet2d

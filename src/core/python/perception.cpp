@@ -67,13 +67,14 @@ void bind_perception(nb::module_& m) {
         .value("NOTICED", About::NOTICED, "Looks at which the user was noticed.");
 
     m.def("random_share", &random_share, "key"_a, "counter"_a, "Return an integer in [0, ONE).");
-    m.def("random_shares",
-          [](u64 key, View<const i64> counters) {
-              auto shares = Array<i64>::empty({counters.size()});
-              for (i64 i = 0; i < counters.size(); ++i) shares[i] = random_share(key, counters[i]);
-              return shares;
-          },
-          "key"_a, "counters"_a, Unlocked(), "Return the integer in [0, ONE) of each counter, int64 (n,).");
+    m.def(
+        "random_shares",
+        [](u64 key, View<const i64> counters) {
+            auto shares = Array<i64>::empty({counters.size()});
+            for (i64 i = 0; i < counters.size(); ++i) shares[i] = random_share(key, counters[i]);
+            return shares;
+        },
+        "key"_a, "counters"_a, Unlocked(), "Return the integer in [0, ONE) of each counter, int64 (n,).");
     m.def("pick", &pick, "cumulative"_a, "draw"_a,
           R"(Return the first outcome whose cumulative probability is above `draw`; their number if none.
 
@@ -81,26 +82,29 @@ Example:
     >>> pick(np.array([ONE // 2, ONE]), ONE // 2)
     1)");
     m.def("length", &length, "dx"_a, "dy"_a, "Return how long (dx, dy) is [lattice units], rounded down.");
-    m.def("distance_bin",
-          [](View<const i64, 2> table, i64 camera, i64 dx, i64 dy) {
-              return distance_bin(table_of(table, camera), dx, dy);
-          },
-          "table"_a, "camera"_a, "dx"_a, "dy"_a, "Return the bin of the parts by distance that (dx, dy) belongs to.");
-    m.def("lasting",
-          [](View<const i64, 2> table, i64 camera, i64 steps) {
-              require(steps < i64{1} << DOUBLINGS, "steps must be below 2**62");
-              return lasting(table_of(table, camera), steps);
-          },
-          "table"_a, "camera"_a, "steps"_a,
-          "Return the probability that attention outlasts so many steps, from that for 2**i steps.");
-    m.def("steady_chance",
-          [](View<const i64, 2> table, i64 camera, i64 heading, i64 dx, i64 dy, i64 faces, i64 posture, i64 shown) {
-              require(0 <= posture && posture < POSTURES, "there is no such posture");
-              require(0 <= shown && shown < MOST_SHOWN, "shown must be below MOST_SHOWN");
-              return steady_chance(table_of(table, camera), heading, dx, dy, faces, posture, shown);
-          },
-          "table"_a, "camera"_a, "heading"_a, "dx"_a, "dy"_a, "faces"_a, "posture"_a, "shown"_a,
-          R"(Return the product of all factors but light [2**-31] for a user at (dx, dy) from the camera.
+    m.def(
+        "distance_bin",
+        [](View<const i64, 2> table, i64 camera, i64 dx, i64 dy) {
+            return distance_bin(table_of(table, camera), dx, dy);
+        },
+        "table"_a, "camera"_a, "dx"_a, "dy"_a, "Return the bin of the parts by distance that (dx, dy) belongs to.");
+    m.def(
+        "lasting",
+        [](View<const i64, 2> table, i64 camera, i64 steps) {
+            require(steps < i64{1} << DOUBLINGS, "steps must be below 2**62");
+            return lasting(table_of(table, camera), steps);
+        },
+        "table"_a, "camera"_a, "steps"_a,
+        "Return the probability that attention outlasts so many steps, from that for 2**i steps.");
+    m.def(
+        "steady_chance",
+        [](View<const i64, 2> table, i64 camera, i64 heading, i64 dx, i64 dy, i64 faces, i64 posture, i64 shown) {
+            require(0 <= posture && posture < POSTURES, "there is no such posture");
+            require(0 <= shown && shown < MOST_SHOWN, "shown must be below MOST_SHOWN");
+            return steady_chance(table_of(table, camera), heading, dx, dy, faces, posture, shown);
+        },
+        "table"_a, "camera"_a, "heading"_a, "dx"_a, "dy"_a, "faces"_a, "posture"_a, "shown"_a,
+        R"(Return the product of all factors but light [2**-31] for a user at (dx, dy) from the camera.
 
 Args:
     table: The cameras' tables, int64 (cameras, TABLE).
@@ -113,29 +117,32 @@ Args:
     shown: How many points of the body are in view.)");
     m.def("notice_chance", &notice_chance, "steady"_a, "light"_a, "chance"_a,
           "Return the probability to notice [2**-53], from [2**-31], [2**-31] and the camera's own [2**-53].");
-    m.def("turn_and_stretch",
-          [](i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
-              require(distance > 0, "distance must be above 0");
-              const Offset offset = turn_and_stretch(dx, dy, turn, distance, wanted);
-              return std::tuple(offset.dx, offset.dy);
-          },
-          "dx"_a, "dy"_a, "turn"_a, "distance"_a, "wanted"_a,
-          "Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length `wanted`.");
-    m.def("blurred",
-          [](View<const i64, 2> table, View<const u64, 3> keys, i64 camera, i64 user, i64 now, i64 dx, i64 dy) {
-              require(0 <= camera && camera < keys.size(), "there is no such camera");
-              require(0 <= user && user < keys.shape[1] && keys.shape[2] == USER_DRAWS, "there is no such user");
-              const Offset offset = blurred(table_of(table, camera), keys[camera][user], now, dx, dy);
-              return std::tuple(offset.dx, offset.dy);
-          },
-          "table"_a, "keys"_a, "camera"_a, "user"_a, "now"_a, "dx"_a, "dy"_a,
-          "Return where a user at (dx, dy) from the camera is perceived, from there.");
-    m.def("seeming",
-          [](View<const i64, 2> table, i64 camera, i64 posture, i64 draw) {
-              require(0 <= posture && posture < POSTURES, "there is no such posture");
-              return seeming(table_of(table, camera), posture, draw);
-          },
-          "table"_a, "camera"_a, "posture"_a, "draw"_a, "Return the posture that a posture is taken for.");
+    m.def(
+        "turn_and_stretch",
+        [](i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
+            require(distance > 0, "distance must be above 0");
+            const Offset offset = turn_and_stretch(dx, dy, turn, distance, wanted);
+            return std::tuple(offset.dx, offset.dy);
+        },
+        "dx"_a, "dy"_a, "turn"_a, "distance"_a, "wanted"_a,
+        "Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length `wanted`.");
+    m.def(
+        "blurred",
+        [](View<const i64, 2> table, View<const u64, 3> keys, i64 camera, i64 user, i64 now, i64 dx, i64 dy) {
+            require(0 <= camera && camera < keys.size(), "there is no such camera");
+            require(0 <= user && user < keys.shape[1] && keys.shape[2] == USER_DRAWS, "there is no such user");
+            const Offset offset = blurred(table_of(table, camera), keys[camera][user], now, dx, dy);
+            return std::tuple(offset.dx, offset.dy);
+        },
+        "table"_a, "keys"_a, "camera"_a, "user"_a, "now"_a, "dx"_a, "dy"_a,
+        "Return where a user at (dx, dy) from the camera is perceived, from there.");
+    m.def(
+        "seeming",
+        [](View<const i64, 2> table, i64 camera, i64 posture, i64 draw) {
+            require(0 <= posture && posture < POSTURES, "there is no such posture");
+            return seeming(table_of(table, camera), posture, draw);
+        },
+        "table"_a, "camera"_a, "posture"_a, "draw"_a, "Return the posture that a posture is taken for.");
 }
 
 }  // namespace fleet2d

@@ -9,9 +9,9 @@ namespace fleet2d {
 template <>
 struct border::Fields<ErrorTables> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(
-        &ErrorTables::table, &ErrorTables::whom, &ErrorTables::haunted, &ErrorTables::ghosts, &ErrorTables::source,
-        &ErrorTables::spot, &ErrorTables::looks_like, &ErrorTables::keys, &ErrorTables::ghost_keys);
+    static constexpr auto members = std::tuple(&ErrorTables::table, &ErrorTables::whom, &ErrorTables::haunted,
+                                               &ErrorTables::ghosts, &ErrorTables::source, &ErrorTables::spot,
+                                               &ErrorTables::looks_like, &ErrorTables::keys, &ErrorTables::ghost_keys);
 };
 
 // A camera's table as far as it decides where another entry is read.
@@ -23,9 +23,9 @@ inline void check_table(View<const i64> table) {
 // All arrays must be of one set of cameras and users. Tables are only read for a camera that errs.
 inline void check_errors(const ErrorTables& errors, View<const i64> errs, i64 users) {
     const i64 cameras = errs.size(), sources = errors.source.shape[1];
-    for (const i64 length : {errors.table.size(), errors.whom.size(), errors.haunted.size(), errors.ghosts.size(),
-                             errors.source.size(), errors.spot.size(), errors.looks_like.size(), errors.keys.size(),
-                             errors.ghost_keys.size()}) {
+    for (const i64 length :
+         {errors.table.size(), errors.whom.size(), errors.haunted.size(), errors.ghosts.size(), errors.source.size(),
+          errors.spot.size(), errors.looks_like.size(), errors.keys.size(), errors.ghost_keys.size()}) {
         require(length == cameras, "all arrays of error tables must have one length, that of the cameras");
     }
     require(errors.whom.shape[1] == users && errors.whom.shape[2] == users && errors.keys.shape[1] == users &&

@@ -23,23 +23,25 @@ Array<i64, 2> rows_of(const std::vector<Question>& questions) {
 }  // namespace
 
 void bind_points(nb::module_& m) {
-    m.def("points_in_sight",
-          [](const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points) {
-              check_point(x, y);
-              check_points(points);
-              return points_in_sight(mesh, x, y, points);
-          },
-          "mesh"_a, "x"_a, "y"_a, "points"_a, Unlocked(),
-          "Return which of the points, int64 (n, 2), a line of sight leads to from (x, y): bool (n,).");
-    m.def("points_in_reach",
-          [](i64 x, i64 y, i64 heading, std::tuple<i64, i64, i64> reach, View<const i64, 2> points) {
-              check_point(x, y);
-              check_points(points);
-              const auto [near_squared, far_squared, half_angle] = reach;
-              return points_in_reach({x, y, heading}, near_squared, far_squared, half_angle, points);
-          },
-          "x"_a, "y"_a, "heading"_a, "reach"_a, "points"_a, Unlocked(),
-          R"(Return which points are in range and within the angle, walls apart.
+    m.def(
+        "points_in_sight",
+        [](const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points) {
+            check_point(x, y);
+            check_points(points);
+            return points_in_sight(mesh, x, y, points);
+        },
+        "mesh"_a, "x"_a, "y"_a, "points"_a, Unlocked(),
+        "Return which of the points, int64 (n, 2), a line of sight leads to from (x, y): bool (n,).");
+    m.def(
+        "points_in_reach",
+        [](i64 x, i64 y, i64 heading, std::tuple<i64, i64, i64> reach, View<const i64, 2> points) {
+            check_point(x, y);
+            check_points(points);
+            const auto [near_squared, far_squared, half_angle] = reach;
+            return points_in_reach({x, y, heading}, near_squared, far_squared, half_angle, points);
+        },
+        "x"_a, "y"_a, "heading"_a, "reach"_a, "points"_a, Unlocked(),
+        R"(Return which points are in range and within the angle, walls apart.
 
 Args:
     x: Where the camera is [lattice units].
@@ -50,22 +52,23 @@ Args:
 
 Returns:
     bool (n,).)");
-    m.def("questions",
-          [](const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot, View<const i64, 2> x,
-             View<const i64, 2> y, View<const u8, 2> away, i64 first, i64 step_us) {
-              check_lenses(lenses);
-              check_poses(robot);
-              const i64 bodies = widest.shape[1];
-              require(widest.shape[0] == lenses.period.size() && bodies == lenses.reach.shape[1],
-                      "widest must be (cameras, bodies), as the lenses are");
-              for (const auto& shape : {x.shape, y.shape, away.shape}) {
-                  require(shape[0] == bodies && shape[1] == robot.x.size(), "x, y and away must be (bodies, n)");
-              }
-              Questions questions = list_questions(lenses, widest, slack, robot, {x, y, away}, first, step_us);
-              return std::tuple(rows_of(questions.asked), std::move(questions.number));
-          },
-          "lenses"_a, "widest"_a, "slack"_a, "robot"_a, "x"_a, "y"_a, "away"_a, "first"_a, "step_us"_a, Unlocked(),
-          R"(List who may be in view of which camera when: near enough, and not far beside the angle.
+    m.def(
+        "questions",
+        [](const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot, View<const i64, 2> x,
+           View<const i64, 2> y, View<const u8, 2> away, i64 first, i64 step_us) {
+            check_lenses(lenses);
+            check_poses(robot);
+            const i64 bodies = widest.shape[1];
+            require(widest.shape[0] == lenses.period.size() && bodies == lenses.reach.shape[1],
+                    "widest must be (cameras, bodies), as the lenses are");
+            for (const auto& shape : {x.shape, y.shape, away.shape}) {
+                require(shape[0] == bodies && shape[1] == robot.x.size(), "x, y and away must be (bodies, n)");
+            }
+            Questions questions = list_questions(lenses, widest, slack, robot, {x, y, away}, first, step_us);
+            return std::tuple(rows_of(questions.asked), std::move(questions.number));
+        },
+        "lenses"_a, "widest"_a, "slack"_a, "robot"_a, "x"_a, "y"_a, "away"_a, "first"_a, "step_us"_a, Unlocked(),
+        R"(List who may be in view of which camera when: near enough, and not far beside the angle.
 
 Args:
     lenses: Lenses.

@@ -6,14 +6,15 @@
 namespace fleet2d {
 
 void bind_presence(nb::module_& m) {
-    m.def("advance",
-          [](View<const f64> probability, View<const f64, 2> transition, i64 bins) {
-              require(transition.shape[0] == probability.size() && transition.shape[1] == probability.size(),
-                      "transition must be (states, states)");
-              return advance(probability, transition, bins);
-          },
-          "probability"_a, "transition"_a, "bins"_a, Unlocked(),
-          R"(Return a chain's state probabilities some bins later, without evidence.
+    m.def(
+        "advance",
+        [](View<const f64> probability, View<const f64, 2> transition, i64 bins) {
+            require(transition.shape[0] == probability.size() && transition.shape[1] == probability.size(),
+                    "transition must be (states, states)");
+            return advance(probability, transition, bins);
+        },
+        "probability"_a, "transition"_a, "bins"_a, Unlocked(),
+        R"(Return a chain's state probabilities some bins later, without evidence.
 
 Args:
     probability: float64 (states,), now.
@@ -22,18 +23,19 @@ Args:
 
 Returns:
     float64 (states,).)");
-    m.def("count_sightings",
-          [](View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps, View<i64, 3> seen) {
-              require(step.size() == user.size() && step.size() == room.size(),
-                      "step, user and room must have one length");
-              require(bin_steps > 0, "bin_steps must be 1 or more");
-              require(seen.shape[1] > 0 && all_in_range(user, INT64_MIN, seen.shape[1]) &&
-                          all_in_range(room, INT64_MIN, seen.shape[2]),
-                      "seen must have an entry for each user and each room, and one more for anybody");
-              count_sightings(step, user, room, bin_steps, seen);
-          },
-          "step"_a, "user"_a, "room"_a, "bin_steps"_a, "seen"_a, Unlocked(),
-          R"(Count the steps at which each user was perceived in each room, once however often.
+    m.def(
+        "count_sightings",
+        [](View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps, View<i64, 3> seen) {
+            require(step.size() == user.size() && step.size() == room.size(),
+                    "step, user and room must have one length");
+            require(bin_steps > 0, "bin_steps must be 1 or more");
+            require(seen.shape[1] > 0 && all_in_range(user, INT64_MIN, seen.shape[1]) &&
+                        all_in_range(room, INT64_MIN, seen.shape[2]),
+                    "seen must have an entry for each user and each room, and one more for anybody");
+            count_sightings(step, user, room, bin_steps, seen);
+        },
+        "step"_a, "user"_a, "room"_a, "bin_steps"_a, "seen"_a, Unlocked(),
+        R"(Count the steps at which each user was perceived in each room, once however often.
 
 Args:
     step: int64 (n,), in order of time, from the beginning of the first bin.
@@ -41,15 +43,16 @@ Args:
     room: int64 (n,), below 0 for none.
     bin_steps: Steps of a bin.
     seen: int64 (bins, users + 1, rooms), to be added to; the last user is anybody.)");
-    m.def("resampled",
-          [](u64 key, View<const f64, 2> days, i64 replicates) {
-              require(days.size() < (i64{1} << 31), "days must be fewer than 2**31");
-              require(replicates >= 0, "replicates must be 0 or more");
-              return resampled(key, days, replicates);
-          },
-          nb::sig("def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64], replicates: int) -> "
-                  "numpy.typing.NDArray[numpy.float64]"),
-          "key"_a, "days"_a, "replicates"_a, Unlocked(), R"(Sum days drawn with replacement.
+    m.def(
+        "resampled",
+        [](u64 key, View<const f64, 2> days, i64 replicates) {
+            require(days.size() < (i64{1} << 31), "days must be fewer than 2**31");
+            require(replicates >= 0, "replicates must be 0 or more");
+            return resampled(key, days, replicates);
+        },
+        nb::sig("def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64], replicates: int) -> "
+                "numpy.typing.NDArray[numpy.float64]"),
+        "key"_a, "days"_a, "replicates"_a, Unlocked(), R"(Sum days drawn with replacement.
 
 Args:
     key: Of the stream of draws.

@@ -10,8 +10,7 @@ namespace fleet2d {
 template <>
 struct border::Fields<Corners> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
+    static constexpr auto members = std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
 };
 
 namespace {
@@ -54,9 +53,8 @@ private:
 auto state_of(nb::handle_t<Routes> self) {
     const Routes& routes = nb::cast<const Routes&>(self);
     const auto [vertex, before, after, simple] = routes.graph().corners();
-    return nb::make_tuple(routes.mesh(),
-                          nb::make_tuple(border::borrowed(vertex, self), border::borrowed(before, self),
-                                         border::borrowed(after, self), border::borrowed(simple, self)));
+    return nb::make_tuple(routes.mesh(), nb::make_tuple(border::borrowed(vertex, self), border::borrowed(before, self),
+                                                        border::borrowed(after, self), border::borrowed(simple, self)));
 }
 
 template <auto Member>

@@ -29,16 +29,17 @@ void mark_spans(View<const i32, 2> spans, View<bool, 2> mask) {
 }  // namespace
 
 void bind_seen(nb::module_& m) {
-    m.def("cells_in_view",
-          [](const Mesh& mesh, i64 x, i64 y, i64 heading, const Reach& reach, i64 rows, i64 columns) {
-              check_reach(reach);
-              require(0 <= rows && rows <= LIMIT && 0 <= columns && columns <= LIMIT,
-                      "rows and columns must be in 0 to 2**20");
-              CellFinder finder(mesh, rows, columns);
-              return array_of(finder.cells_in_view({x, y, heading & (TURN - 1)}, reach));
-          },
-          "mesh"_a, "x"_a, "y"_a, "heading"_a, "reach"_a, "rows"_a, "columns"_a, Unlocked(),
-          R"(Find the cells whose centre is in view: in range, within the angle, and in line of sight.
+    m.def(
+        "cells_in_view",
+        [](const Mesh& mesh, i64 x, i64 y, i64 heading, const Reach& reach, i64 rows, i64 columns) {
+            check_reach(reach);
+            require(0 <= rows && rows <= LIMIT && 0 <= columns && columns <= LIMIT,
+                    "rows and columns must be in 0 to 2**20");
+            CellFinder finder(mesh, rows, columns);
+            return array_of(finder.cells_in_view({x, y, heading & (TURN - 1)}, reach));
+        },
+        "mesh"_a, "x"_a, "y"_a, "heading"_a, "reach"_a, "rows"_a, "columns"_a, Unlocked(),
+        R"(Find the cells whose centre is in view: in range, within the angle, and in line of sight.
 
 Args:
     mesh: Free space.

@@ -10,8 +10,8 @@ namespace {
 bool sees_from_triangle(const Mesh& mesh, i64 qx, i64 qy, i64 triangle, i64 px, i64 py) {
     check_point(qx, qy);
     check_point(px, py);
-    require(triangle == OUTSIDE || (0 <= triangle && triangle < mesh.triangle_count() &&
-                                    contains_triangle(mesh, triangle, qx, qy)),
+    require(triangle == OUTSIDE ||
+                (0 <= triangle && triangle < mesh.triangle_count() && contains_triangle(mesh, triangle, qx, qy)),
             "triangle must be one that holds the point q, or -1");
     return line_of_sight(mesh, qx, qy, triangle, px, py);
 }
@@ -38,24 +38,26 @@ Args:
     py: Where the looked-for point is, lattice units.)");
     m.def("line_of_sight", &sees, "mesh"_a, "qx"_a, "qy"_a, "px"_a, "py"_a,
           "Return whether p is visible from q, wherever q is; see the other form.");
-    m.def("build_fans",
-          [](const Mesh& mesh) {
-              Fans fans = build_fans(mesh);
-              return std::tuple(std::move(fans.start), std::move(fans.triangles));
-          },
-          "mesh"_a, Unlocked(), R"(List the triangles around each vertex.
+    m.def(
+        "build_fans",
+        [](const Mesh& mesh) {
+            Fans fans = build_fans(mesh);
+            return std::tuple(std::move(fans.start), std::move(fans.triangles));
+        },
+        "mesh"_a, Unlocked(), R"(List the triangles around each vertex.
 
 Returns:
     int32 (vertices + 1,), where the triangles of each vertex begin in the list; and the list,
     int32, ascending for each vertex.)");
-    m.def("vertices_seen_from_point",
-          [](const Mesh& mesh, i64 x, i64 y) {
-              Scratch scratch(mesh);
-              auto seen = Array<i32>::empty({mesh.vertex_count() + 4});
-              seen.truncate(vertices_seen_from_point(mesh, x, y, locate(mesh, x, y), seen, scratch));
-              return seen;
-          },
-          "mesh"_a, "x"_a, "y"_a, Unlocked(), R"(Return the vertices that a straight way from a point leads to.
+    m.def(
+        "vertices_seen_from_point",
+        [](const Mesh& mesh, i64 x, i64 y) {
+            Scratch scratch(mesh);
+            auto seen = Array<i32>::empty({mesh.vertex_count() + 4});
+            seen.truncate(vertices_seen_from_point(mesh, x, y, locate(mesh, x, y), seen, scratch));
+            return seen;
+        },
+        "mesh"_a, "x"_a, "y"_a, Unlocked(), R"(Return the vertices that a straight way from a point leads to.
 
 Between the point and the vertex the way touches no wall and no other vertex. A point on a wall
 also sees the ends of that wall. A point at a vertex sees only that vertex.
@@ -67,15 +69,16 @@ Args:
 
 Returns:
     int32 (n,), in no particular order, each once; none from a point outside.)");
-    m.def("vertices_seen_from_vertex",
-          [](const Mesh& mesh, i64 vertex) {
-              require(0 <= vertex && vertex < mesh.vertex_count(), "there is no such vertex");
-              Scratch scratch(mesh);
-              auto seen = Array<i32>::empty({mesh.vertex_count() + 4});
-              seen.truncate(vertices_seen_from_vertex(mesh, build_fans(mesh), vertex, seen, scratch));
-              return seen;
-          },
-          "mesh"_a, "vertex"_a, Unlocked(), R"(Return the vertices that a straight way from a vertex leads to.
+    m.def(
+        "vertices_seen_from_vertex",
+        [](const Mesh& mesh, i64 vertex) {
+            require(0 <= vertex && vertex < mesh.vertex_count(), "there is no such vertex");
+            Scratch scratch(mesh);
+            auto seen = Array<i32>::empty({mesh.vertex_count() + 4});
+            seen.truncate(vertices_seen_from_vertex(mesh, build_fans(mesh), vertex, seen, scratch));
+            return seen;
+        },
+        "mesh"_a, "vertex"_a, Unlocked(), R"(Return the vertices that a straight way from a vertex leads to.
 
 Between the two the way touches no wall and no other vertex, or it runs along one wall.
 

@@ -13,21 +13,22 @@ struct border::Fields<Moments> {
 };
 
 void bind_smoothing(nb::module_& m) {
-    m.def("smooth",
-          [](const Ways& ways, const Stretches& stretches, View<const f64, 2> dawn, View<const f64, 2> dusk,
-             const Moments& moments) {
-              check_stays(ways, stretches);
-              const std::array states{ways.stages(), ways.patches()};
-              require(dawn.shape == states && dusk.shape == states, "dawn and dusk must be (stages, patches)");
-              require(moments.time.size() == ways.nodes() && moments.exits.shape == ways.follow.shape &&
-                          moments.arrivals.size() == ways.patches() && moments.moves.size() == ways.rooms() &&
-                          moments.rests.size() == ways.rooms(),
-                      "moments must be of the rooms, stages and patches of ways");
-              Smoothed made = smooth(ways, stretches, dawn, dusk, moments);
-              return std::tuple(std::move(made.places), std::move(made.end), std::move(made.ahead));
-          },
-          "ways"_a, "stretches"_a, "dawn"_a, "dusk"_a, "moments"_a, Unlocked(),
-          R"(Return where a person was, given all evidence of some stretches.
+    m.def(
+        "smooth",
+        [](const Ways& ways, const Stretches& stretches, View<const f64, 2> dawn, View<const f64, 2> dusk,
+           const Moments& moments) {
+            check_stays(ways, stretches);
+            const std::array states{ways.stages(), ways.patches()};
+            require(dawn.shape == states && dusk.shape == states, "dawn and dusk must be (stages, patches)");
+            require(moments.time.size() == ways.nodes() && moments.exits.shape == ways.follow.shape &&
+                        moments.arrivals.size() == ways.patches() && moments.moves.size() == ways.rooms() &&
+                        moments.rests.size() == ways.rooms(),
+                    "moments must be of the rooms, stages and patches of ways");
+            Smoothed made = smooth(ways, stretches, dawn, dusk, moments);
+            return std::tuple(std::move(made.places), std::move(made.end), std::move(made.ahead));
+        },
+        "ways"_a, "stretches"_a, "dawn"_a, "dusk"_a, "moments"_a, Unlocked(),
+        R"(Return where a person was, given all evidence of some stretches.
 
 Between two stretches a person may go on once: leave a stage, with the chance to do so within the
 later one, or change patch within the room. With stretches of one bin that is a hidden Markov chain;

@@ -9,8 +9,8 @@ namespace fleet2d {
 template <>
 struct border::Fields<Stretches> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Stretches::bins, &Stretches::hour, &Stretches::shown,
-                                               &Stretches::begin, &Stretches::patch, &Stretches::share);
+    static constexpr auto members = std::tuple(&Stretches::bins, &Stretches::hour, &Stretches::shown, &Stretches::begin,
+                                               &Stretches::patch, &Stretches::share);
 };
 
 template <>

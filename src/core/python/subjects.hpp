@@ -25,6 +25,8 @@ void bind_perception(nanobind::module_& m);
 void bind_look(nanobind::module_& m);
 void bind_routes(nanobind::module_& m);
 void bind_presence(nanobind::module_& m);
+void bind_evidence(nanobind::module_& m);
+void bind_legs(nanobind::module_& m);
 void bind_stays(nanobind::module_& m);
 void bind_smoothing(nanobind::module_& m);
 

@@ -17,6 +17,20 @@ Array<T> array_of(const std::vector<T>& values) {
     return Array<T>::copy_of({values.data(), {static_cast<i64>(values.size())}});
 }
 
+constexpr i64 FAR = i64{1} << 29;  // where a random walk is, and its headings, are nearer to 0
+constexpr const char* NO_STATE = "this is no state of timelines";
+
+// A part of a state, and what had to be copied of it.
+template <class T>
+class Part {
+public:
+    explicit Part(nb::handle source) { require(caster_.from_python(source, 0, nullptr), NO_STATE); }
+    T value() const { return caster_.value; }
+
+private:
+    nb::detail::make_caster<T> caster_;
+};
+
 // Timelines, and the meshes that their random walks need.
 class OwnedTimelines {
 public:
@@ -36,12 +50,13 @@ public:
         for (i64 i = 1; i < posture_us.size(); ++i) ascend &= posture_us[i - 1] <= posture_us[i];
         require(ascend, "posture_us must ascend");
         auto piece = std::make_shared<TrackPiece>();
-        *piece = {copied(track.time),    copied(track.x),    copied(track.y),  copied(track.heading),
+        *piece = {copied(track.time), copied(track.x),    copied(track.y), copied(track.heading),
                   copied(track.away), copied(posture_us), copied(postures)};
         timelines_.put(body, {step, std::move(piece), nullptr});
     }
 
-    void walk(i64 body, i64 step, nb::object walls, nb::object space, const WalkRule& rule, std::tuple<i64, i64, i64> start) {
+    void walk(i64 body, i64 step, nb::object walls, nb::object space, const WalkRule& rule,
+              std::tuple<i64, i64, i64> start) {
         check(body, step);
         auto piece = std::make_shared<WalkPiece>();
         piece->walls = nb::cast<Mesh>(walls);
@@ -51,7 +66,7 @@ public:
         piece->drawn_from = step;
         const auto [x, y, heading] = start;
         for (const i64 value : {x, y, heading}) {
-            require(-(i64{1} << 29) < value && value < (i64{1} << 29), "start must be within 2**29 of 0");
+            require(-FAR < value && value < FAR, "start must be within 2**29 of 0");
         }
         piece->x.push_back(static_cast<i32>(x));
         piece->y.push_back(static_cast<i32>(y));
@@ -97,9 +112,17 @@ public:
         return nb::make_tuple(timelines_.bodies(), timelines_.step_us(), bodies);
     }
 
-    void restore(nb::list bodies) {
-        for (i64 body = 0; body < timelines_.bodies(); ++body) {
-            for (nb::handle item : nb::cast<nb::list>(bodies[static_cast<std::size_t>(body)])) restore_piece(body, nb::cast<nb::tuple>(item));
+    void restore(nb::handle bodies) {
+        require(nb::isinstance<nb::list>(bodies) && nb::len(bodies) == static_cast<std::size_t>(timelines_.bodies()),
+                NO_STATE);
+        i64 body = 0;
+        for (nb::handle pieces : nb::borrow<nb::list>(bodies)) {
+            require(nb::isinstance<nb::list>(pieces), NO_STATE);
+            for (nb::handle piece : nb::borrow<nb::list>(pieces)) {
+                require(nb::isinstance<nb::tuple>(piece), NO_STATE);
+                restore_piece(body, nb::borrow<nb::tuple>(piece));
+            }
+            ++body;
         }
     }
 
@@ -110,13 +133,16 @@ private:
     }
     void check(i64 body, i64 step) const {
         require(0 <= body && body < timelines_.bodies(), "there is no such body");
-        require(0 <= step && step <= LATEST / timelines_.step_us(), "step must be 0 or more, and its time at most 2**61 us");
+        require(0 <= step && step <= LATEST / timelines_.step_us(),
+                "step must be 0 or more, and its time at most 2**61 us");
     }
     void check_known(i64 body, i64 step) const {
         check(body, step);
         const auto& pieces = timelines_.pieces(body);
-        require(!pieces.empty() && pieces.front().first <= step, "the step is forgotten, or the body has no motion yet");
-        require(!pieces.front().walk || (pieces.size() > 1 && pieces[1].first <= step) || pieces.front().walk->drawn_from <= step,
+        require(!pieces.empty() && pieces.front().first <= step,
+                "the step is forgotten, or the body has no motion yet");
+        require(!pieces.front().walk || (pieces.size() > 1 && pieces[1].first <= step) ||
+                    pieces.front().walk->drawn_from <= step,
                 "the step is forgotten");
     }
     static void check_walk(const WalkRule& rule) {
@@ -148,7 +174,8 @@ private:
     nb::tuple state_of(const Piece& piece) const {
         if (piece.walk) {
             const WalkPiece& walk = *piece.walk;
-            const auto rule = nb::make_tuple(walk.rule.key, walk.rule.stride, walk.rule.sway, walk.rule.turn_limit);
+            const auto rule = nb::make_tuple(walk.rule.key, walk.rule.stride, walk.rule.sway, walk.rule.turn_limit,
+                                             walk.rule.stays);
             return nb::make_tuple(piece.first, mesh_of(walk.walls), mesh_of(walk.space), rule, walk.drawn_from,
                                   array_of(walk.x), array_of(walk.y), array_of(walk.heading));
         }
@@ -158,18 +185,30 @@ private:
         return nb::make_tuple(piece.first, breakpoints, array_of(track.posture_us), array_of(track.postures));
     }
     void restore_piece(i64 body, nb::tuple state) {
-        const i64 first = nb::cast<i64>(state[0]);
-        if (state.size() == 4) {
-            follow(body, first, nb::cast<Breakpoints>(state[1]), nb::cast<View<const i64>>(state[2]),
-                   nb::cast<View<const i8>>(state[3]));
+        const bool is_track = state.size() == 4;
+        require(is_track || state.size() == 8, NO_STATE);
+        const Part<i64> first(state[0]);
+        if (is_track) {
+            const Part<Breakpoints> track(state[1]);
+            const Part<View<const i64>> posture_us(state[2]);
+            const Part<View<const i8>> postures(state[3]);
+            follow(body, first.value(), track.value(), posture_us.value(), postures.value());
             return;
         }
-        const auto x = nb::cast<View<const i32>>(state[5]), y = nb::cast<View<const i32>>(state[6]);
-        const auto heading = nb::cast<View<const i32>>(state[7]);
-        require(x.size() > 0 && x.size() == y.size() && x.size() == heading.size(), "a walk's poses must have one length");
-        walk(body, first, nb::borrow(state[1]), nb::borrow(state[2]), nb::cast<WalkRule>(state[3]), {x[0], y[0], heading[0]});
+        const Part<WalkRule> rule(state[3]);
+        const Part<i64> drawn_from(state[4]);
+        const Part<View<const i32>> xs(state[5]), ys(state[6]), headings(state[7]);
+        const View<const i32> x = xs.value(), y = ys.value(), heading = headings.value();
+        require(x.size() > 0 && x.size() == y.size() && x.size() == heading.size(),
+                "a walk's poses must have one length");
+        for (const View<const i32> values : {x, y, heading}) require(all_in_range(values, -FAR + 1, FAR), NO_STATE);
+        // Only of the first piece that a body has may the beginning be forgotten.
+        const bool is_first = timelines_.pieces(body).empty();
+        require(is_first ? first.value() <= drawn_from.value() : first.value() == drawn_from.value(), NO_STATE);
+        check(body, drawn_from.value());
+        walk(body, first.value(), nb::borrow(state[1]), nb::borrow(state[2]), rule.value(), {x[0], y[0], heading[0]});
         WalkPiece& walk = *timelines_.pieces(body).back().walk;
-        walk.drawn_from = nb::cast<i64>(state[4]);
+        walk.drawn_from = drawn_from.value();
         walk.x = copied(x), walk.y = copied(y), walk.heading = copied(heading);
     }
 
@@ -178,7 +217,8 @@ private:
 };
 
 // The poses of one body at each of some steps.
-std::tuple<Array<i64>, Array<i64>, Array<i64>, Array<u8>, Array<i8>> dense(const Window& window, i64 body, i64 first, i64 end) {
+std::tuple<Array<i64>, Array<i64>, Array<i64>, Array<u8>, Array<i8>> dense(const Window& window, i64 body, i64 first,
+                                                                           i64 end) {
     require(0 <= body && body < window.bodies(), "there is no such body");
     require(window.first <= first && first <= end && end <= window.end, "the steps must lie within the window");
     const i64 count = end - first;
@@ -245,22 +285,35 @@ Args:
     heading: int64 (bodies, steps), 1/4096 turn.
     away: uint8 (bodies, steps), not 0 while a body isn't at home.
     posture: int8 (bodies, steps), number of the posture.)")
-        .def("__init__", [](OwnedWindow* self, i64 first, View<const i64, 2> x, View<const i64, 2> y, View<const i64, 2> heading,
-                             View<const u8, 2> away, View<const i8, 2> posture) {
-            new (self) OwnedWindow(window_of_poses(first, x, y, heading, away, posture));
-        }, "first"_a, "x"_a, "y"_a, "heading"_a, "away"_a, "posture"_a)
+        .def(
+            "__init__",
+            [](OwnedWindow* self, i64 first, View<const i64, 2> x, View<const i64, 2> y, View<const i64, 2> heading,
+               View<const u8, 2> away, View<const i8, 2> posture) {
+                new (self) OwnedWindow(window_of_poses(first, x, y, heading, away, posture));
+            },
+            "first"_a, "x"_a, "y"_a, "heading"_a, "away"_a, "posture"_a)
         .def_ro("first", &OwnedWindow::first, "The first step.")
         .def_ro("end", &OwnedWindow::end, "One past the last step.")
-        .def_prop_ro("start", column<&Window::start>(), nb::sig("def start(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (bodies + 1,), the first run of each body.")
-        .def_prop_ro("step", column<&Window::step>(), nb::sig("def step(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), the step at which each begins.")
-        .def_prop_ro("x", column<&Window::x>(), nb::sig("def x(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), lattice units.")
-        .def_prop_ro("y", column<&Window::y>(), nb::sig("def y(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), lattice units.")
-        .def_prop_ro("heading", column<&Window::heading>(), nb::sig("def heading(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), 1/4096 turn.")
-        .def_prop_ro("away", column<&Window::away>(), nb::sig("def away(self) -> numpy.typing.NDArray[numpy.uint8]"), "uint8 (runs,), not 0 while the body isn't at home.")
-        .def_prop_ro("posture", column<&Window::posture>(), nb::sig("def posture(self) -> numpy.typing.NDArray[numpy.int8]"), "int8 (runs,), number of the posture.")
-        .def("dense", [](const OwnedWindow& self, i64 body, i64 first, i64 end) { return dense(self.view(), body, first, end); },
-             "body"_a, "first"_a, "end"_a,
-             R"(Return the poses of a body at each of the steps from `first` to `end` - 1.
+        .def_prop_ro("start", column<&Window::start>(), nb::sig("def start(self) -> numpy.typing.NDArray[numpy.int64]"),
+                     "int64 (bodies + 1,), the first run of each body.")
+        .def_prop_ro("step", column<&Window::step>(), nb::sig("def step(self) -> numpy.typing.NDArray[numpy.int64]"),
+                     "int64 (runs,), the step at which each begins.")
+        .def_prop_ro("x", column<&Window::x>(), nb::sig("def x(self) -> numpy.typing.NDArray[numpy.int64]"),
+                     "int64 (runs,), lattice units.")
+        .def_prop_ro("y", column<&Window::y>(), nb::sig("def y(self) -> numpy.typing.NDArray[numpy.int64]"),
+                     "int64 (runs,), lattice units.")
+        .def_prop_ro("heading", column<&Window::heading>(),
+                     nb::sig("def heading(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), 1/4096 turn.")
+        .def_prop_ro("away", column<&Window::away>(), nb::sig("def away(self) -> numpy.typing.NDArray[numpy.uint8]"),
+                     "uint8 (runs,), not 0 while the body isn't at home.")
+        .def_prop_ro("posture", column<&Window::posture>(),
+                     nb::sig("def posture(self) -> numpy.typing.NDArray[numpy.int8]"),
+                     "int8 (runs,), number of the posture.")
+        .def(
+            "dense",
+            [](const OwnedWindow& self, i64 body, i64 first, i64 end) { return dense(self.view(), body, first, end); },
+            "body"_a, "first"_a, "end"_a,
+            R"(Return the poses of a body at each of the steps from `first` to `end` - 1.
 
 Returns:
     x, y, heading int64, away uint8 and posture int8, (steps,) each.)");
@@ -283,20 +336,27 @@ Args:
     posture_us: int64 (n,), when it takes another posture.
     postures: int8 (n + 1,); number i holds before posture_us[i], the last one from then on.)")
         .def("walk", &OwnedTimelines::walk, "body"_a, "step"_a, nb::arg("walls"), nb::arg("space"), "rule"_a, "start"_a,
-             nb::sig("def walk(self, body: int, step: int, walls: Mesh, space: Mesh, rule: tuple[typing.Any, ...], start: tuple[int, int, int]) -> None"),
+             nb::sig("def walk(self, body: int, step: int, walls: Mesh, space: Mesh, rule: tuple[typing.Any, ...], "
+                     "start: tuple[int, int, int]) -> None"),
              "Let a body walk at random from a step on; see `trace_meander`.")
         .def("pose", &OwnedTimelines::pose, "body"_a, "step"_a, "Return x, y, heading and away of a body at a step.")
-        .def("poses", &OwnedTimelines::poses, "step"_a, "Return x, y, heading and away of all bodies at a step, (bodies,) each.")
+        .def("poses", &OwnedTimelines::poses, "step"_a,
+             "Return x, y, heading and away of all bodies at a step, (bodies,) each.")
         .def("window", &OwnedTimelines::window, "first"_a, "end"_a, Unlocked(),
              "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")
         .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a, Unlocked(),
              "Return the runs of equal pose of one body in the steps from `first` to `end` - 1.")
         .def("forget", &OwnedTimelines::forget, "before"_a, "Drop what is only needed for steps earlier than `before`.")
         .def("__getstate__", &OwnedTimelines::state, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
-        .def("__setstate__", [](OwnedTimelines& self, nb::tuple state) {
-            new (&self) OwnedTimelines(nb::cast<i64>(state[0]), nb::cast<i64>(state[1]));
-            self.restore(nb::cast<nb::list>(state[2]));
-        }, nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
+        .def(
+            "__setstate__",
+            [](OwnedTimelines& self, nb::tuple state) {
+                require(state.size() == 3, NO_STATE);
+                OwnedTimelines made(Part<i64>{state[0]}.value(), Part<i64>{state[1]}.value());
+                made.restore(state[2]);
+                new (&self) OwnedTimelines(std::move(made));
+            },
+            nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
 }
 
 }  // namespace fleet2d

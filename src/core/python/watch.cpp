@@ -18,8 +18,8 @@ struct border::Fields<Glances> {
 template <>
 struct border::Fields<Record> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Record::first, &Record::last, &Record::exposure, &Record::counted,
-                                               &Record::binned, &Record::most);
+    static constexpr auto members =
+        std::tuple(&Record::first, &Record::last, &Record::exposure, &Record::counted, &Record::binned, &Record::most);
 };
 
 template <>
@@ -79,18 +79,19 @@ void check_steps(const Watched& watched, const Window& window, i64 body, i64 fir
 
 void bind_watch(nb::module_& m) {
     m.attr("NEVER") = NEVER;
-    m.def("watch",
-          [](const Watched& watched, const Window& window, i64 body, i64 first, i64 end, const Glances& glances,
-             const Record& record) {
-              check_watched(watched);
-              check_glances(glances);
-              check_record(watched, record);
-              require(glances.cells.shape[1] == record.patches(), "cells must be (slots, patches)");
-              check_steps(watched, window, body, first, end, record);
-              watch(watched, window, body, first, end, glances, record);
-          },
-          "watched"_a, "window"_a, "body"_a, "first"_a, "end"_a, "glances"_a, "record"_a, Unlocked(),
-          R"(Take in what a robot sees in the steps from `first` to `end` - 1.
+    m.def(
+        "watch",
+        [](const Watched& watched, const Window& window, i64 body, i64 first, i64 end, const Glances& glances,
+           const Record& record) {
+            check_watched(watched);
+            check_glances(glances);
+            check_record(watched, record);
+            require(glances.cells.shape[1] == record.patches(), "cells must be (slots, patches)");
+            check_steps(watched, window, body, first, end, record);
+            watch(watched, window, body, first, end, glances, record);
+        },
+        "watched"_a, "window"_a, "body"_a, "first"_a, "end"_a, "glances"_a, "record"_a, Unlocked(),
+        R"(Take in what a robot sees in the steps from `first` to `end` - 1.
 
 Args:
     watched: What it sees it with, and where, a `Watched`.
@@ -100,16 +101,17 @@ Args:
     end: One past the last step.
     glances: The poses kept so far, `Glances`; emptied when the table is half full.
     record: What it has seen, a `Record`; `last` lags behind where a pose comes again: see `settle`.)");
-    m.def("settle",
-          [](const Watched& watched, const Glances& glances, View<i64, 2> seen) {
-              check_watched(watched);
-              check_glances(glances);
-              require(all_in_range<i64>(glances.last, NEVER, LATEST / watched.step_us), "last must hold steps, or -1");
-              require(is_grid(seen, watched), "seen must be as large as patch_of_cell");
-              settle(watched, glances, seen);
-          },
-          "watched"_a, "glances"_a, "seen"_a, Unlocked(),
-          R"(Bring the last step of each cell up to date with poses that were taken again.
+    m.def(
+        "settle",
+        [](const Watched& watched, const Glances& glances, View<i64, 2> seen) {
+            check_watched(watched);
+            check_glances(glances);
+            require(all_in_range<i64>(glances.last, NEVER, LATEST / watched.step_us), "last must hold steps, or -1");
+            require(is_grid(seen, watched), "seen must be as large as patch_of_cell");
+            settle(watched, glances, seen);
+        },
+        "watched"_a, "glances"_a, "seen"_a, Unlocked(),
+        R"(Bring the last step of each cell up to date with poses that were taken again.
 
 Args:
     watched: What the robot sees with, and where, a `Watched`.

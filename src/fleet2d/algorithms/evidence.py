@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.patches import Patches
+from fleet2d.kernels.evidence import gather_views
 from fleet2d.kernels.presence import count_sightings
 
 # Length of a bin; one step where a step is longer.
@@ -22,6 +23,7 @@ class Parts(NamedTuple):
         shown: float64 (bins, patches), share of each patch's cells in view at one step of the bin,
             at most; of several robots, that of the robot that saw most of it.
         seen: int64 (bins, users + 1, patches), as in Evidence.
+        shown_parts: uint8 (bins, patches), `shown` in parts of 255; None: not worked out yet.
     """
 
     room: NDArray[np.int64]
@@ -29,6 +31,7 @@ class Parts(NamedTuple):
     watched: NDArray[np.float64]
     shown: NDArray[np.float64]
     seen: NDArray[np.int64]
+    shown_parts: NDArray[np.uint8] | None = None
 
 
 class Evidence(NamedTuple):
@@ -116,22 +119,16 @@ def gather(
         sighted: Who was perceived in which patch.
         users: How many users there are.
     """
-    bins, first_patches, count = len(cells), patches.first, len(patches.room)
-    of_patch = np.maximum(patches.cells, 1)
-    summed, most = cells[:, :, 0], cells[:, :, 1].max(axis=1, initial=0)
-    by_room = np.add.reduceat(summed, first_patches, axis=2).max(axis=1, initial=0)
-    by_patch = summed.max(axis=1, initial=0)
-    sizes = (first, bins, bin_steps, users)
-    in_room = sighted._replace(room=patches.room[sighted.room])
-    parts = Parts(
-        patches.room,
-        patches.cells,
-        by_patch / (of_patch * bin_steps),
-        most / of_patch,
-        count_seen(sighted, *sizes, count),
+    count = len(patches.room)
+    watched, by_patch, shown, shown_parts = gather_views(
+        cells, patches.room, patches.cells, patches.room_cells, bin_steps
     )
-    seen = count_seen(in_room, *sizes, len(first_patches))
-    return Evidence(first, bin_steps, by_room / (patches.room_cells * bin_steps), seen, parts)
+    sizes = (first, len(cells), bin_steps, users)
+    in_room = sighted._replace(room=patches.room[sighted.room])
+    seen = count_seen(sighted, *sizes, count)
+    parts = Parts(patches.room, patches.cells, by_patch, shown, seen, shown_parts)
+    in_rooms = count_seen(in_room, *sizes, len(patches.first))
+    return Evidence(first, bin_steps, watched, in_rooms, parts)
 
 
 def count_seen(

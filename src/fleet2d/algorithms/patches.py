@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.floorplan.kept import read_only
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
@@ -34,20 +35,20 @@ class Patches:
     @cached_property
     def first(self) -> NDArray[np.int64]:
         """The first patch of each room: int64 (rooms,)."""
-        return np.flatnonzero(np.diff(self.room, prepend=-1))
+        return read_only(np.flatnonzero(np.diff(self.room, prepend=-1)))
 
     @cached_property
     def room_cells(self) -> NDArray[np.int64]:
         """How many cells each room has, 1 at least: int64 (rooms,)."""
         cells: NDArray[np.int64] = np.maximum(np.add.reduceat(self.cells, self.first), 1)
-        return cells
+        return read_only(cells)
 
 
 def whole_rooms(plan: "FloorPlan") -> Patches:
     """Return the rooms as they are, each a patch."""
     rooms, count = plan.room_of_cell, len(plan.rooms)
     cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
-    return Patches(rooms, np.arange(count), cells)
+    return Patches(rooms, read_only(np.arange(count)), read_only(cells))
 
 
 def patches_of(plan: "FloorPlan") -> Patches:
@@ -79,8 +80,8 @@ def patches_of(plan: "FloorPlan") -> Patches:
     number = np.cumsum(kept) - 1
     of_cell = np.full(rooms.shape, NOWHERE, np.int16)
     of_cell[row, column] = number[box]
-    of_cell.setflags(write=False)  # as the rooms of a plan: kernels are compiled for that
-    return Patches(of_cell, np.repeat(np.arange(count), boxes)[kept], cells[kept])
+    room = np.repeat(np.arange(count), boxes)[kept]
+    return Patches(read_only(of_cell), read_only(room), read_only(cells[kept]))
 
 
 def _cut(

@@ -148,14 +148,13 @@ def columns_of(entry: Entry) -> dict[str, object]:
         if lengths is not None:
             ends = np.cumsum(lengths).tolist()
             text = values.tobytes()
-            strings = [
-                text[a:b].decode() for a, b in zip([0, *ends[:-1]], ends, strict=True)
-            ]
+            strings = [text[a:b].decode() for a, b in zip([0, *ends[:-1]], ends, strict=True)]
             columns[column.name] = _with_gaps(strings, valid)
         elif column.is_growing:
             words = entry.words[column.name].listed()
-            columns[column.name] = _with_gaps([words[code] for code in values.tolist()] if words
-                                              else [""] * entry.rows, valid)
+            columns[column.name] = _with_gaps(
+                [words[code] for code in values.tolist()] if words else [""] * entry.rows, valid
+            )
         elif valid is None:
             columns[column.name] = values
         else:
@@ -167,5 +166,3 @@ def _with_gaps(strings: list[str], valid: object) -> list[str | None]:
     if not isinstance(valid, np.ndarray):
         return list(strings)
     return [string if there else None for string, there in zip(strings, valid, strict=True)]
-
-

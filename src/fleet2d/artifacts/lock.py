@@ -12,7 +12,9 @@ from fleet2d.errors import RunDirectoryError
 try:
     import fcntl
 except ImportError:  # not a POSIX system: the file itself is the lock
-    fcntl = None  # type: ignore[assignment]
+    HAS_LOCKS = False
+else:
+    HAS_LOCKS = True
 
 LOCK_NAME = "run.lock"
 
@@ -53,12 +55,12 @@ class RunLock:
         os.write(self._handle, f"process {os.getpid()} on {platform.node()}\n".encode())
 
     def _open(self, directory: Path) -> int:
-        flags = os.O_RDWR | os.O_CREAT | (0 if fcntl else os.O_EXCL)
+        flags = os.O_RDWR | os.O_CREAT | (0 if HAS_LOCKS else os.O_EXCL)
         try:
             handle = os.open(self.path, flags, 0o666)
         except FileExistsError as error:
             raise self._taken(directory) from error
-        if fcntl:
+        if HAS_LOCKS:
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:

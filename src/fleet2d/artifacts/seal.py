@@ -209,9 +209,7 @@ def _file_record(path: Path) -> FileRecord:
 
 
 def _digest_of(fields: Mapping[str, str], files: Mapping[str, FileRecord]) -> str:
-    return _sha256_of(
-        [dict(fields), {name: record.model_dump() for name, record in files.items()}]
-    )
+    return _sha256_of([dict(fields), {name: record.model_dump() for name, record in files.items()}])
 
 
 def _sha256_of(content: Any) -> str:

@@ -50,6 +50,8 @@ def validate(
     for note in plan.notes:
         typer.echo(f"note: {note}")
     for actor in simulation.actors.values():
+        for note in actor.notes:
+            typer.echo(f"note: {actor.path}.{note}")
         for behavior in actor.behaviors:
             for note in getattr(behavior, "notes", ()):  # what it made of its input
                 typer.echo(f"note: {actor.path}: {note}")

@@ -44,12 +44,13 @@ def reproduce_paper(
     ] = None,
 ) -> None:
     """Measure the paper's results anew, beside its figures."""
-    from fleet2d.paper.months import Request, cores
+    from fleet2d.paper.months import Request
     from fleet2d.paper.result import make_directory
     from fleet2d.paper.results import chosen, reproduce
+    from fleet2d.studies.execution import cores
 
     names = chosen(results or [])
-    request = Request(quick, seeds, days, workers or cores(), real_map)
+    request = Request(quick, seeds, days, workers or cores(), real_map, out / "studies")
     make_directory(out)  # before hours of work
     pictures = _can_draw()
     for name in names:

@@ -12,7 +12,7 @@ import typer
 
 from fleet2d.cli.arguments import file_name, split
 from fleet2d.cli.summary import print_summary, summary_of
-from fleet2d.errors import RunDirectoryError
+from fleet2d.errors import InputError, RunDirectoryError
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
@@ -61,14 +61,34 @@ def run(
 
 def export(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-    out: Annotated[Path, typer.Argument(help="The text file to write.")],
+    out: Annotated[Path | None, typer.Argument(help="The text file of sensors to write.")] = None,
+    html: Annotated[
+        Path | None, typer.Option(help="The page to write: one file that plays anywhere.")
+    ] = None,
+    begin: Annotated[
+        str | None, typer.Option("--from", help="Of the page: where it begins, 'day 3 18:30'.")
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Of the page: where it ends.")] = None,
 ) -> None:
-    """Write what a run's sensors said as smart-home tools read it: in the layout of CASAS."""
-    from fleet2d.artifacts.casas import write_casas
+    """Write a run for others: the page as one file, or sensors in the layout of CASAS."""
     from fleet2d.artifacts.reader import open_run
 
-    count = write_casas(open_run(directory), out)
-    typer.echo(f"{count} readings in {out}")
+    if (out is None) == (html is None):
+        raise InputError("one file at a time: --html FILE for the page, or FILE for the sensors")
+    if html is None and (begin is not None or end is not None):
+        raise InputError("--from and --to are for the page: give --html FILE")
+    run = open_run(directory)
+    if out is not None:
+        from fleet2d.artifacts.casas import write_casas
+
+        typer.echo(f"{write_casas(run, out)} readings in {out}")
+    elif html is not None:
+        from fleet2d.viewer.export import export_html
+        from fleet2d.viewer.moments import steps_of
+
+        first, last = steps_of(run, begin, end)
+        export_html(run, html, first, last)
+        typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
 
 
 def _fresh_directory(name: str) -> Path:

@@ -6,7 +6,7 @@ crashes the process or worse. These functions check both.
 
 import copyreg
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,9 @@ def _reduce_array(array: NDArray[Any]) -> tuple[Any, ...]:
     if array.dtype == object:
         return object_array, (array.shape, list(array.ravel()))
     text = plain_type(array.dtype.str).str
-    order = "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
+    order: Literal["C", "F"] = (
+        "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
+    )
     content = array.tobytes(order)
     return plain_array, (text, array.shape, content, order, array.flags.writeable)
 

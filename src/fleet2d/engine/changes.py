@@ -17,7 +17,7 @@ from shapely import LineString
 
 from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.objects.door import Door
+from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.plan import Track
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
@@ -325,9 +325,10 @@ class Changes:
         else:
             kind, known = "door", self.names
         if change.target not in known:
+            hint = how_to_hang_a_door(self.home.plan, change.target) if kind == "door" else ""
             raise ScenarioError(
                 f"there is no {kind} {change.target!r}{did_you_mean(change.target, known)}"
-                f" There are: {', '.join(known) or 'none'}"
+                f" There are: {', '.join(known) or 'none'}{hint}"
             )
         if change.verb == "move":
             self._check_move(change)

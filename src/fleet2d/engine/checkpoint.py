@@ -82,7 +82,7 @@ class Checkpoint:
 
 
 class Keeper:
-    """Commits the rows of a run in a directory, and keeps its state, so that it can be gone on with.
+    """Commits the rows of a run in a directory, and keeps its state to go on from.
 
     Attributes:
         is_able: Whether the state can be written; False once a component's own could not.

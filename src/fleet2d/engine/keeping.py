@@ -41,9 +41,7 @@ def describe_start(
     manifest.start = clock.start.isoformat()
     manifest.entities = Entities(users=list(scenario.users), robots=list(scenario.robots))
     manifest.versions = versions()
-    manifest.inputs = [
-        InputRecord(**file_record(path)) for path in input_files(scenario)
-    ]
+    manifest.inputs = [InputRecord(**file_record(path)) for path in input_files(scenario)]
     manifest.notes = list(plan.notes)
     for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
         manifest.notes += [
@@ -122,7 +120,7 @@ def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
         stop()
         put_back()
         with suppress(OSError):  # not by sys.stderr, which may be at work just now
-            os.write(2, _HEARD[number])
+            os.write(2, _HEARD[signal.Signals(number)])
 
     for number in _STOPPING:
         signal.signal(number, on_signal)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.log import Log
-from fleet2d.algorithms.patches import patches_of, whole_rooms
+from fleet2d.algorithms.patches import Patches, patches_of, whole_rooms
 from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
@@ -90,7 +90,7 @@ class LayerBook:
         self._exposes = "exposure" in needed
         self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0
         self._taken_bins = 0
-        self._patches = patches_of(home.plan) if self._bin_steps else whole_rooms(home.plan)
+        self._patches = _patches(home, "patches" if self._bin_steps else "rooms")
         self.areas = self._open_areas(scenario, actors, bodies, wanted) if wanted else []
         self._lay_seen(scenario, needed)
         self.next_due(0)
@@ -114,6 +114,8 @@ class LayerBook:
 
     def next_due(self, step: int) -> int | None:
         """Return the next step after `step` before which a layer is stored; None for none."""
+        if not self._home.layers:  # asked for at every span
+            return None
         periods = [self._period(layer) for layer in self._home.layers.values()]
         return min((every * (step // every + 1) for every in periods if every), default=None)
 
@@ -188,6 +190,12 @@ class LayerBook:
         steps = np.full(len(columns["row"]), step, np.int64)
         self._store.append(spec.name, step=steps, time=self._clock.times(steps), **columns)
         self._stored_at[layer.name] = step
+
+
+def _patches(home: Home, cut_by: Literal["patches", "rooms"]) -> Patches:
+    """Return the parts of rooms that are told apart, the same for all runs in the home."""
+    of = patches_of if cut_by == "patches" else whole_rooms
+    return home.kept((cut_by,), lambda: of(home.plan))
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,10 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     """
     manifest = run.manifest
     clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
+    if not isinstance(every, timedelta):
+        raise ArtifactError(
+            f"every is {every!r}: a timedelta is wanted, as in every=timedelta(seconds=10)"
+        )
     stride, rest = divmod(micros(every), clock.step_us)
     if rest or stride < 1:
         raise ArtifactError(

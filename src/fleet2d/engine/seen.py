@@ -131,11 +131,12 @@ class SeenArea:
         """Keep the bins of the steps from `begin` to the present one."""
         first = begin // self._bin_steps - self._first_bin
         end = (self.taken - 1) // self._bin_steps + 1 - self._first_bin
-        grown = np.zeros((end, *self._bins.shape[1:]), np.int64)
-        grown[: len(self._bins)] = self._bins
-        grown[first:, 0] += self._record.binned[: end - first]
-        grown[first:, 1] = np.maximum(grown[first:, 1], self._record.most[: end - first])
-        self._bins = grown
+        under_way = self._bins[first:]  # the last bin, if steps of it were taken before
+        grown = np.stack([self._record.binned[: end - first], self._record.most[: end - first]], 1)
+        if len(under_way):
+            grown[0, 0] += under_way[0, 0]
+            grown[0, 1] = np.maximum(grown[0, 1], under_way[0, 1])
+        self._bins = np.concatenate([self._bins[:first], grown]) if first else grown
 
     def _settle(self) -> None:
         if len(self._record.last):

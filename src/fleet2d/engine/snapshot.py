@@ -16,9 +16,9 @@ from typing import Any, BinaryIO
 
 from fleet2d import __version__
 from fleet2d.artifacts.chunk import ColumnChunk
+from fleet2d.artifacts.manifest import plain
 from fleet2d.engine import arrays
 from fleet2d.engine.inputs import components_of
-from fleet2d.artifacts.manifest import plain
 from fleet2d.engine.state import State
 from fleet2d.entities.plan import Track, Walk
 from fleet2d.errors import ArtifactError
@@ -54,7 +54,7 @@ _KNOWN = {
         "slice",
         "str",
         "tuple",
-    },  # fmt: skip
+    },
     "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
     "copyreg": {"_reconstructor"},
     "datetime": {"date", "datetime", "time", "timedelta"},
@@ -211,7 +211,6 @@ class _Writer(pickle.Pickler):
             return None
         self._shared.append(obj)
         return len(self._shared) - 1
-
 
     def _check_reference(self, obj: Any) -> None:
         """Refuse now what the reader would refuse."""

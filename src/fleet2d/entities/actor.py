@@ -14,7 +14,9 @@ from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.battery import Charge
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.entity import Entity
+from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
+from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, Pose
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
@@ -77,6 +79,7 @@ class Actor:
         plan: What it follows.
         motion: The motion of the plan.
         planned_at: The step at which it was last asked.
+        notes: What of its scenario this home lacks, and what was left out for it.
         row: Its row among the bodies of the run.
     """
 
@@ -87,6 +90,7 @@ class Actor:
     clock: Clock
     seed: int
     behaviors: list[Behavior] = field(init=False)
+    notes: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
@@ -229,11 +233,12 @@ class Actor:
         Raises:
             PlacementError: It names no room, or none that can be reached.
         """
-        return self._match(names)[1]
+        return room_of_furniture(self, names) or self._match(names)[1]
 
     def _match(self, names: RoomChoice) -> tuple[str, list[Room]]:
         try:
-            return matching_rooms(names, self.home.rooms, self.reachable_rooms())
+            home = self.home
+            return matching_rooms(names, home.rooms, self.reachable_rooms(), home.objects)
         except PlacementError as error:
             raise PlacementError(f"{self.path}: {error}") from None
 
@@ -251,6 +256,9 @@ class Actor:
         where = parse_place(place)
         if is_point(where):
             return self.point(where)  # type: ignore[arg-type]
+        thing = furniture_of(self, where)
+        if thing is not None:
+            return self.place_at(thing, 0).approach
         draws = Draws(self.stream(purpose), time_us)
         name, rooms = self._match(where)  # type: ignore[arg-type]
         habit = Draws(self.stream(f"room of {name}"), 0)
@@ -334,6 +342,8 @@ class Actor:
             self.charge.follow(self.motion, now.step * self.clock.step_us)
             if self.charge.is_empty:
                 return False
+        if self._chosen is not None:  # from outside
+            return False
         with blame(self.path, now.step):
             found = self.arbiter.goes_on(now, self.plan, self._asked)
             if found is True:
@@ -436,6 +446,8 @@ class Actor:
         if place is None:
             begins = (behavior.begins_at(self.clock.start) for behavior in self.behaviors)
             place = next((begin for begin in begins if begin is not None), (ANY,))
+            if place and is_kind(self, place) and not self._has_any(place):
+                place = (ANY,)
         away = int(len(place) == 0)
         if away:
             x, y = self.way_out
@@ -450,6 +462,10 @@ class Actor:
         if heading is None:
             return Pose(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
         return Pose(x, y, round(heading / 360 * TURN) % TURN, away)
+
+    def _has_any(self, names: RoomChoice | Point) -> bool:
+        """Tell whether the largest part of its space has a room of these kinds."""
+        return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
 
     def _first_part(self, names: RoomChoice) -> int:
         """Return the largest part of its space with one of these rooms; else the largest."""

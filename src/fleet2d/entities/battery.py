@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import Settings
-from fleet2d.entities.place import Place, is_point
+from fleet2d.entities.furniture import stop_at
+from fleet2d.entities.place import Place
 from fleet2d.entities.plan import Motion, Note, Plan, Track
 from fleet2d.units import PositiveDuration, Share, micros
 
@@ -44,11 +45,7 @@ class Charge:
         self.level = battery.charge
         self._drain = 1 / micros(battery.driving), 1 / micros(battery.standing)  # per us
         self._gain = 1 / micros(battery.charging)
-        place = battery.charger
-        if is_point(place):
-            self.charger = actor.point(place)  # type: ignore[arg-type]
-        else:
-            self.charger = actor.middle(actor.rooms(place)[0])  # type: ignore[arg-type]
+        self.charger = stop_at(actor, battery.charger)
         self._told = -1.0
         self._since_us = 0
 

@@ -45,6 +45,8 @@ class Entity(Settings):
     )
     # Whether its ways are the cheapest by the costmap, if there is one, and not the shortest.
     minds_costs: ClassVar[bool] = False
+    # Whether it sits or lies on furniture that a place names, instead of stopping before it.
+    uses_furniture: ClassVar[bool] = False
     # What happens when its cameras lose somebody, and when they see somebody.
     sight_events: ClassVar[tuple[str, str]]
 
@@ -65,6 +67,7 @@ class User(Entity):
         description="what the user could see: with it, robots that come into view are events",
     )
     sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
+    uses_furniture: ClassVar[bool] = True
 
     @model_validator(mode="after")
     def _sees_what_is_there(self) -> Self:

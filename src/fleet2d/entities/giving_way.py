@@ -83,12 +83,13 @@ class Waiting:
             distance: How far to keep where there is room [m].
         """
         actor, lattice = now.actor, now.actor.home.plan.lattice
-        plan = None
         for gap in (max(distance, PASSING) + lattice.cell, PASSING):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
             begun, detour = self._looking_again(now), _Detour(actor, around)
-            plan = plan or resumed(actor, begun, self.broken, self.step, detour)
-        return self._heard(plan)
+            plan = resumed(actor, begun, self.broken, self.step, detour)
+            if plan is not None:
+                return self._heard(plan)
+        return None
 
     def leave_out(self, now: "Situation", whom: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""

@@ -1,7 +1,7 @@
 """Meander: the random walk of the paper, for users and robots."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
@@ -27,8 +27,8 @@ class Meander(Behavior):
 
     In each step the body turns by a normally distributed angle, no faster than its turn rate, and
     goes forward at its speed. Where a wall is in the way it turns instead, by any angle that its
-    turn rate allows. (The published Fleet2D keeps to small turns there, and so stands at walls for
-    most of the time.)
+    turn rate allows; with `at_walls: stay` by the same small angles as everywhere, as the published
+    Fleet2D does: so it stands at walls for most of the time.
     """
 
     turn_std_deg: AngleDeg = Field(
@@ -36,6 +36,11 @@ class Meander(Behavior):
         ge=0,
         le=36000,
         description="standard deviation of the turn in one second [deg/sqrt(s)]",
+    )
+
+    at_walls: Literal["turn", "stay"] = Field(
+        default="turn",
+        description="where a wall is in the way: turn by any angle, or sway until it isn't",
     )
 
     def start(self, actor: "Actor") -> None:
@@ -47,6 +52,7 @@ class Meander(Behavior):
             stride=min(round(actor.speed * step_s * 256), LONGEST_STRIDE),
             sway=round(std / BELL_STD * 65536),
             turn_limit=min(max(1, math.floor(actor.turn_rate * step_s)), TURN // 2),
+            stays=int(self.at_walls == "stay"),
         )
 
     def decide(self, now: Situation) -> Plan:

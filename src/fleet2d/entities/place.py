@@ -1,4 +1,4 @@
-"""Places as a scenario names them: a room, a kind of room, a list of those to try, or a point."""
+"""Places as a scenario names them: rooms, kinds of rooms, furniture, lists of those, points."""
 
 import difflib
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.units import problem
 
@@ -34,7 +35,8 @@ def parse_place(value: object) -> RoomChoice | Point:
             if abs(x) < 1e6 and abs(y) < 1e6:  # NaN fails this, too
                 return x, y
     raise problem(
-        f"found {value!r}; a place is wanted: a room or kind of room like 'kitchen',"
+        f"found {value!r}; a place is wanted: a room, kind of room or piece of furniture like"
+        " 'kitchen' or 'sofa',"
         " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in"
         " metres"
     )
@@ -50,8 +52,8 @@ Place = Annotated[
     PlainSerializer(_dump),
     WithJsonSchema(
         {
-            "description": "a room, a kind of room, a list of those to try in turn,"
-            " or [x, y] in metres; 'any' is any room",
+            "description": "a room, a kind of room, a piece or kind of furniture, a list of those"
+            " to try in turn, or [x, y] in metres; 'any' is any room",
             "x-quantity": "place",
             "anyOf": [
                 {"type": "string"},
@@ -70,9 +72,18 @@ def is_point(place: RoomChoice | Point) -> bool:
 
 
 def matching_rooms(
-    names: RoomChoice, rooms: Sequence[Room], reachable: Sequence[Room]
+    names: RoomChoice,
+    rooms: Sequence[Room],
+    reachable: Sequence[Room],
+    objects: Sequence[PlacedObject] = (),
 ) -> tuple[str, list[Room]]:
     """Return the first name that fits a reachable room, and all reachable rooms that it fits.
+
+    Args:
+        names: Rooms and kinds of rooms to try in turn.
+        rooms: All rooms of the home.
+        reachable: Those that the body gets to.
+        objects: Furniture, which a place may name as well; for the message.
 
     Raises:
         PlacementError: No name fits a room that can be reached; says which rooms there are.
@@ -91,9 +102,18 @@ def matching_rooms(
             f"{wanted} can't be reached from where it starts; it can reach: {listed}"
         )
     choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
+    choices += [thing.name for thing in objects] + sorted({thing.type for thing in objects})
     close = difflib.get_close_matches(names[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
+    if any(name in (thing.name, thing.type) for name in names for thing in objects):
+        raise PlacementError(f"{wanted} has no place to use it from that can be reached")
     raise PlacementError(
-        f"there is no room {wanted}{hint or '.'} The rooms are: {listed}."
+        f"there is no room {wanted}{hint or '.'} The rooms are: {listed}.{_furniture(objects)}"
         " A list that ends in 'any' works in every home"
     )
+
+
+def _furniture(objects: Sequence[PlacedObject]) -> str:
+    """Return the kinds of furniture that are places, for messages."""
+    kinds = sorted({thing.type for thing in objects if thing.uses})
+    return f" The furniture is: {', '.join(kinds)}." if kinds else ""

@@ -3,19 +3,19 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.furniture import seat_at
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.kernels.motion import Breakpoints, WalkRule, time_route
+from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from fleet2d.entities.place import Point, RoomChoice
 
 I64 = NDArray[np.int64]
-Row = tuple[int, int, int, int, int]  # time, x, y, heading, away
 
 
 class Pose(NamedTuple):
@@ -83,7 +82,7 @@ class Plan:
         state = actor.state
         self._actor = actor
         self.began = (step, state)
-        self._rows: list[I64 | Row] = []  # breakpoints, in blocks and one by one
+        self._legs = Legs()
         self._motion: Motion | None = None
         self.time_us = step * actor.clock.step_us
         self.x, self.y, self.heading, self.away = state
@@ -114,8 +113,12 @@ class Plan:
 
         A robot takes the cheapest path where the home has a costmap.
 
-        In a room, the place is a spot drawn from its free cells; `purpose` names the random stream.
+        In a room, the place is a spot drawn from its free cells by the stream `purpose`. Furniture
+        is used by people; robots stop where one steps up to it.
         """
+        thing = seat_at(self._actor, place)
+        if thing is not None:
+            return self.use(thing)
         return self.go_to_point(*self._actor.find(place, self.time_us, purpose))
 
     def go_to_point(self, x: int, y: int, *, route: I64 | None = None) -> Self:
@@ -138,11 +141,9 @@ class Plan:
 
     def _walk(self, route: I64) -> None:
         actor = self._actor
-        rows = time_route(route, self.time_us, self.heading, actor.speed, actor.turn_rate)
-        block = np.zeros((len(rows) - 1, 5), np.int64)
-        block[:, :4] = rows[1:]
-        self._rows.append(block)
-        self.time_us, self.x, self.y, self.heading = rows[-1].tolist()
+        self.time_us, self.x, self.y, self.heading, _ = self._legs.walk(
+            self.time_us, self.heading, route, actor.speed, actor.turn_rate
+        )
 
     def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
         """Walk to an object and use it: step to one of its places, face and sit as one does there.
@@ -226,22 +227,16 @@ class Plan:
                     f"{self._actor.path}: breakpoints must be in order of time, from"
                     f" {self.time_us} us on"
                 )
-            self._rows.append(breakpoints)
+            self._legs.add(breakpoints)
             self.time_us, self.x, self.y, self.heading, self.away = breakpoints[-1].tolist()
         return self
 
     def turn_by(self, turns: float) -> Self:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
         self._check_goes_on()
-        whole = round(turns * TURN)
-        sign = 1 if whole > 0 else -1
-        left = abs(whole)
-        while left > 0:  # a third of a turn at most, so that the shorter way is the one meant
-            part = min(left, TURN // 3)
-            left -= part
-            self.time_us += ceil(part * 1e6 / self._actor.turn_rate)
-            self.heading = (self.heading + sign * part) % TURN
-            self._mark()
+        now = self.time_us, self.x, self.y, self.heading, self.away
+        after = self._legs.turn(*now, round(turns * TURN), self._actor.turn_rate)
+        self.time_us, self.heading = after[0], after[3]
         return self
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
@@ -291,7 +286,7 @@ class Plan:
         """Walk at random, for good; must be all that the plan does."""
         self.come_home()
         self._check_goes_on()
-        if len(self._rows) > 2 or self.time_us != self.began[0] * self._actor.clock.step_us:
+        if len(self._legs) > 2 or self.time_us != self.began[0] * self._actor.clock.step_us:
             raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
         home, actor = self._actor.home, self._actor
         # Who wanders about takes a shut door for a wall.
@@ -363,9 +358,7 @@ class Plan:
     def finish(self) -> Motion:
         """Return the motion of the plan."""
         if self._motion is None:
-            rows = self._breakpoints()
-            time, x, y, heading = (np.ascontiguousarray(rows[:, i]) for i in range(4))
-            track = Breakpoints(time, x, y, heading, rows[:, 4].astype(np.uint8))
+            track = Breakpoints(*self._legs.track())
             self._motion = Track(track, self._actor.clock.step_us)
         return self._motion
 
@@ -374,7 +367,7 @@ class Plan:
         motion = self.finish()
         walk: list[Any] | None = list(motion.rule) if isinstance(motion, Walk) else None
         return {
-            "rows": self._breakpoints().tolist(),
+            "rows": self._legs.rows().tolist(),
             "walk": None if walk is None else [int(number) for number in walk],
             "notes": [list(note) for note in self.notes],
             "interrupts": sorted(self.interrupts),
@@ -390,7 +383,8 @@ class Plan:
         if data["walk"] is not None:
             key, *numbers = data["walk"]
             return plan.meander(WalkRule(np.uint64(key), *numbers))
-        plan._rows = [np.array(data["rows"], np.int64).reshape(-1, 5)]
+        plan._legs = Legs()
+        plan._legs.add(np.array(data["rows"], np.int64).reshape(-1, 5))
         plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
         plan.notes = [Note(*note) for note in data["notes"]]
         plan.interrupts, plan.asks_us = frozenset(data["interrupts"]), data["asks_us"]
@@ -406,16 +400,4 @@ class Plan:
             )
 
     def _mark(self) -> None:
-        self._rows.append((self.time_us, self.x, self.y, self.heading, self.away))
-
-    def _breakpoints(self) -> I64:
-        blocks, single = list[I64](), list[Row]()
-        for row in (*self._rows, np.empty((0, 5), np.int64)):
-            if isinstance(row, tuple):
-                single.append(row)
-                continue
-            if single:
-                blocks.append(np.array(single, np.int64))
-                single.clear()
-            blocks.append(row)
-        return np.concatenate(blocks)
+        self._legs.mark(self.time_us, self.x, self.y, self.heading, self.away)

@@ -13,8 +13,6 @@ fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
 # So that `fleet2d fit` keeps its subcommands when there is one of them only.
 fitting.callback()(lambda: None)
 
-ROWS = ("the persona", "a first-order Markov chain", "the days they were fitted on")
-
 
 @fitting.command()
 def routine(
@@ -27,10 +25,13 @@ def routine(
         Path | None, typer.Option(help="Picture of the fit to write, .png or .svg.")
     ] = None,
     seed: Annotated[int, typer.Option(help="The seed of the sampled days.")] = 0,
+    model: Annotated[
+        str, typer.Option(help="recorded: days that go from one of the log to another; laws.")
+    ] = "recorded",
     sort: Annotated[bool, typer.Option(help="Sort lines whose time runs backwards.")] = False,
 ) -> None:
     """Learn a persona from a log, and say how well its days match days held back."""
-    for line in fit_routine(log, out, layout, picture, seed, sort=sort):
+    for line in fit_routine(log, out, layout, picture, seed, sort=sort, model=model):
         typer.echo(line)
 
 
@@ -42,6 +43,7 @@ def fit_routine(
     seed: int = 0,
     *,
     sort: bool = False,
+    model: str = "recorded",
 ) -> list[str]:
     """Fit a persona to a log, write it, and return what to say about it.
 
@@ -52,6 +54,7 @@ def fit_routine(
         picture: Where to draw how it compares with the log; None: nowhere.
         seed: Of the days that are sampled to compare.
         sort: Sort lines of the log whose time runs backwards.
+        model: "recorded" or "laws", see `fit_persona`.
 
     Raises:
         LogError: The log can't be read, is of positions, or has too few days.
@@ -65,13 +68,16 @@ def fit_routine(
 
     if layout not in ("auto", "casas", "uci_adl", "homer"):
         raise LogError(f"--format is {layout!r}; a log to fit is casas, uci_adl or homer")
+    if model not in ("recorded", "laws"):
+        raise LogError(f"--model is {model!r}; recorded or laws is wanted")
     log = read_log(path, layout, sort=sort)  # type: ignore[arg-type]
     if not isinstance(log, ActivityLog):
         raise LogError(f"{path} is a log of positions; a persona is fitted to one of rooms")
     timeline = read_timeline(log)
     days = find_days(timeline)
-    validation = validate(timeline, seed=seed)
-    fitted = fit_persona(timeline, days, f"fitted to {len(days)} days of {log.path.name}")
+    validation = validate(timeline, seed=seed, model=model)  # type: ignore[arg-type]
+    about = f"fitted to {len(days)} days of {log.path.name}"
+    fitted = fit_persona(timeline, days, about, model=model)  # type: ignore[arg-type]
     try:
         out.write_text(to_yaml(fitted.document), encoding="utf-8")
     except OSError as error:
@@ -88,6 +94,8 @@ def fit_routine(
 
 def table(validation: "Validation") -> list[str]:
     """Return the distances of a validation as lines of text."""
+    from fleet2d.fit.validate import MODELS
+
     lines = [
         f"{validation.days} days, held back {validation.folds} parts in turn; how far from them are"
         " days sampled from a model fitted to the others:",
@@ -97,6 +105,9 @@ def table(validation: "Validation") -> list[str]:
         lines.append(what)
         lines += [
             f"  {name:28}{d.share:12.3f}{d.hours:10.3f}{d.ks:10.3f}{d.stay_min:12.1f}"
-            for name, d in zip(ROWS, found, strict=True)
+            for name, d in zip(MODELS, found, strict=True)
         ]
+    worse = validation.worse_than_copying()
+    verdict = "; ".join(worse) if worse else "in nothing that is compared of rooms"
+    lines.append(f"the persona is farther off than whole days drawn anew: {verdict}")
     return lines

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from fleet2d.fit.timeline import MINUTES, State, Timeline
 from fleet2d.logs.log import AWAY, LogError
 from fleet2d.logs.rooms import USUAL
 from fleet2d.routines.persona import Persona
+from fleet2d.routines.recorded import RecordedDay, write_day
 
 BLOCK = 180  # minutes of a day that share what is done to fill the time
 QUANTILES = 21  # of a law of durations, at most
@@ -22,6 +23,7 @@ KEPT, SPREAD, APART = 0.8, 20, 60  # share, min, min
 LONG = 10  # min; shorter things are no appointments
 FEWEST = 4  # days of a kind from which a template is fitted
 WORKDAYS = 5
+Model = Literal["recorded", "laws"]
 
 
 @dataclass
@@ -41,13 +43,18 @@ class Fitted:
     notes: list[str] = field(default_factory=list)
 
 
-def fit_persona(timeline: Timeline, days: Sequence[Day], about: str = "") -> Fitted:
+def fit_persona(
+    timeline: Timeline, days: Sequence[Day], about: str = "", *, model: Model = "recorded"
+) -> Fitted:
     """Fit a persona to days of a log.
 
-    What is done once on most days at about the same time becomes a task with the mean and spread
-    of its beginning, the measured law of its duration and the share of days that have it. All else
-    fills the rest: per three hours of the day a weighted choice, with the measured durations of
-    what began in them. Getting up at night becomes the fetching of sleep.
+    Of model `recorded`, its days are drawn from those of the log, of which each goes on as another
+    where both do the same at about the same time.
+
+    Of model `laws`: what is done once on most days at about the same time becomes a task with the
+    mean and spread of its beginning, the measured law of its duration and the share of days that
+    have it. All else fills the rest: per three hours of the day a weighted choice, with the
+    measured durations of what began in them. Getting up at night becomes the fetching of sleep.
 
     Raises:
         LogError: There are no days to fit.
@@ -59,12 +66,18 @@ def fit_persona(timeline: Timeline, days: Sequence[Day], about: str = "") -> Fit
     kinds, notes = _kinds_of_days(timeline, days)
     templates = {}
     for name, (on, members) in kinds.items():
-        templates[name] = {"on": on, **fitter.template(members, name if len(kinds) > 1 else "")}
-    fitter.sleep(days)
+        if model == "recorded":
+            templates[name] = {"on": on, "recorded": fitter.recorded(members)}
+        else:
+            kind = name if len(kinds) > 1 else ""
+            templates[name] = {"on": on, **fitter.template(members, kind)}
+    fitter.sleep(days, gets_up=model == "laws")
     fitter.rest(days)
     document = {
         "about": about or f"fitted to {len(days)} days of a log",
         "activities": fitter.activities,
+        "needs": {},  # the log has them already
+        "errands": {},
         "days": templates,
     }
     return Fitted(document, Persona.model_validate(document), fitter.states, notes)
@@ -198,14 +211,24 @@ class _Fitter:
         state = max(lasts, key=lambda s: (lasts[s], -s))
         return state, 2 * lasts[state] > sum(lasts.values())
 
-    def sleep(self, days: Sequence[Day]) -> None:
+    def recorded(self, days: Sequence[Day]) -> list[str]:
+        """Return days as they were lived, with a name for each state."""
+        by_state: dict[int, list[Run]] = defaultdict(list)
+        for day in days:
+            for run in (*day.awake, *day.up):
+                by_state[run.state].append(run)
+        for state, done in sorted(by_state.items()):
+            self._add(self.names[state], state, done)
+        return [write_day(_as_lived(day, self.names)) for day in days]
+
+    def sleep(self, days: Sequence[Day], *, gets_up: bool) -> None:
         """Describe sleep, and how often and for how long one is up at night."""
         state = max(sleep_states(self.timeline), key=lambda s: (self.timeline.minutes == s).sum())
         fields = self._where(state) | {"posture": "lie"}
         places = self.timeline.states
         up = [r for day in days for r in day.up if places[r.state].place not in (AWAY,)]
         own = places[state].place
-        up = [run for run in up if places[run.state].place != own]
+        up = [run for run in up if gets_up and places[run.state].place != own]
         if up:
             asleep = sum(day.next_wake - day.bed for day in days) - sum(r.length for r in up)
             rooms: dict[str, int] = defaultdict(int)
@@ -244,6 +267,22 @@ class _Fitter:
         if posture == "stand" and any(word in activity for word in SIT):
             posture = "sit"
         return {"rooms": list(rooms), "posture": posture}
+
+
+def _as_lived(day: Day, names: Sequence[str]) -> RecordedDay:
+    """Return a day of a log; what nobody knows of it is taken for going on with what one did."""
+    entries = [(run.begin, names[run.state]) for run in day.awake] or [(day.wake, "rest")]
+    entries[0] = (day.wake, entries[0][1])
+    entries.append((day.bed, "sleep"))
+    for run in day.up:
+        entries += [(run.begin, names[run.state]), (run.begin + run.length, "sleep")]
+    entries = [e for e in dict(entries).items() if e[0] < day.next_wake]
+    last = [e for e in entries if e[0] < day.next_wake - 1]
+    if last[-1][1] != "sleep":
+        last.append((day.next_wake - 1, "sleep"))
+    kept = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
+    begins, activities = zip(*kept, strict=True)
+    return RecordedDay(tuple(60 * at for at in begins), tuple(activities), 60 * day.next_wake)
 
 
 def _clusters(done: Sequence[tuple[int, Run]]) -> list[list[tuple[int, Run]]]:
@@ -307,9 +346,12 @@ def to_yaml(document: Mapping[str, Any]) -> str:
     lines = [f"about: {document['about']}", "activities:"]
     for name, fields in sorted(document["activities"].items()):
         lines.append(f"  {name}: {_flow(fields)}")
-    lines.append("days:")
+    lines += ["needs: {}", "errands: {}", "days:"]
     for name, day in document["days"].items():
         lines += [f"  {name}:", f"    on: {day['on']}"]
+        if "recorded" in day:
+            lines += ["    recorded:", *(f'      - "{text}"' for text in day["recorded"])]
+            continue
         lines += [f"    {key}: {_flow(day[key])}" for key in ("wake", "sleep")]
         for key in ("do", "leisure"):
             lines.append(f"    {key}:" + ("" if day[key] else " {}"))

@@ -12,7 +12,7 @@ from fleet2d.fit.persona import Fitted
 from fleet2d.fit.sample import sample_markov, sample_persona
 from fleet2d.fit.timeline import Timeline
 from fleet2d.logs.log import AWAY
-from fleet2d.view.floorplan import OTHER_COLOR, ROOM_COLORS
+from fleet2d.palette import OTHER_COLOR, ROOM_COLORS
 
 SAMPLED = 140
 LABELS = ("log", "persona", "Markov chain")

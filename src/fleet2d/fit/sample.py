@@ -54,6 +54,12 @@ def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, 
     return times
 
 
+def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
+    """Return whole days drawn from some, which is copying: int16 (days, 1440)."""
+    draws = Draws(stream_key(seed, "fit", "whole days"), 0)
+    return labels[[draws.below(len(labels)) for _ in range(days)]]
+
+
 def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
     """Return days of the first-order Markov chain of some days' minutes, int16 (days, 1440).
 

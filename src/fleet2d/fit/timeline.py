@@ -67,6 +67,20 @@ def read_timeline(log: ActivityLog) -> Timeline:
     Raises:
         LogError: It tells nothing for most of the time.
     """
+    pairs, seconds = read_seconds(log)
+    minutes = _by_minute(seconds, len(pairs))
+    states, minutes = _without_rare(pairs, _one_a_stay(pairs, minutes))
+    if np.count_nonzero(minutes >= 0) < minutes.size // 4:
+        raise LogError(
+            f"{log.path} tells nothing for most of its {log.days} days: there is nothing to fit"
+        )
+    first = log.first_day
+    weekdays = tuple((first.weekday() + i) % 7 for i in range(log.days)) if first else None
+    return Timeline(states, minutes, weekdays)
+
+
+def read_seconds(log: ActivityLog) -> tuple[list[State], I16]:
+    """Return the states of a log, and the index of that in each second of its days, -1 unknown."""
     kinds = {label: (_kind(label),) for label in log.rooms}
     rule = Rule(
         step_us=1_000_000,
@@ -77,17 +91,7 @@ def read_timeline(log: ActivityLog) -> Timeline:
         unknown=True,
         door_us=micros(OUT),
     )
-    visits = visits_of(log, kinds, rule).visits
-    pairs, seconds = _by_second(visits, rule.steps)
-    minutes = _by_minute(seconds, len(pairs))
-    states, minutes = _without_rare(pairs, _one_a_stay(pairs, minutes))
-    if np.count_nonzero(minutes >= 0) < minutes.size // 4:
-        raise LogError(
-            f"{log.path} tells nothing for most of its {log.days} days: there is nothing to fit"
-        )
-    first = log.first_day
-    weekdays = tuple((first.weekday() + i) % 7 for i in range(log.days)) if first else None
-    return Timeline(states, minutes, weekdays)
+    return _by_second(visits_of(log, kinds, rule).visits, rule.steps)
 
 
 def _kind(label: str) -> str:

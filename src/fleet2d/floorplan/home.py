@@ -1,8 +1,9 @@
 """The home of a run: its floor plan, what stands in it now, and the space that bodies have."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import shapely
@@ -13,6 +14,7 @@ from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.doorways import Doorway
 from fleet2d.floorplan.gates import Gates, Segment
+from fleet2d.floorplan.kept import Kept
 from fleet2d.floorplan.layers import COSTMAP, Layers
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
@@ -26,6 +28,11 @@ from fleet2d.problems import did_you_mean
 WAYS_OUT = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")
 # Arrangements of doors and furniture whose walls and spaces are kept for when they come again.
 ARRANGEMENTS_KEPT = 128
+# Homes whose walls and spaces a process keeps for its next run, and what else of each.
+HOMES_KEPT = 8
+VALUES_KEPT = 512
+
+T = TypeVar("T")
 
 NOTHING: frozenset[int] = frozenset()
 
@@ -59,7 +66,7 @@ class Home:
         self.locked: frozenset[int] = NOTHING
         self.version = 0
         self.layers = Layers(plan)
-        self._shapes = _Shapes(plan, [self.door_line(door) for door in range(len(self.doors))])
+        self._shapes = _shapes_of(plan, [self.door_line(door) for door in range(len(self.doors))])
         self._walls: tuple[int, Mesh] = (-1, plan.mesh)
         self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
         # The costs as they were when last asked for, how often they were others than before, and
@@ -72,6 +79,23 @@ class Home:
     def constants(self) -> dict[str, object]:
         """What of it never changes during a run, by name."""
         return {"plan": self.plan, "walls": self.plan.mesh, "shapes": self._shapes}
+
+    def draw(self, ax: Any = None) -> Any:
+        """Draw the floor plan; see `FloorPlan.draw`."""
+        return self.plan.draw(ax)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the floor plan in a notebook, where matplotlib is installed."""
+        return self.plan._repr_png_()
+
+    def kept(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return what `make` returns, once for all runs in this home.
+
+        Args:
+            key: All that it depends on besides the floor plan: walls, spaces, objects, numbers.
+            make: Makes it. Nobody may change it afterwards: arrays must be read-only.
+        """
+        return self._shapes.kept.get(key, make)
 
     @property
     def walls(self) -> Mesh:
@@ -219,14 +243,19 @@ class Home:
 
 
 class _Shapes:
-    """Walls and spaces of a home, by what is shut and what stands where."""
+    """Walls and spaces of a home, by what is shut and what stands where; runs share them."""
 
     def __init__(self, plan: FloorPlan, door_lines: Sequence[Segment]) -> None:
         self.plan = plan
+        self.kept = Kept(VALUES_KEPT)
         self.door_lines = door_lines
         self.walls = lru_cache(ARRANGEMENTS_KEPT)(self._find_walls)
         self._gates = lru_cache(ARRANGEMENTS_KEPT)(self._find_gates)
         self.space_of = lru_cache(ARRANGEMENTS_KEPT)(self._find_space)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return itself: branches of a run share it, too."""
+        return self
 
     def space(
         self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]
@@ -267,6 +296,15 @@ class _Shapes:
         )
         space.key = radius, shut, solid
         return space
+
+
+_SHAPES = Kept(HOMES_KEPT)
+
+
+def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
+    """Return the walls and spaces of a plan with doors, the same for all runs in it."""
+    # The plan itself, not one like it: a state that is written to a file refers to it.
+    return _SHAPES.get((id(plan), *door_lines), lambda: _Shapes(plan, door_lines))
 
 
 def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:

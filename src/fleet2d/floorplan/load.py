@@ -1,6 +1,7 @@
 """Read a floor plan from whatever names one: a file of a known format, or a home of this project.
 
-A home of this project is a bundled one, or a synthetic one by its seed, `synthetic:7`.
+A home of this project is a bundled one, or a synthetic one by its seed, `synthetic:7`. Readers of
+other formats load when a file needs them.
 """
 
 import re
@@ -9,16 +10,9 @@ from typing import Any
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.bundled import HOMES, bundled_names
-from fleet2d.floorplan.drawing import read_image
-from fleet2d.floorplan.geojson import read_geojson
-from fleet2d.floorplan.geojson_file import COLLECTION
-from fleet2d.floorplan.houseexpo import read_houseexpo
 from fleet2d.floorplan.native import FORMAT, native_plan, read_native
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.ros import read_ros
 from fleet2d.floorplan.source import YAML, read_document, read_yaml
-from fleet2d.floorplan.valetudo import read_valetudo
-from fleet2d.floorplan.valetudo_file import MAP_CLASS
 from fleet2d.problems import did_you_mean
 
 USUAL_CELL_M = 0.05
@@ -71,21 +65,32 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
     """Read a file of which its content tells the format."""
     usual = USUAL_CELL_M if cell is None else cell
     content = read_document(path)
-    kind = _format_of(content)
+    kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
     if kind == "native":
         return native_plan(content, path, usual)
+    if kind is not None:
+        return _load_foreign(kind, path, cell)
+    raise _unknown_format(path)
+
+
+def _load_foreign(kind: str, path: Path, cell: float | None) -> FloorPlan:
+    """Read a file in a format of others."""
+    usual = USUAL_CELL_M if cell is None else cell
     if kind == "houseexpo":
+        from fleet2d.floorplan.houseexpo import read_houseexpo
+
         return read_houseexpo(path, usual)
     if kind == "geojson":
+        from fleet2d.floorplan.geojson import read_geojson
+
         return read_geojson(path, usual)
     if kind == "valetudo":
+        from fleet2d.floorplan.valetudo import read_valetudo
+
         return read_valetudo(path, cell)
-    if path.suffix.lower() in YAML:
-        return read_ros(path, cell)
-    raise FloorPlanError(
-        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
-        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
-    )
+    from fleet2d.floorplan.ros import read_ros
+
+    return read_ros(path, cell)
 
 
 def is_floorplan(plan: str | Path) -> bool:
@@ -105,11 +110,39 @@ def is_floorplan(plan: str | Path) -> bool:
     return _format_of(content) is not None or "image" in content
 
 
+def format_of_file(path: Path) -> str:
+    """Return the `type` of a floor plan in a scenario that reads a file.
+
+    Raises:
+        FloorPlanError: It can't be read, or is no floor plan that Fleet2D knows.
+    """
+    content = read_document(path)
+    kind = _format_of(content)
+    if kind is None and path.suffix.lower() in YAML and "image" in content:
+        return "ros"
+    if kind is None:
+        raise _unknown_format(path)
+    return kind
+
+
+def _unknown_format(path: Path) -> FloorPlanError:
+    from fleet2d.floorplan.geojson_file import COLLECTION
+    from fleet2d.floorplan.valetudo_file import MAP_CLASS
+
+    return FloorPlanError(
+        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
+        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
+    )
+
+
 def _format_of(content: dict[str, Any]) -> str | None:
     if content.get("format") == FORMAT:
         return "native"
     if "verts" in content:
         return "houseexpo"
+    from fleet2d.floorplan.geojson_file import COLLECTION
+    from fleet2d.floorplan.valetudo_file import MAP_CLASS
+
     if content.get("type") == COLLECTION:
         return "geojson"
     return "valetudo" if content.get("__class") == MAP_CLASS else None
@@ -122,4 +155,6 @@ def _load_image(path: Path, resolution: float | None, cell: float | None) -> Flo
             f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
             " pixel as resolution"
         )
+    from fleet2d.floorplan.drawing import read_image
+
     return read_image(path, resolution, cell)

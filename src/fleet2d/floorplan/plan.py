@@ -24,6 +24,7 @@ from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, beside_rooms
 from fleet2d.floorplan.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
+from fleet2d.leaves import leaf
 from fleet2d.problems import did_you_mean
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
@@ -62,7 +63,7 @@ class FloorPlan:
     name: str
     source: str
     lattice: Lattice
-    polygons: list[Polygon]
+    polygons: Sequence[Polygon]
     mesh: Mesh
     free: NDArray[np.bool_]
     room_of_cell: NDArray[np.int16]
@@ -139,7 +140,7 @@ class FloorPlan:
             name=name,
             source=source,
             lattice=lattice,
-            polygons=polygons,
+            polygons=tuple(polygons),
             mesh=mesh,
             free=cells,
             room_of_cell=room_of_cell,
@@ -325,6 +326,22 @@ class FloorPlan:
         centre = self.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))
         near_x, near_y = self.lattice.to_metres(centre).tolist()
         return near_x, near_y
+
+    def draw(self, ax: Any = None) -> Any:
+        """Draw the plan; needs the extra `viz`.
+
+        Args:
+            ax: Matplotlib axes to draw on, in metres; None for a new figure.
+
+        Returns:
+            A matplotlib figure, or `ax`.
+        """
+        return leaf("viewer.notebook").draw_plan(self, ax)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the plan in a notebook, where matplotlib is installed."""
+        png: bytes | None = leaf("viewer.notebook").plan_png(self)
+        return png
 
     def to_native(self) -> dict[str, Any]:
         """Return the plan in Fleet2D's own file format; reading it back gives an equal plan."""

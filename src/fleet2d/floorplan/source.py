@@ -1,9 +1,10 @@
 """Where floor plans come from: the base of their components, and what every file reader needs."""
 
+import hashlib
 import json
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -15,6 +16,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.corrections import RoomCorrection, corrected
 from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furnishing import Furnishing, FurniturePiece, furnished
+from fleet2d.floorplan.kept import Kept
 from fleet2d.floorplan.layers import LayerSettings, check_layers
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.paths import InputPath
@@ -28,6 +30,10 @@ YAML = (".yaml", ".yml")
 # Lists in lists: a floor plan has 8; what is deeper is damaged, or made to break the reader.
 MAX_DEPTH = 64
 MAX_VALUES = 20_000_000
+# Homes that a process keeps, read and furnished.
+PLANS_KEPT = 8
+
+_PLANS = Kept(PLANS_KEPT)
 
 Point = tuple[float, float]
 
@@ -79,9 +85,26 @@ class FloorPlanSource(Component):
     def plan(self) -> FloorPlan:
         """Return the floor plan with all that the scenario adds to it.
 
+        A process reads a home once, as long as its files and what is configured stay the same.
+
         Raises:
             FloorPlanError: The file can't be read, is no home, or something doesn't fit into it.
         """
+        key = self._content()
+        return self._read() if key is None else _PLANS.get(key, self._read)
+
+    def _content(self) -> Hashable:
+        """Return what the plan depends on; None if that isn't known, as of a user's own source."""
+        cls = type(self)
+        if cls.__module__.partition(".")[0] != "fleet2d":
+            return None
+        try:
+            files = [(path, hashlib.sha256(path.read_bytes()).digest()) for path in self.files()]
+        except (OSError, FloorPlanError):
+            return None  # reading it says what is wrong
+        return cls, self.model_dump_json(exclude={"layers", "costmap"}), tuple(files)
+
+    def _read(self) -> FloorPlan:
         rules = Furnishing() if self.furnish is True else self.furnish or None
         plan = corrected(self.load(), self.rooms)
         return furnished(plan, self.furniture, rules)

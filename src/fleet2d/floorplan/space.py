@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.gates import Segment
+from fleet2d.floorplan.kept import read_only
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.fields import walking_distance
@@ -99,8 +100,10 @@ class Space:
         order = np.argsort(-sizes, kind="stable")
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
-        self.part_of_cell = np.where(triangles >= 0, rank[part_of_cell], -1).astype(np.int32)
-        self._part_of_triangle = rank[part].astype(np.int32)
+        self.part_of_cell = read_only(
+            np.where(triangles >= 0, rank[part_of_cell], -1).astype(np.int32)
+        )
+        self._part_of_triangle = read_only(rank[part].astype(np.int32))
         self.parts = int(np.count_nonzero(sizes))
 
     @cached_property
@@ -124,7 +127,7 @@ class Space:
         mask = self.part_of_cell == part
         if room is not None:
             mask &= self.plan.room_of_cell == room
-        return _shared(np.argwhere(mask))
+        return read_only(np.argwhere(mask))
 
     def _find_nearest(
         self, x: int, y: int, part: int | None = None, room: int | None = None
@@ -142,10 +145,10 @@ class Space:
             return None
         if strictly_inside(self.mesh, *start):
             route = self.routes.find(*start, *goal)
-            return None if route is None else _shared(route)
+            return None if route is None else read_only(route)
         inside = self._way_in(*start)
         route = None if inside is None else self.routes.find(*inside, *goal)
-        return None if route is None else _shared(np.concatenate([[start], route]))
+        return None if route is None else read_only(np.concatenate([[start], route]))
 
     def distance_field(self, places: I64) -> NDArray[np.float64]:
         """Return how far each cell is on foot from the nearest of some places.
@@ -223,7 +226,7 @@ class Space:
 
 
 def _shrunk(
-    polygons: list[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
+    polygons: Sequence[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
 ) -> list[Polygon]:
     """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side.
 
@@ -277,12 +280,6 @@ def _even_at_least(value: float) -> int:
     return 2 * int(np.ceil(value / 2))
 
 
-def _shared(array: I64) -> I64:
-    """Refuse changes: everybody who asks gets the same array."""
-    array.setflags(write=False)
-    return array
-
-
 def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:
     """Return the way straight on: int64 (2, 2), read-only as those of `Space.route` are."""
-    return _shared(np.array([begin, end], np.int64))
+    return read_only(np.array([begin, end], np.int64))

@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d._core import time_route, trace_meander, trace_track
+from fleet2d._core import Legs, time_route, trace_meander, trace_track
 
 __all__ = [
     "Breakpoints",
+    "Legs",
     "Poses",
     "WalkRule",
     "empty_poses",
@@ -52,6 +53,7 @@ class WalkRule(NamedTuple):
     stride: int  # 1/256 lattice units forward
     sway: int  # standard deviation of the turn, in 2**-16 headings per unit of random_bell
     turn_limit: int  # headings, half a turn at most
+    stays: int = 0  # 1: where a wall is in the way it only sways, and stays where it is
 
 
 def empty_poses(count: int) -> Poses:

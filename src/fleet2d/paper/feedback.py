@@ -7,12 +7,15 @@ Where the robot hangs out, it goes by the estimator of the column; elsewhere all
 the same robot.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fleet2d.paper.months import USER, Request, Tell, interval, month, run_all
+from fleet2d.paper.months import USER, Request, Tell, interval, month, run_study
 from fleet2d.paper.result import Result, Table, counted
+
+if TYPE_CHECKING:
+    from fleet2d.studies.reader import Study
 
 NAME = "feedback"
 TITLE = "The feedback loop: error of long-term presence by what the robot does"
@@ -57,19 +60,54 @@ POLICIES = {
     "opportunistic, else patrol": Policy(({"type": "opportunistic"}, PATROL)),
 }
 
-Case = tuple[str, tuple[str, ...], int]
 Errors = dict[str, dict[str, list[float]]]  # by policy and estimator, of each seed
 
 
-def watched_month(policy: str, estimators: tuple[str, ...], seed: int, days: int) -> dict[str, Any]:
-    """Return a month in which these estimators learn; the robot goes by the first, if by any."""
-    return month(
-        POLICIES[policy].robot(estimators[0]),
-        algorithms={name: _algorithm(name) for name in estimators},
-        metrics={f"error_{name}": {"type": "ltp_error", "of": name} for name in estimators},
-        seed=seed,
-        days=days,
-    )
+def study_of(seeds: int, days: int) -> dict[str, Any]:
+    """Return the study: all estimators watch a robot that heeds none.
+
+    Of robots that act on an estimator there is one for each, and the others don't run.
+    """
+    acting = [policy for policy, does in POLICIES.items() if does.acts]
+    rules = [
+        {
+            "when": {"robot": acting, "estimator": estimator},
+            "set": {
+                f"{section}.{prefix}{other}": None
+                for section, prefix in (("algorithms", ""), ("metrics", "error_"))
+                for other in ESTIMATORS
+                if other != estimator
+            },
+        }
+        for estimator in ESTIMATORS
+    ]
+    rules += [
+        {
+            "when": {"robot": policy, "estimator": estimator},
+            "set": {"robots.astro.behaviors": POLICIES[policy].robot(estimator)["behaviors"]},
+        }
+        for policy in acting
+        for estimator in ESTIMATORS
+    ]
+    robots = {
+        policy: {"robots.astro.behaviors": does.robot(NAIVE)["behaviors"]}
+        for policy, does in POLICIES.items()
+    }
+    return {
+        "base": month(
+            {"behaviors": [PATROL]},
+            algorithms={name: _algorithm(name) for name in ESTIMATORS},
+            metrics={f"error_{name}": {"type": "ltp_error", "of": name} for name in ESTIMATORS},
+            days=days,
+        ),
+        "axes": {
+            "robot": {"options": robots},
+            "estimator": {"options": {e: {} for e in ESTIMATORS}, "when": {"robot": acting}},
+        },
+        "rules": rules,
+        "replicates": seeds,
+        "keep": {"metrics": [f"error_*.{USER}.tv"]},
+    }
 
 
 def _algorithm(estimator: str) -> dict[str, Any]:
@@ -79,39 +117,21 @@ def _algorithm(estimator: str) -> dict[str, Any]:
     return {"type": "long_term_presence", "estimator": chosen}
 
 
-def errors(content: Mapping[str, Any]) -> dict[str, float]:
-    """Run a month; return the error of each estimator in it."""
-    import fleet2d
-
-    stored = fleet2d.run(content)
-    return {name: stored.metrics[f"error_{name}"][USER]["tv"] for name in content["algorithms"]}
+def errors(study: "Study") -> Errors:
+    """Return the error of each estimator under each policy, by seed."""
+    tv: Errors = {policy: {e: [] for e in ESTIMATORS} for policy in POLICIES}
+    for row in study.variants.sort("seed").to_dicts():
+        for estimator in ESTIMATORS:
+            error = row.get(f"error_{estimator}.{USER}.tv")
+            if error is not None:
+                tv[row["robot"]][estimator].append(error)
+    return tv
 
 
 def reproduce(request: Request, tell: Tell) -> Result:
     """Run all months; return the tables of errors and of differences to the naive estimator."""
     seeds, days = request.size(30, 30, 2, 3)
-    cases = cases_of(range(seeds))
-    found = run_all(errors, [watched_month(*case, days) for case in cases], request, tell)
-    return compared(cases, found, days)
-
-
-def cases_of(seeds: Iterable[int]) -> list[Case]:
-    """Return the months, seed by seed: policy, the estimators in it, and seed."""
-    return [
-        (policy, estimators, seed)
-        for seed in seeds
-        for policy, does in POLICIES.items()
-        for estimators in ([(e,) for e in ESTIMATORS] if does.acts else [ESTIMATORS])
-    ]
-
-
-def compared(cases: Sequence[Case], found: Sequence[Mapping[str, float]], days: int) -> Result:
-    """Return the tables of the errors that were found."""
-    tv: Errors = {policy: {e: [] for e in ESTIMATORS} for policy in POLICIES}
-    for (policy, _, _), row in zip(cases, found, strict=True):
-        for estimator, error in row.items():
-            tv[policy][estimator].append(error)
-    seeds = len({seed for _, _, seed in cases})
+    tv = errors(run_study(NAME, study_of(seeds, days), request, tell))
     size = f"{counted(seeds, 'paired seed')} of {counted(days, 'day')}"
     tables = (
         _table(

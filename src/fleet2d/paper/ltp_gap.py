@@ -7,13 +7,15 @@ far; mean over robots, and the band that holds 80 % of them.
 """
 
 import time
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.paper.months import USER, Request, Tell, month, run_all
+from fleet2d.paper.months import CAMERA, USER, Request, Tell, month, run_study
 from fleet2d.paper.result import Result, Table, counted
+
+if TYPE_CHECKING:
+    from fleet2d.studies.reader import Study
 
 NAME = "ltp-gap"
 TITLE = "Fig. 7 left: gap of long-term presence by days"
@@ -37,38 +39,40 @@ KINDS: tuple[dict[str, Any], ...] = (
 Gaps = dict[str, list[float]]
 
 
-def robot_month(number: int, days: int) -> dict[str, Any]:
-    """Return the month of a robot: of even numbers on patrol, of odd ones hanging out."""
-    return month(
-        KINDS[number % len(KINDS)],
+def study_of(robots: int, days: int) -> dict[str, Any]:
+    """Return the study: robots of even numbers on patrol, of odd ones hanging out.
+
+    Each has a name of its own, and so draws of its own.
+    """
+    base = month(
         algorithms={"ltp": {"type": "long_term_presence", "estimator": ESTIMATOR, "period": "4 h"}},
         metrics={"gap": {"type": "ltp_gap", "of": "ltp", "period": "1 d"}},
         days=days,
-        name=f"robot_{number}",
     )
+    options = {
+        f"robot_{number}": {
+            f"robots.robot_{number}": {"camera": CAMERA, **KINDS[number % len(KINDS)]}
+        }
+        for number in range(robots)
+    }
+    return {"base": base, "axes": {"robot": {"options": options}}, "keep": {"tables": ["gap"]}}
 
 
-def gaps(content: Mapping[str, Any]) -> Gaps:
-    """Run a month; return the gap of each room after each day."""
-    import fleet2d
-
-    table = fleet2d.run(content).tables["gap"]
-    mine = [user == USER for user in table["user"].to_pylist()]
-    found: Gaps = {}
-    for room, gap, wanted in zip(
-        table["room"].to_pylist(), table["gap"].to_pylist(), mine, strict=True
-    ):
-        if wanted:
-            found.setdefault(room, []).append(gap)
-    return found
+def gaps(study: "Study") -> list[Gaps]:
+    """Return the gap of each room after each day, by robot."""
+    rows = study.pandas("gap", columns=["variant", "step", "user", "room", "gap"])
+    rows = rows[rows["user"] == USER].sort_values(["variant", "step"], kind="stable")
+    return [
+        {room: one["gap"].tolist() for room, one in of_robot.groupby("room", sort=False)}
+        for _, of_robot in rows.groupby("variant")
+    ]
 
 
 def reproduce(request: Request, tell: Tell) -> Result:
     """Run all months; return the table of mean gaps."""
     robots, days = request.size(100, 30, 4, 3)
     began = time.perf_counter()
-    cases = [robot_month(number, days) for number in range(robots)]
-    found = run_all(gaps, cases, request, tell)
+    found = gaps(run_study(NAME, study_of(robots, days), request, tell))
     took = time.perf_counter() - began
     by_room = {room: np.array([one[room] for one in found]) for room in found[0]}
     means = {room: values.mean(axis=0) for room, values in by_room.items()}

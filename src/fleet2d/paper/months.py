@@ -1,29 +1,25 @@
-"""What the results share: the month that is lived, many months at once, and intervals."""
+"""What the results share: the month that is lived, studies of months, and intervals."""
 
-import os
-import signal
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from fleet2d.errors import ComponentError
 
-from fleet2d.kernels.presence import resampled
-from fleet2d.streams import stream_key
+if TYPE_CHECKING:
+    from fleet2d.studies.reader import Study
+    from fleet2d.studies.record import Record
+    from fleet2d.studies.results import Counts
 
-Case = TypeVar("Case")
-Found = TypeVar("Found")
 # What is told of progress: what is being done, how much of it is done, and of how much.
 Tell = Callable[[str, int, int], None]
 
 CAMERA = {"range": [0.3, 4.5], "angle_deg": 108, "detection": 0.95}
 USER = "ana"
 START = "2026-01-05"
-RESAMPLES = 2000
-LEVEL = 0.95
+SEED = 4
 
 
 @dataclass(frozen=True)
@@ -37,6 +33,7 @@ class Request:
         days: Days of a month; None: 30, or a few of a quick one.
         workers: Processes at a time; results don't depend on it.
         map: A map of a real home, for the table of speed.
+        folder: Where the studies of months are kept; None: in a temporary folder.
     """
 
     quick: bool = False
@@ -44,6 +41,7 @@ class Request:
     days: int | None = None
     workers: int = 1
     map: Path | None = None
+    folder: Path | None = None
 
     def size(self, seeds: int, days: int, quick_seeds: int, quick_days: int) -> tuple[int, int]:
         """Return how many months and of how many days, asked for or else usual.
@@ -57,96 +55,92 @@ class Request:
 
 
 def month(
-    robot: Mapping[str, Any],
+    robot: Mapping[str, Any] | None = None,
     *,
     algorithms: Mapping[str, Any],
     metrics: Mapping[str, Any],
-    seed: int = 4,
     days: int = 30,
-    name: str = "astro",
 ) -> dict[str, Any]:
-    """Return the scenario of a month in the bundled home: one person, who works outside, one robot.
-
-    The person's life goes by `seed` only; the robot's draws by its name, too. Nothing is stored
-    but what algorithms and metrics put out.
-    """
-    return {
-        "simulation": {"start": START, "duration": {"days": days}, "seed": seed},
-        "floorplan": {"type": "bundled"},
-        "users": {USER: {"type": "routine", "persona": "works_outside"}},
-        "robots": {name: {"camera": CAMERA, **robot}},
-        "algorithms": dict(algorithms),
-        "metrics": dict(metrics),
-        "artifacts": {
-            "trajectories": "off", "key_frames": False, "observations": False, "events": False,
-        },
-    }  # fmt: skip
-
-
-def run_all(
-    collect: Callable[[Case], Found],
-    cases: Sequence[Case],
-    request: Request,
-    tell: Tell,
-    what: str = "months",
-) -> list[Found]:
-    """Return what `collect` finds in each case, in their order, several processes at a time.
-
-    Processes are started afresh, not forked: what is loaded here may have threads.
+    """Return the scenario of a month in the bundled home: one person, who works outside.
 
     Args:
-        collect: A function of a module; a month of its own, that depends on nothing but the case.
-        cases: The cases.
-        request: How many processes.
-        tell: Told of progress.
-        what: The cases in words.
+        robot: What the robot astro does; None: there is no robot.
+        algorithms: What learns.
+        metrics: What measures.
+        days: How long it lasts.
     """
-    found: list[Found] = []
-    tell(what, 0, len(cases))
-
-    def take(results: Iterable[Found]) -> None:
-        for result in results:
-            found.append(result)
-            tell(what, len(found), len(cases))
-
-    workers = min(request.workers, len(cases))
-    if workers <= 1:
-        take(map(collect, cases))
-        return found
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), _leave_interrupts_to_the_parent)
-    try:
-        take(pool.map(collect, cases))
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return found
+    return {
+        "simulation": {"start": START, "duration": {"days": days}, "seed": SEED},
+        "floorplan": {"type": "bundled"},
+        "users": {USER: {"type": "routine", "persona": "works_outside"}},
+        "robots": {} if robot is None else {"astro": {"camera": CAMERA, **robot}},
+        "algorithms": dict(algorithms),
+        "metrics": dict(metrics),
+    }
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    """Let Ctrl-C, which all processes of a terminal get, end the one that has begun the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def run_study(name: str, content: Mapping[str, Any], request: Request, tell: Tell) -> "Study":
+    """Run a study of months and open it; where results are kept, it goes on where it stopped.
+
+    Args:
+        name: What the study is called.
+        content: The study, as a study file has it.
+        request: How many processes, and where to keep it.
+        tell: Told of progress.
+
+    Raises:
+        InputError: The folder holds results of other code; or polars or scipy is missing.
+    """
+    from fleet2d.studies.driver import RunOptions, check_study, run_study
+    from fleet2d.studies.local import LocalExecutor
+    from fleet2d.studies.reader import open_study
+
+    checked = check_study({"name": name, **content})
+    options = RunOptions(fail_fast=True, changed="redo", observer=_Progress(tell))
+    folder = request.folder or Path(tempfile.mkdtemp(prefix="fleet2d-paper-"))
+    counts = run_study(checked, folder / name, LocalExecutor(request.workers), options)
+    study = open_study(folder / name)
+    if counts.failed:
+        raise ComponentError(f"a month failed: {study.failures['error'][0]}")
+    return study
+
+
+class _Progress:
+    """Passes on how a study goes on."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell, self._done, self._total = tell, 0, 0
+
+    def note(self, text: str) -> None:
+        """Pass on nothing."""
+
+    def checked(self, done: int, total: int) -> None:
+        """Pass on how many homes are checked."""
+        self._tell("homes", done, total)
+
+    def began(self, counts: "Counts", workers: int) -> None:
+        """Pass on how many months there are."""
+        self._done, self._total = counts.complete, counts.total
+        self._tell("months", self._done, self._total)
+
+    def ended(self, record: "Record") -> None:
+        """Pass on one more month."""
+        self._done += 1
+        self._tell("months", self._done, self._total)
 
 
 def silent(what: str, done: int, of: int) -> None:
     """Be told of progress, and tell nobody."""
 
 
-def cores() -> int:
-    """Return how many cores this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1
-
-
 def interval(values: Iterable[float]) -> tuple[float, float, float]:
-    """Return the mean, and the ends of its 95 % bootstrap interval; the same at each call.
+    """Return the mean, and the ends of its 95 % interval over months; the same at each call.
 
     Example:
         >>> interval([0.5, 0.5, 0.5])
         (0.5, 0.5, 0.5)
     """
-    given = np.array(list(values), np.float64)
-    drawn = resampled(np.uint64(stream_key(0, "paper", "interval")), given[:, None], RESAMPLES)
-    drawn = drawn[:, 0] / len(given)
-    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return float(given.mean()), float(low), float(high)
+    from fleet2d.studies.intervals import estimate
+
+    found = estimate(list(values))
+    return found.mean, found.low, found.high

@@ -6,11 +6,14 @@ over seeds, each a month of another life with a robot on patrol, and its bootstr
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fleet2d.metrics.presence.rtp_score import ALL, GAPS
-from fleet2d.paper.months import USER, Request, Tell, interval, month, run_all
+from fleet2d.paper.months import USER, Request, Tell, interval, month, run_study
 from fleet2d.paper.result import Result, Table, counted
+
+if TYPE_CHECKING:
+    from fleet2d.studies.reader import Study
 
 NAME = "rtp-gap"
 TITLE = "Fig. 7 right: accuracy of real-time presence by last-seen gap"
@@ -27,9 +30,9 @@ Scores = dict[str, dict[str, dict[str, float]]]
 Means = dict[str, dict[str, dict[str, tuple[float, float, float]]]]
 
 
-def watched_month(seed: int, days: int) -> dict[str, Any]:
-    """Return the month of a life, with all models in it: a robot on patrol heeds none."""
-    return month(
+def study_of(seeds: int, days: int) -> dict[str, Any]:
+    """Return the study: lives by seed, all models in each: a robot on patrol heeds none."""
+    base = month(
         {"type": "patrol", "order": "random", "dwell": "5 min"},
         algorithms={
             model: {"type": "real_time_presence", "model": model, "period": "1 h"}
@@ -39,21 +42,26 @@ def watched_month(seed: int, days: int) -> dict[str, Any]:
             f"score_{model}": {"type": "rtp_score", "of": model, "period": "1 h"}
             for model in MODELS
         },
-        seed=seed,
         days=days,
     )
+    return {"base": base, "replicates": seeds, "keep": {"metrics": [f"score_*.{USER}.*"]}}
 
 
-def scores(content: Mapping[str, Any]) -> Scores:
-    """Run a month; return the scores by model and gap, the naive guess as one more model."""
-    import fleet2d
+def scores(study: "Study") -> list[Scores]:
+    """Return the scores of each life by model and gap, the naive guess as one more model."""
+    return [_scores_of(row) for row in study.variants.to_dicts()]
 
-    stored = fleet2d.run(content)
-    found: Scores = {name: stored.metrics[f"score_{name}"][USER] for name in content["algorithms"]}
-    found[NAIVE] = {
-        gap: {score: values[f"naive_{score}"] for score in SCORES}
-        for gap, values in found[MODELS[0]].items()
-    }
+
+def _scores_of(row: Mapping[str, Any]) -> Scores:
+    found: Scores = {name: {} for name in (*MODELS, NAIVE)}
+    for model in MODELS:
+        for gap in (*GAPS, ALL):
+            prefix = f"score_{model}.{USER}.{gap}"
+            if row.get(f"{prefix}.top_1") is not None:
+                found[model][gap] = {score: row[f"{prefix}.{score}"] for score in SCORES}
+    for gap in found[MODELS[0]]:
+        prefix = f"score_{MODELS[0]}.{USER}.{gap}"
+        found[NAIVE][gap] = {score: row[f"{prefix}.naive_{score}"] for score in SCORES}
     return found
 
 
@@ -75,8 +83,7 @@ def means(found: list[Scores]) -> Means:
 def reproduce(request: Request, tell: Tell) -> Result:
     """Run all months; return the tables of scores."""
     seeds, days = request.size(10, 30, 2, 3)
-    cases = [watched_month(seed, days) for seed in range(seeds)]
-    found = run_all(scores, cases, request, tell)
+    found = scores(run_study(NAME, study_of(seeds, days), request, tell))
     by_score = means(found)
     tables = tuple(
         Table(

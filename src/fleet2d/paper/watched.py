@@ -88,8 +88,7 @@ class LiveView:
     def _add_bodies(self) -> None:
         from matplotlib.patches import Circle, Polygon
 
-        from fleet2d.view.page import VIEW_COLOR
-        from fleet2d.view.traces import ROBOT_COLORS, USER_COLORS
+        from fleet2d.palette import ROBOT_COLORS, USER_COLORS, VIEW_COLOR
 
         scenario = self.simulation.scenario
         self._robots = [name for name in scenario.robots if scenario.robots[name].camera]

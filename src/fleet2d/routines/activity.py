@@ -32,8 +32,8 @@ class Takes(Settings):
     between, as likely as any other.
     """
 
-    law: Literal["lognormal", "gamma", "normal", "uniform", "fixed", "measured"] = Field(
-        default="lognormal", description="its shape"
+    law: Literal["lognormal", "gamma", "normal", "uniform", "exponential", "fixed", "measured"] = (
+        Field(default="lognormal", description="its shape")
     )
     mean: PositiveDuration = Field(
         default=timedelta(minutes=30), description="its mean, before it is cut"
@@ -88,6 +88,8 @@ class Takes(Settings):
             return laws.uniform(low or 0, high or 0)
         if self.law == "measured":
             return laws.empirical([seconds(d) for d in self.quantiles]).within(low, high)
+        if self.law == "exponential":
+            return laws.exponential(mean).within(low, high)
         make = {"lognormal": laws.lognormal, "gamma": laws.gamma, "normal": laws.normal}[self.law]
         return make(mean, std).within(low, high)
 
@@ -111,6 +113,15 @@ class Activity(Settings):
     away: bool = Field(default=False, description="out of the home")
     exclusive: bool = Field(
         default=False, description="one member of a household at a time, as a bathroom is used"
+    )
+    choose: Literal["own", "nearest", "each_time", "here"] = Field(
+        default="own",
+        description="which room, where several fit: own: one of the first kind that there is, for"
+        " good; nearest: of all kinds listed, the nearest; each_time: of all kinds listed, another"
+        " each time; here: the room that one is in",
+    )
+    interruptible: bool = Field(
+        default=True, description="whether needs interrupt it; else they wait until it is over"
     )
     takes: AnyTakes = Field(default=Takes(), description="how long it takes")
     shifts: PositiveDuration | None = Field(

@@ -6,6 +6,7 @@ for each, with what they do together as appointments, and round the times at whi
 only one can use at a time: those before them, and all whose day before isn't over yet.
 """
 
+from bisect import insort
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
 from itertools import pairwise
@@ -19,11 +20,24 @@ from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import Location, did_you_mean, problem, problem_at, shown
 from fleet2d.routines.activity import AnyTakes, find_activity
+from fleet2d.routines.busy import ANY_ROOM, Busy
 from fleet2d.routines.laws import uniform
 from fleet2d.routines.life import Life
 from fleet2d.routines.periods import AnyPeriod, without
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, holds_on
-from fleet2d.routines.planner import DAY_S, MILLION, NEVER, NO_GAP_S, SLEEP, DayPlan, Doing, Job
+from fleet2d.routines.planner import (
+    DAY_S,
+    INTERRUPTS,
+    MILLION,
+    NEVER,
+    NO_GAP_S,
+    PLANNED,
+    RESUMES,
+    SLEEP,
+    DayPlan,
+    Doing,
+    Job,
+)
 from fleet2d.routines.templates import starts
 from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
@@ -31,6 +45,7 @@ from fleet2d.streams import Draws, stream_key
 from fleet2d.units import Share
 from fleet2d.weekdays import OnDays, weekdays_of
 
+MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
 # So many days are remembered.
 REMEMBERED = 8
 # Somebody is welcomed after so long a time.
@@ -144,13 +159,17 @@ class Lives:
     A day depends on the one before: who is up all night is in the bathroom when others get up.
     """
 
-    def __init__(self, household: Household, seed: int, first: int) -> None:
+    def __init__(
+        self, household: Household, seed: int, first: int, rooms: MemberRooms | None = None
+    ) -> None:
         """Prepare to draw days.
 
         Args:
             household: Whose.
             seed: Of the run.
             first: The ordinal of the first day.
+            rooms: Where each member does what wants a room to itself: rooms by index, by activity,
+                by member; None: one unknown room for all.
         """
         self.household = household
         self._seed = seed
@@ -158,6 +177,10 @@ class Lives:
         self._lives = {
             name: Life(persona, seed, f"{self._path}.{name}")
             for name, persona in household.members.items()
+        }
+        self._rooms = {
+            name: self._in_order_of_preference(name, (rooms or {}).get(name, {}))
+            for name in household.members
         }
         self._known: dict[int, Mapping[str, Sequence[Doing]]] = {}
         self._first = self._next = first
@@ -179,19 +202,31 @@ class Lives:
             self._next += 1
         return self._known[ordinal]
 
-    def in_use(self, ordinal: int, member: str) -> list[tuple[int, int]]:
-        """Return when others use what only one can use at a time, on a date [s of its midnight]."""
+    def _in_order_of_preference(
+        self, name: str, rooms: Mapping[str, Sequence[int]]
+    ) -> dict[str, Sequence[int]]:
+        """Return a member's rooms, its own one first."""
+        own = Draws(stream_key(self._seed, f"{self._path}.{name}", "own room"), 0).below(1 << 20)
+        return {
+            activity: [*some[own % len(some) :], *some[: own % len(some)]]
+            for activity, some in rooms.items()
+            if some
+        }
+
+    def in_use(self, ordinal: int, member: str, room: int) -> list[tuple[int, int]]:
+        """Return when others use a room that only one uses at a time, on a date [s]."""
         return [
             (doing.begin + shift, doing.end + shift)
             for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
             if day >= self._first
             for name, doings in self.day(day).items()
             for doing in doings
-            if name != member and self._is_exclusive(name, doing)
+            if name != member and doing.room in (ANY_ROOM, room) and self._is_exclusive(name, doing)
         ]
 
     def _is_exclusive(self, name: str, doing: Doing) -> bool:
-        return find_activity(doing.activity, self.household.members[name].activities).exclusive
+        own = self.household.members[name].activities
+        return doing.activity in self._rooms[name] or find_activity(doing.activity, own).exclusive
 
     def _is_out(self, name: str, doing: Doing) -> bool:
         return find_activity(doing.activity, self.household.members[name].activities).away
@@ -199,22 +234,32 @@ class Lives:
     def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
         joint = self._together(ordinal)
         before = self._known.get(ordinal - 1, {})
-        busy = sorted(
-            (doing.begin - DAY_S, doing.end - DAY_S)
-            for name, doings in before.items()
-            for doing in doings
-            if doing.end > DAY_S and self._is_exclusive(name, doing)
-        )
+        busy: dict[int, list[tuple[int, int]]] = {}
+        for name, doings in before.items():
+            self._note_use(busy, name, doings, -DAY_S)
         days: dict[str, Sequence[Doing]] = {}
         for name, life in self._lives.items():
             plan = life.template(ordinal)
             for job, who in joint:
                 if not who or name in who:
                     plan = _with(plan, job)
-            days[name] = self._there(name, life.draw_day(ordinal, plan, busy), ordinal)
-            busy += [(d.begin, d.end) for d in days[name] if self._is_exclusive(name, d)]
-            busy.sort()
+            day = life.draw_day(ordinal, plan, Busy(self._rooms[name], busy))
+            days[name] = self._there(name, day, ordinal)
+            self._note_use(busy, name, days[name])
         return self._welcomed(ordinal, days) if self.household.welcome else days
+
+    def _note_use(
+        self,
+        busy: dict[int, list[tuple[int, int]]],
+        name: str,
+        doings: Sequence[Doing],
+        shift: int = 0,
+    ) -> None:
+        """Add when a member uses rooms that only one uses at a time."""
+        for doing in doings:
+            if doing.end + shift > 0 and self._is_exclusive(name, doing):
+                times = busy.setdefault(doing.room, [])
+                insort(times, (doing.begin + shift, doing.end + shift))
 
     def _there(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
         """Return a member's day, out of the home when it is on a trip or not on a visit."""
@@ -249,10 +294,13 @@ class Lives:
             over = at + WELCOME_S
             if doing.begin <= at < doing.end:
                 busy = doing.task or doing.activity == SLEEP or self._is_out(name, doing)
+                busy = busy or self._is_exclusive(name, doing)
                 if busy or doing.end - over < NO_GAP_S:
                     return day
                 before = [doing._replace(end=at)] if doing.begin < at else []
-                welcome, after = Doing(WELCOME, at, over), doing._replace(begin=over)
+                welcome = Doing(WELCOME, at, over, role=INTERRUPTS)
+                role = RESUMES if doing.begin < at and doing.role == PLANNED else doing.role
+                after = doing._replace(begin=over, role=role)
                 return [*day[:i], *before, welcome, after, *day[i + 1 :]]
         return day
 

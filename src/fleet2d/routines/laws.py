@@ -15,6 +15,7 @@ from typing import NamedTuple
 from fleet2d.streams import Draws
 
 KNOTS = 128
+DRAWN_BITS = 30
 _BITS = 24
 _ONE = 1 << _BITS
 _LN2 = 0.6931471805599453
@@ -69,6 +70,23 @@ class Law(NamedTuple):
         below, above = self.knots[i], self.knots[i + 1]
         value = below + ((above - below) * (at & (_ONE - 1)) >> _BITS)
         return min(max(value, low), high)
+
+    def quantiles(self, count: int) -> list[int]:
+        """Return evenly spaced quantiles of the law between its bounds, at (i + 1/2) / count [s].
+
+        >>> uniform(0, 80).quantiles(4)
+        [10, 30, 50, 70]
+        """
+        first = position(self.knots, self.shortest)
+        wide = position(self.knots, self.longest) - first
+        last = len(self.knots) - 1
+        values = []
+        for k in range(count):
+            i, part = divmod(first + wide * (2 * k + 1) // (2 * count), _ONE)
+            below, above = self.knots[i], self.knots[min(i + 1, last)]
+            value = below + ((above - below) * part >> _BITS)
+            values.append(min(max(value, self.shortest), self.longest))
+        return values
 
     def mean(self) -> float:
         """Return the mean of the law between its bounds [s]."""
@@ -145,6 +163,23 @@ def uniform(low_s: int, high_s: int) -> Law:
 def empirical(quantiles: Sequence[int]) -> Law:
     """Return the law of measured quantiles at evenly spaced probabilities from 0 to 1 [s]."""
     return Law(tuple(quantiles), quantiles[0], quantiles[-1])
+
+
+class Bits:
+    """Small draws, several from each draw of a stream."""
+
+    def __init__(self, draws: Draws) -> None:
+        self._draws = draws
+        self._left = self._bits = 0
+
+    def take(self, count: int) -> int:
+        """Return a number from 0 to 2**count - 1, all equally likely; `count` is 30 at most."""
+        if self._left < count:
+            self._bits, self._left = self._draws.below(1 << DRAWN_BITS), DRAWN_BITS
+        value = self._bits & ((1 << count) - 1)
+        self._bits >>= count
+        self._left -= count
+        return value
 
 
 def weighted(draws: Draws, weights: Sequence[int]) -> int:

@@ -3,8 +3,11 @@
 from collections.abc import Sequence
 from datetime import date
 
+from fleet2d.routines.busy import Busy
+from fleet2d.routines.interruptions import interrupted
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import DAY_S, DayPlan, Doing, plan_day
+from fleet2d.routines.recorded import draw_recorded, in_free_rooms, source, with_jobs
 from fleet2d.streams import Draws, stream_key
 
 # So many days are remembered, of those that were asked for.
@@ -29,6 +32,7 @@ class Life:
         self.persona = persona
         self._wake = stream_key(seed, path, "wake")
         self._day = stream_key(seed, path, "day")
+        self._needs = stream_key(seed, path, "needs")
         self._known: dict[int, Sequence[Doing]] = {}
 
     def template(self, ordinal: int) -> DayPlan:
@@ -37,7 +41,10 @@ class Life:
 
     def wake(self, ordinal: int) -> int:
         """Return when a day begins [s since its midnight]."""
-        return self.template(ordinal).wake.draw(Draws(self._wake, ordinal))
+        plan, draws = self.template(ordinal), Draws(self._wake, ordinal)
+        if plan.recorded is not None:
+            return plan.recorded.days[source(plan.recorded, draws)].begins[0]
+        return plan.wake.draw(draws)
 
     def draws(self, ordinal: int) -> Draws:
         """Return the random draws of a day."""
@@ -51,9 +58,19 @@ class Life:
             self._known[ordinal] = self.draw_day(ordinal, self.template(ordinal))
         return self._known[ordinal]
 
-    def draw_day(
-        self, ordinal: int, plan: DayPlan, busy: Sequence[tuple[int, int]] = ()
-    ) -> Sequence[Doing]:
-        """Draw a day from a template that may differ from its own."""
+    def draw_day(self, ordinal: int, plan: DayPlan, busy: Busy | None = None) -> Sequence[Doing]:
+        """Draw a day from a template that may differ from its own, and what comes up in it."""
+        day = self.planned(ordinal, plan, busy)
+        body = self.persona.body
+        if not (body.urges or body.chores):
+            return day
+        return interrupted(body, Draws(self._needs, ordinal), day, busy)
+
+    def planned(self, ordinal: int, plan: DayPlan, busy: Busy | None = None) -> Sequence[Doing]:
+        """Draw a day from a template, without what comes up in it."""
         next_wake = self.wake(ordinal + 1) + DAY_S
+        if plan.recorded is not None:
+            first = source(plan.recorded, Draws(self._wake, ordinal))
+            day = draw_recorded(plan.recorded, first, self.draws(ordinal), next_wake)
+            return in_free_rooms(with_jobs(day, plan.jobs), self.persona.body.private, busy)
         return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, busy)

@@ -18,9 +18,19 @@ from fleet2d.component import Settings
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at, shown
-from fleet2d.routines.activity import Activity, AnyTakes, find_activity
+from fleet2d.routines.activity import Activity, AnyTakes, catalogue, find_activity
+from fleet2d.routines.interruptions import Body, body_of
 from fleet2d.routines.manners import Manners
+from fleet2d.routines.needs import (
+    AnyErrand,
+    AnyNeed,
+    activities_of,
+    named_activities,
+    usual_errands,
+    usual_needs,
+)
 from fleet2d.routines.planner import REST, SLEEP, DayPlan
+from fleet2d.routines.recorded import AnyRecordedDay
 from fleet2d.routines.templates import check, day_plans
 from fleet2d.routines.written import OrWritten
 from fleet2d.scenario.document import read_document
@@ -149,10 +159,22 @@ class DayTemplate(Settings):
         default=None, description="what fills the rest; left out: as the persona's"
     )
 
+    recorded: tuple[AnyRecordedDay, ...] = Field(
+        default=(),
+        description="days as they were lived, '07:00 wash, 07:20 work, …, 23:00 sleep, 31:00 end':"
+        " new days are drawn from them, instead of from `do` and `leisure`",
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _drop_deleted(cls, data: Any) -> Any:
         return _without_nulls(data, ("do", "leisure"))
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Self:
+        if self.recorded and (self.do or self.leisure):
+            raise problem_at(("recorded",), "give recorded days, or do and leisure: not both")
+        return self
 
     @model_validator(mode="after")
     def _order_is_possible(self) -> Self:
@@ -199,22 +221,36 @@ class Persona(Settings):
     leisure: dict[str, AnyPastime] = Field(
         default_factory=lambda: {"rest": Pastime()}, description="what fills the rest of a day"
     )
+    needs: dict[str, AnyNeed] = Field(
+        default_factory=lambda: dict(usual_needs()),
+        description="what builds up and interrupts a day, by name; left out: an adult's;"
+        " null: nothing",
+    )
+    errands: dict[str, AnyErrand] = Field(
+        default_factory=lambda: dict(usual_errands()),
+        description="short ways between activities, by name; left out: an adult's; null: none",
+    )
     days: dict[str, DayTemplate] = Field(min_length=1, description="the kinds of days, by name")
 
     @model_validator(mode="before")
     @classmethod
     def _drop_deleted(cls, data: Any) -> Any:
-        return _without_nulls(data, ("leisure", "days", "activities"))
+        return _without_nulls(data, ("leisure", "days", "activities", "needs", "errands"))
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
         for name, day in self.days.items():
             for task, fields in day.do.items():
                 self._check_activity(fields.activity or task, ("days", name, "do", task))
+            for recorded in day.recorded:
+                for what in recorded.activities:
+                    self._check_activity(what, ("days", name, "recorded"))
             for pastime in day.leisure or ():
                 self._check_activity(pastime, ("days", name, "leisure", pastime))
         for pastime in self.leisure:
             self._check_activity(pastime, ("leisure", pastime))
+        for where, name in named_activities(self.needs, self.errands):
+            self._check_activity(name, where)
         covered = {weekday for day in self.days.values() for weekday in day.weekdays}
         if missing := [WEEKDAYS[i] for i in range(7) if i not in covered]:
             raise problem_at(
@@ -227,6 +263,11 @@ class Persona(Settings):
     def plans(self) -> dict[str, DayPlan]:
         """What the planner uses of each kind of day."""
         return day_plans(self)
+
+    @cached_property
+    def body(self) -> Body:
+        """What the planner uses of its needs and errands."""
+        return body_of(self.needs, self.errands, {**catalogue(), **self.activities})
 
     def _check_activity(self, name: str, where: tuple[str, ...]) -> None:
         try:
@@ -247,6 +288,8 @@ class Persona(Settings):
         """The activities that its days may hold, by name."""
         names = {job.activity for plan in self.plans.values() for job in plan.jobs}
         names |= {fill.activity for plan in self.plans.values() for fill in plan.fills}
+        names |= {n for day in self.days.values() for r in day.recorded for n in r.activities}
+        names |= activities_of(self.needs, self.errands)
         return {name: self.activity(name) for name in sorted(names | {REST, SLEEP})}
 
     def day(self, day: date) -> str:
@@ -263,6 +306,9 @@ def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
     if not isinstance(data, Mapping):
         return data
     result = dict(data)
+    for key in ("needs", "errands"):
+        if key in keys and key in result and result[key] is None:
+            result[key] = {}
     for key in keys:
         if isinstance(result.get(key), Mapping):
             result[key] = {k: v for k, v in result[key].items() if v is not None}

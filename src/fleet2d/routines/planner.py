@@ -12,10 +12,14 @@ rule: of those that needn't be done every day, the one that is done on the fewes
 """
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from fleet2d.routines.busy import ANY_ROOM, Busy
 from fleet2d.routines.laws import Law, weighted
 from fleet2d.streams import Draws
+
+if TYPE_CHECKING:
+    from fleet2d.routines.recorded import Recording
 
 DAY_S = 86_400
 ORDERS = 5  # drawn before a job is left out
@@ -23,6 +27,7 @@ ORDERS = 5  # drawn before a job is left out
 NO_GAP_S = 300
 MILLION = 1_000_000
 NEVER = 1 << 40  # a time that nobody sees [s]
+PLANNED, INTERRUPTS, RESUMES, FINISHES = 0, 1, 2, 3
 REST = "rest"
 SLEEP = "sleep"
 
@@ -35,12 +40,16 @@ class Doing(NamedTuple):
         begin: When [s since the midnight of the day's date].
         end: When it is over, and the next one begins.
         task: The task that it is in the template; empty for what fills the time, and for sleep.
+        room: The room where it is done, by index, if its household has chosen one; else -1.
+        role: Whether it was PLANNED, INTERRUPTS what was, RESUMES that afterwards, or FINISHES it.
     """
 
     activity: str
     begin: int
     end: int
     task: str = ""
+    room: int = ANY_ROOM
+    role: int = PLANNED
 
 
 class Job(NamedTuple):
@@ -87,7 +96,7 @@ class Fill(NamedTuple):
 
 
 class DayPlan(NamedTuple):
-    """A template as the planner uses it."""
+    """A template as the planner uses it; days are drawn from `recorded` ones where it has them."""
 
     name: str
     wake: Law
@@ -95,6 +104,7 @@ class DayPlan(NamedTuple):
     least_sleep: int
     jobs: tuple[Job, ...]
     fills: tuple[Fill, ...]
+    recorded: "Recording | None" = None
 
 
 class Chain(NamedTuple):
@@ -110,7 +120,7 @@ def plan_day(
     draws: Draws,
     wake: int,
     next_wake: int,
-    busy: Sequence[tuple[int, int]] = (),
+    busy: Busy | None = None,
 ) -> list[Doing]:
     """Draw a day.
 
@@ -119,7 +129,7 @@ def plan_day(
         draws: Its random draws.
         wake: When it begins [s since its midnight].
         next_wake: When the next day begins [s since its midnight].
-        busy: When what only one can use is in use by others [s], in order of time.
+        busy: When the rooms that only one can use are in use by others; None: never.
 
     Returns:
         What is done from `wake` to `next_wake`, without a gap.
@@ -130,14 +140,15 @@ def plan_day(
     for i, job in enumerate(chain.jobs):
         end_by = min(job.until, chain.latest[i + 1])
         begin = min(_next_begin(job, now, chain.wished[i]), chain.latest[i])
-        if job.exclusive and busy:
-            free = _free_time(busy, begin, chain.latest[i], job.takes.shortest, end_by)
+        room = ANY_ROOM
+        if busy is not None and (job.exclusive or job.activity in busy.rooms):
+            free = busy.free(job.activity, begin, chain.latest[i], job.takes.shortest, end_by)
             if free is None:  # others are in there all the time: the day goes on without
                 continue
-            begin, end_by = free
+            begin, end_by, room = free
         end = begin + job.takes.draw(draws, None, end_by - begin)
         _fill(plan.fills, day, draws, now, begin)
-        day.append(Doing(job.activity, begin, end, job.task))
+        day.append(Doing(job.activity, begin, end, job.task, room))
         now = end
     bed = min(max(now, chain.wished[-1]), chain.latest[-1])
     bed = now if bed - now < NO_GAP_S and now >= plan.sleep.shortest else bed
@@ -240,21 +251,6 @@ def fits(plan: DayPlan, chain: Chain, wake: int) -> bool:
             return False
         earliest += job.takes.shortest
     return max(earliest, plan.sleep.shortest) <= chain.latest[-1]
-
-
-def _free_time(
-    busy: Sequence[tuple[int, int]], begin: int, latest: int, shortest: int, end_by: int
-) -> tuple[int, int] | None:
-    """Return the first beginning from `begin` to `latest` between others' times, and its end."""
-    for first, last in busy:
-        if last <= begin:
-            continue
-        if begin > latest:
-            return None
-        if begin + shortest <= first:
-            return begin, min(end_by, first)
-        begin = last
-    return (begin, end_by) if begin <= latest else None
 
 
 def _fill(fills: Sequence[Fill], day: list[Doing], draws: Draws, begin: int, end: int) -> None:

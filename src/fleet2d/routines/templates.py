@@ -19,6 +19,7 @@ from fleet2d.routines.planner import (
     draw_chain,
     fits,
 )
+from fleet2d.routines.recorded import recording
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ def day_plans(persona: "Persona") -> dict[str, DayPlan]:
 
 
 def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
+    if day.recorded:
+        return _recorded_plan(name, day)
     wake = starts(day.wake, 0)
     assert wake is not None
     dawn = wake.shortest
@@ -69,6 +72,14 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     leisure = persona.leisure if day.leisure is None else day.leisure
     fills = tuple(_fill(persona, activity, p, dawn) for activity, p in leisure.items())
     return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, fills)
+
+
+def _recorded_plan(name: str, day: "DayTemplate") -> DayPlan:
+    """Return the plan of a template that has recorded days."""
+    wakes = [recorded.begins[0] for recorded in day.recorded]
+    beds = [recorded.begins[-1] for recorded in day.recorded]
+    wake, sleep = uniform(min(wakes), max(wakes)), uniform(min(beds), max(beds))
+    return DayPlan(name, wake, sleep, 0, (), (), recording(day.recorded))
 
 
 def _in_order(tasks: dict[str, "Task"]) -> list[str]:
@@ -151,6 +162,8 @@ def check(persona: "Persona") -> None:
     """
     plans = persona.plans
     for name, plan in plans.items():
+        if plan.recorded is not None:  # as it was lived, it is possible
+            continue
         _check_appointments(name, plan)
         next_wake = DAY_S + min(plans[n].wake.shortest for n in _days_after(persona, name))
         where = ("days", name)

@@ -2,7 +2,7 @@
 
 import os.path
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,20 @@ def compose(
     document = _load("bundled:base" if source is None else source, Path(), ())
     changes = [_read_override(text) for text in overrides]
     for keys, value in (settings or {}).items():
-        changes.append(_at(keys, value, f"argument {keys[-1]}={value!r}"))
+        changes.append(assignment(keys, value, f"argument {keys[-1]}={value!r}"))
+    return changed(document, changes)
+
+
+def changed(document: Document, changes: Sequence[Document]) -> Document:
+    """Return a composed scenario with changes applied as one; the document is not modified.
+
+    Args:
+        document: A scenario as `compose` returns it.
+        changes: Changes, each on the one before; `assignment` makes one.
+
+    Raises:
+        ScenarioError: A change deletes or reaches into an entry that isn't there.
+    """
     change = Document()
     for single in changes:
         change = merge(change, single)
@@ -139,10 +152,15 @@ def _read_override(text: str) -> Document:
     )
     if not value.strip():
         raise ScenarioError(f"{shown}: no value; write {key}=null to delete an entry")
-    return _at(keys, parsed, shown)
+    return assignment(keys, parsed, shown)
 
 
-def _at(keys: Keys, value: Any, place: str) -> Document:
+def assignment(keys: Keys, value: Any, place: str) -> Document:
+    """Return the change that sets one key; `place` is where messages say it is written.
+
+    >>> assignment(("simulation", "seed"), 4, "home.yaml:3").data
+    {'simulation': {'seed': 4}}
+    """
     for key in reversed(keys):
         value = {key: value}
     return Document(value, {keys[:n]: place for n in range(1, len(keys) + 1)})
@@ -253,10 +271,10 @@ def _refuse_unknown_deletions(below: Document, above: Document) -> None:
                 )
 
 
-def _refuse_unknown_entries(below: Document, change: Document, changes: list[Document]) -> None:
+def _refuse_unknown_entries(below: Document, change: Document, changes: Sequence[Document]) -> None:
     """Refuse to reach inside an entry that isn't there, unless the change says what it is."""
     reached = {keys[:2]: single for single in changes for keys in single.places if len(keys) > 2}
-    whole = {max(single.places, key=len) for single in changes}
+    whole = {max(single.places, key=len) for single in changes if single.places}
     for (section, name), single in reached.items():
         if section not in ENTRIES or (section, name) in whole or (section,) in whole:
             continue

@@ -248,6 +248,19 @@ def load_scenario(
     elif isinstance(source, str | Path) and not str(source).startswith("bundled:"):
         folder = Path(source).absolute().parent
     document = compose(source, overrides, {_key(name): v for name, v in settings.items()})
+    return scenario_of(document, folder)
+
+
+def scenario_of(document: Document, folder: Path) -> Scenario:
+    """Check a composed scenario as a whole.
+
+    Args:
+        document: What `compose` returns.
+        folder: The folder of the file that it was read from.
+
+    Raises:
+        ScenarioError: as `load_scenario`.
+    """
     try:
         scenario = Scenario.model_validate(document.data)
     except ValidationError as error:

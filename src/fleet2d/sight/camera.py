@@ -1,6 +1,5 @@
 """The camera of a robot: what it could see (its field of view), and how surely it notices."""
 
-import math
 from collections.abc import Sequence
 from datetime import timedelta
 from typing import NamedTuple, Self
@@ -67,6 +66,10 @@ class Lens(NamedTuple):
         return [(0, 0), *((int(x), int(y)) for x, y in circle)]
 
 
+# A user not noticed for this long is lost, where a camera doesn't say otherwise.
+USUAL_PATIENCE = timedelta(seconds=5)
+
+
 class Camera(Settings):
     """A camera on the body. Left as it is, it sits at the centre and looks where the body heads.
 
@@ -90,10 +93,12 @@ class Camera(Settings):
     detection: Share = Field(
         default=1.0, description="probability that a user in view is noticed, in each look"
     )
-    lost_after: Duration = Field(
-        default=timedelta(seconds=5),
-        description="a user not noticed for this long counts as lost (event user_lost); with"
-        " several cameras, the longest counts",
+    lost_after: Duration | None = Field(
+        default=None,
+        description="a user not noticed for this long counts as lost (event user_lost): a multiple"
+        " of the step; left out: 5 s, or the next multiple above; with several cameras, the longest"
+        " counts",
+        examples=["5 s"],
     )
     offset: tuple[Length, Length] = Field(
         default=(0.0, 0.0),
@@ -136,11 +141,12 @@ class Camera(Settings):
 
     @model_validator(mode="after")
     def _looks_before_it_forgets(self) -> Self:
-        if self.period is not None and self.period > self.lost_after:
+        patience = USUAL_PATIENCE if self.lost_after is None else self.lost_after
+        if self.period is not None and self.period > patience:
             raise problem_at(
                 ("period",),
                 f"{format_duration(self.period)} is longer than lost_after,"
-                f" {format_duration(self.lost_after)}: each user would be lost between two looks",
+                f" {format_duration(patience)}: each user would be lost between two looks",
             )
         return self
 
@@ -148,8 +154,15 @@ class Camera(Settings):
         """Return the camera in the integers of the sight kernel.
 
         Raises:
-            ValueError: The period is no multiple of the step.
+            ValueError: The period, or a given `lost_after`, is no multiple of the step.
         """
+        lost_us = micros(USUAL_PATIENCE if self.lost_after is None else self.lost_after)
+        if lost_us % step_us and self.lost_after is not None:
+            raise ValueError(
+                f"lost_after is {format_duration(self.lost_after)}, which is no multiple of"
+                f" simulation.step ({step_us / 1e6:g} s): it would act as"
+                f" {-(-lost_us // step_us) * step_us / 1e6:g} s; choose a multiple"
+            )
         near, far = (round(distance * units_per_m) for distance in self.range)
         period, rest = divmod(step_us if self.period is None else micros(self.period), step_us)
         if rest:
@@ -163,7 +176,7 @@ class Camera(Settings):
             # At 0, both borders are one line, and what lies right behind is on it, too.
             half_angle=max(1, round(self.angle_deg / 360 * TURN)),
             chance=round(self.detection * 2**53),
-            patience=math.ceil(micros(self.lost_after) / step_us),
+            patience=-(-lost_us // step_us),
             forward=round(self.offset[0] * units_per_m),
             left=round(self.offset[1] * units_per_m),
             heading=headings([self.heading_deg])[0],

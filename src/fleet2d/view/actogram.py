@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.view.floorplan import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
+from fleet2d.palette import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
 from fleet2d.view.page import HATCH_COLOR, QUIET_COLOR
 from fleet2d.view.traces import Trace
 

@@ -15,9 +15,9 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import TEXT_COLOR
 from fleet2d.view.floorplan import (
     DPI,
-    TEXT_COLOR,
     check_picture,
     drawing_style,
     figure_size,

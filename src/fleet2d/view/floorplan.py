@@ -2,8 +2,10 @@
 
 import io
 import re
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import matplotlib as mpl
@@ -24,39 +26,19 @@ from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.floorplan.rooms import NO_ROOM
 from fleet2d.floorplan.standing import grown_cells
 from fleet2d.kernels.fields import squared_distance
+from fleet2d.palette import (
+    ACCENT_COLOR,
+    BORDER_COLOR,
+    OTHER_COLOR,
+    ROOM_COLORS,
+    TEXT_COLOR,
+    WALL_COLOR,
+)
 from fleet2d.view.objects import draw_objects, label_objects
 
-ROOM_COLORS = {
-    "living_room": "#f6e3c5",
-    "dining_room": "#f7edb8",
-    "kitchen": "#f9d5bb",
-    "bedroom": "#c9dcf2",
-    "child_room": "#d3e8f7",
-    "guest_room": "#bfd0ea",
-    "bathroom": "#bfe5e3",
-    "toilet": "#d2efec",
-    "office": "#ddd2ee",
-    "gym": "#f2cfd8",
-    "laundry": "#d3dcd6",
-    "storage": "#dcd8cc",
-    "wardrobe": "#e3d6d9",
-    "boiler_room": "#d6d2cc",
-    "garage": "#d4d6da",
-    "entryway": "#ece3d8",
-    "lobby": "#ece3d8",
-    "hallway": "#f1ece4",
-    "hall": "#f1ece4",
-    "balcony": "#d3e8c8",
-    "loggia": "#d3e8c8",
-    "terrace": "#cfe6c0",
-    "room": "#e9e2c9",
-    "unknown": "#f4f4f2",
-}
-OTHER_COLOR = "#e6dcea"
-WALL_COLOR = "#3b4048"
-BORDER_COLOR = "#9a9da3"
-TEXT_COLOR = "#2d3138"
-ACCENT_COLOR = "#c8452f"
+# Kinds of pictures, and what each would say of when or by what it was made.
+STAMPS = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
+ENDINGS = tuple(STAMPS)
 
 WALL_M = 0.15  # drawn round the outline; a file says nothing of how thick the outer walls are
 LONG_SIDE_IN = 10.0
@@ -93,9 +75,9 @@ def draw_floorplan(plan: FloorPlan, path: Path) -> None:
 def check_picture(path: Path) -> None:
     """Raise InputError unless a file's name ends as that of a picture that we write."""
     ending = path.suffix.lower()
-    if ending not in (".png", ".svg"):
+    if ending not in ENDINGS:
         raise InputError(
-            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
+            f"{path}: a picture is written as .png, .svg or .pdf, not as {ending or 'no ending'!r}"
         )
 
 
@@ -113,7 +95,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     Raises:
         InputError: The file can't be written.
     """
-    unstamped = {"Date": None} if path.suffix.lower() == ".svg" else {"Software": None}
+    unstamped = {STAMPS[path.suffix.lower()]: None}
     picture = io.BytesIO()
     figure.savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
     unfinished = path.with_name(f".{path.name}.unfinished")
@@ -251,7 +233,7 @@ def _spread(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
     return grown[1:-1, 1:-1]
 
 
-def _outline(plan: FloorPlan, polygons: list[shapely.Polygon]) -> Outline:
+def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
     """Return polygons [lattice] as one path [m]."""
     parts = []
     for polygon in polygons:

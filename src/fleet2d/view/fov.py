@@ -15,20 +15,20 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.seen import Reach
+from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.region import VisibleRegion
 from fleet2d.view.floorplan import (
     DPI,
-    TEXT_COLOR,
+    check_picture,
     drawing_style,
     figure_size,
     floorplan_axes,
     save_figure,
 )
-from fleet2d.view.layers import check_ending, layer_on_axes
+from fleet2d.view.layers import layer_on_axes
 from fleet2d.view.life import field_of_view
-from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 
 ROBOT_COLOR = "#22344f"
 RADIUS_M = 0.17
@@ -95,7 +95,7 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
         PlacementError: The pose is in a wall or outside the home.
         InputError: The name ends otherwise, or the file can't be written.
     """
-    check_ending(path)
+    check_picture(path)
     VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)  # or says what is wrong with the place
     with drawing_style():
         width, height = figure_size(plan)
@@ -110,7 +110,7 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
 
 def draw_fov_alone(plan: FloorPlan, pose: Pose, path: Path) -> None:
     """Draw a robot in its home, and its field of view; arguments as for `draw_fov`."""
-    check_ending(path)
+    check_picture(path)
     VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)
     with drawing_style():
         figure = Figure(figsize=figure_size(plan), dpi=DPI)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.layers import PREFIX, layer_steps, read_layer
 from fleet2d.artifacts.reader import Run
-from fleet2d.errors import InputError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import TEXT_COLOR
 from fleet2d.view.floorplan import (
     DPI,
-    TEXT_COLOR,
+    check_picture,
     drawing_style,
     figure_size,
     floorplan_axes,
@@ -45,7 +45,7 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
         ArtifactError: The run stored no such layer, or not after that step.
         InputError: The name ends otherwise, or the file can't be written.
     """
-    check_ending(path)
+    check_picture(path)
     values = read_layer(run, name, step)
     step = layer_steps(run, name)[-1] if step is None else step
     field = run.tables[f"{PREFIX}{name}"].schema.field("value")
@@ -97,16 +97,3 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
     extent = (left, left + width, bottom, bottom + height)
     axes.imshow(image, extent=extent, origin="lower", interpolation="nearest", zorder=2.1)
     return shown
-
-
-def check_ending(path: Path) -> None:
-    """Refuse a picture of a kind that we don't write.
-
-    Raises:
-        InputError: The name ends with neither `.png` nor `.svg`.
-    """
-    ending = path.suffix.lower()
-    if ending not in (".png", ".svg"):
-        raise InputError(
-            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
-        )

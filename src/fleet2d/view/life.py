@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
 from fleet2d.sight.region import VisibleRegion, Walled
-from fleet2d.view.page import VIEW_COLOR, VIEW_EDGE
 from fleet2d.view.traces import Trace
 
 BLUR_M = 0.14  # a body is a soft spot of about its own size
@@ -65,7 +65,7 @@ def draw_presence(plan: FloorPlan, trace: Trace, axes: Axes) -> None:
     shape = (lattice.rows, lattice.columns)
     flat = np.clip(row, 0, shape[0] - 1) * shape[1] + np.clip(column, 0, shape[1] - 1)
     time = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape).astype(np.float64)
-    time = _blurred(time, BLUR_M / lattice.cell) * plan.free
+    time = blurred(time, BLUR_M / lattice.cell) * plan.free
     image = np.empty((*shape, 4))
     image[..., :3] = to_rgb(trace.color)
     image[..., 3] = opacity(time, plan.free)
@@ -231,7 +231,7 @@ def field_of_view(
     return shapely.MultiPolygon(polygons)
 
 
-def _blurred(image: F64, sigma: float) -> F64:
+def blurred(image: F64, sigma: float) -> F64:
     """Return an image blurred by a bell curve of standard deviation `sigma` [cells]."""
     reach = max(1, round(REACH * sigma))
     at = np.arange(-reach, reach + 1)

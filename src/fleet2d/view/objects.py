@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import DOOR_COLOR
 
 EDGE_COLOR = "#6d737c"
 FILL_COLORS = MappingProxyType({"nothing": "none", "path": "#fbfaf7", "sight": "#c9c6bf"})
 LABEL_COLOR = "#6d737c"
-DOOR_COLOR = "#8a5a2b"
 NO_GO_COLOR = "#c8452f"
 
 LABEL_PT = (2.6, 5.0)

@@ -11,14 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle, Wedge
 from matplotlib.text import Text
 
-from fleet2d.view.floorplan import TEXT_COLOR
+from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 
 CHIP_IN = 0.15
 LINE_IN = 0.215
 BETWEEN_IN = 0.17
 QUIET_COLOR = "#6b7078"
-VIEW_COLOR = "#ffd23f"
-VIEW_EDGE = "#b98900"
 HATCH_COLOR = "#cfd2d6"
 
 

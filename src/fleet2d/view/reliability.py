@@ -19,8 +19,7 @@ from fleet2d.metrics.presence.scores import (
     reliability_curve,
     top_k,
 )
-from fleet2d.view.floorplan import DPI, drawing_style, save_figure
-from fleet2d.view.layers import check_ending
+from fleet2d.view.floorplan import DPI, check_picture, drawing_style, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,7 +95,7 @@ def draw_reliability(run: Run, algorithm: str, path: Path) -> None:
         ArtifactError: The run doesn't hold what is needed.
         InputError: The name ends otherwise, or the file can't be written.
     """
-    check_ending(path)
+    check_picture(path)
     belief, truth = forecasts_of(run, algorithm)
     places = np.arange(belief.shape[1])
     sure, right = belief.max(axis=1), top_k(belief, truth, 1)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.reader import Run
-from fleet2d.errors import InputError
+from fleet2d.palette import ACCENT_COLOR
 from fleet2d.view.actogram import (
     MARKS,
     draw_actogram,
@@ -20,8 +20,8 @@ from fleet2d.view.actogram import (
     rooms_by_day,
 )
 from fleet2d.view.floorplan import (
-    ACCENT_COLOR,
     DPI,
+    check_picture,
     drawing_style,
     floorplan_axes,
     save_figure,
@@ -97,13 +97,15 @@ def draw_run(run: Run, path: Path) -> None:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     draw_run(run, Path(folder) / "picture.png")
     """
-    ending = path.suffix.lower()
-    if ending not in (".png", ".svg"):
-        raise InputError(
-            f"{path}: a picture is written as .png or .svg, not as {ending or 'no ending'!r}"
-        )
+    check_picture(path)
     with drawing_style():
         save_figure(_Picture(run).figure, path)
+
+
+def run_figure(run: Run) -> Figure:
+    """Return the picture of a run as a figure; see `draw_run`."""
+    with drawing_style():
+        return _Picture(run).figure
 
 
 class _Picture:

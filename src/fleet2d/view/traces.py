@@ -13,9 +13,7 @@ from fleet2d.artifacts.reader import Run
 from fleet2d.engine.rebuild import rebuild_path
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
-
-USER_COLORS = ("#b5305c", "#2c6fb0", "#3f8a4f", "#8153b5", "#c26a12", "#1f8a8c")
-ROBOT_COLORS = ("#22344f", "#5a4634", "#3d3a63", "#2f5148")
+from fleet2d.palette import body_color
 
 SAMPLES = 40_000  # a short run is sampled more often than once a minute, up to about so many times
 SAMPLE_US = 60_000_000
@@ -84,8 +82,7 @@ def _color(run: Run, name: str, number: int, *, robot: bool) -> str:
     color = bucket.get(name, {}).get("color")
     if isinstance(color, str) and is_color_like(color):
         return color
-    palette = ROBOT_COLORS if robot else USER_COLORS
-    return palette[number % len(palette)]
+    return body_color(number, robot=robot)
 
 
 def _rebuilt(run: Run, plan: FloorPlan, name: str, color: str, *, robot: bool) -> Trace:

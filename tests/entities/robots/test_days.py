@@ -88,7 +88,7 @@ def product() -> dict[str, Any]:
     agenda = [{"at": "07:20", "open": False}, {"at": "08:05", "open": True}]
     content = home_with(
         [
-            {"type": "dock", "threshold": "15 %", "until": "60 %"},
+            {"type": "dock", "threshold": "20 %", "until": "40 %"},
             {"type": "scheduled", "visits": [{"at": "07:45", "place": "kitchen", "task": "sweep"}]},
             {"type": "find", "user": "ben", "every": "25 min", "source": "rtp"},
             {"type": "opportunistic", "users": ["ana"], "cooldown": "20 min", "again": "20 min"},
@@ -102,7 +102,12 @@ def product() -> dict[str, Any]:
         {"type": "routine", "persona": "works_from_home"},
         astro={
             "gives_way": {},
-            "battery": {"driving": "1 h", "standing": "4 h", "charging": "1 h", "charger": [1, 3]},
+            "battery": {
+                "driving": "1 h",
+                "standing": "4 h",
+                "charging": "4 min",
+                "charger": [1, 3],
+            },
         },
         algorithms={"ltp": {"type": "ltp", "period": "30 min"}, "rtp": {"type": "rtp"}},
         objects={

@@ -14,6 +14,7 @@ from tests.scenes import run, scenario, table
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.routines import survey
+from fleet2d.routines.interruptions import uninterrupted
 from fleet2d.streams import Draws, stream_key
 
 HOUR = 3600
@@ -35,7 +36,7 @@ def test_shares_of_a_thousand_people_follow_the_survey_hour_by_hour() -> None:
     for actor in simulation.actors.values():
         for ordinal in range(MONDAY, MONDAY + 7):
             kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
-            day = iter(actor.behaviors[0].day(ordinal))
+            day = iter(uninterrupted(actor.behaviors[0].day(ordinal)))
             doing = next(day)
             for hour in range(4, 28):
                 while doing.end <= hour * HOUR + HOUR // 2:
@@ -94,7 +95,7 @@ def test_groups_are_drawn_by_their_shares() -> None:
 def test_people_of_the_survey_live_in_the_home() -> None:
     stored = run(scenario("3 d", users=users(3, group="at_home")))
     told = set(table(stored, "events", event="activity")["detail"])
-    assert {"sleep", "cook", "tv"} <= told
+    assert {"sleep", "cook", "tv", "toilet", "wash_hands", "drink"} <= told
     assert timedelta(days=3).total_seconds() == stored.manifest["steps"]
 
 

@@ -147,7 +147,8 @@ def test_a_run_can_branch_in_the_middle_of_a_reaction() -> None:
 
 
 def test_after_a_reaction_one_goes_on_with_what_one_did() -> None:
-    activity = {"days": {"any_day": {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}}}
+    day = {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}
+    activity = {"needs": {}, "errands": {}, "days": {"any_day": day}}
     content = meets(["living_room", 200], turns=1, looks="20 s", notices=6)
     routine = {"type": "routine", "persona": activity}
     content["users"]["ana"]["behaviors"].append(routine)
@@ -159,7 +160,8 @@ def test_after_a_reaction_one_goes_on_with_what_one_did() -> None:
 
 
 def test_who_gives_up_what_it_did_rests() -> None:
-    activity = {"days": {"any_day": {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}}}
+    day = {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}
+    activity = {"needs": {}, "errands": {}, "days": {"any_day": day}}
     content = meets([30, "call", 200], comes=1, stops=1, comes_for="20 s")
     content["users"]["ana"]["behaviors"].append({"type": "routine", "persona": activity})
     content["users"]["ana"]["start"] = "living_room"

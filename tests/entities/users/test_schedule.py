@@ -304,10 +304,17 @@ def test_days_that_are_none_are_refused(on: Any) -> None:
         fleet2d.load_scenario(one(agenda({"at": "08:00", "place": "kitchen"}, on=on)))
 
 
-def test_an_unreachable_rest_is_refused_before_the_run() -> None:
+def test_an_unreachable_kind_of_rest_is_left_out_with_a_note() -> None:
     item = {"at": "08:00", "place": "kitchen", "dwell": "1 h"}
-    with pytest.raises(InputError, match="storage") as caught:
-        fleet2d.Simulation(one(agenda(item), rest="storage"))
+    actor = fleet2d.Simulation(one(agenda(item), rest="storage")).actors["ana"]
+    assert ["schedule.days: left out, for this home has none to go to: storage"] == actor.notes
+    assert "kitchen_0" in {room.name for room in actor.reachable_rooms()}
+
+
+def test_an_unreachable_room_is_refused_before_the_run() -> None:
+    item = {"at": "08:00", "place": "storage_0", "dwell": "1 h"}
+    with pytest.raises(InputError, match=r"schedule\.days.*storage_0") as caught:
+        fleet2d.Simulation(one(agenda(item), start="kitchen"))
     assert "users.ana" in str(caught.value)
 
 

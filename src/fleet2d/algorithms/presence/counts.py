@@ -85,8 +85,12 @@ def _part(parts: Parts | None, here: slice) -> Parts | None:
     """Return some bins of the evidence by patches."""
     if parts is None:
         return None
+    shown_parts = None if parts.shown_parts is None else parts.shown_parts[here]
     return parts._replace(
-        watched=parts.watched[here], shown=parts.shown[here], seen=parts.seen[here]
+        watched=parts.watched[here],
+        shown=parts.shown[here],
+        seen=parts.seen[here],
+        shown_parts=shown_parts,
     )
 
 
@@ -106,6 +110,7 @@ def joined(parts: Sequence[Bins]) -> Bins:
             watched=np.concatenate([part.parts.watched for part in parts]),
             shown=np.concatenate([part.parts.shown for part in parts]),
             seen=np.concatenate([part.parts.seen for part in parts]),
+            shown_parts=None,
         ),
     )
 
@@ -159,8 +164,16 @@ class DayCounts:
             return
         slot = day * 24 + minute // 60
         first = np.concatenate([[0], np.flatnonzero(np.diff(slot)) + 1])
-        sums = np.add.reduceat(values, first, axis=0)
-        for at, part in zip(slot[first].tolist(), sums, strict=True):
+        self.add_hours(slot[first], np.add.reduceat(values, first, axis=0))
+
+    def add_hours(self, hours: I64, sums: F64) -> None:
+        """Add the sums of some hours, which come in order of time.
+
+        Args:
+            hours: int64 (hours,), as ordinal * 24 + hour of the day.
+            sums: float64 (hours, *shape).
+        """
+        for at, part in zip(hours.tolist(), sums, strict=True):
             if at // 24 != self.today:
                 self.begin_day(at // 24)
             self.hours[at % 24] += part

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -65,7 +66,15 @@ class Estimator(Component):
 
     def observe(self, bins: Bins) -> None:
         """Take in evidence that follows on that before."""
-        self.counts.add(bins.day, bins.minute, self.sums(bins))
+        sums = np.asarray(self.sums(bins))
+        wanted = (len(bins.day), self.users + 1, self.width(self.rooms))
+        if sums.shape != wanted:
+            raise ComponentError(
+                f"{type(self).__name__}.sums returned an array of shape {sums.shape}, but"
+                f" {wanted} is wanted: bins, users + 1, and what width({self.rooms}) says"
+                f"{_written_at(type(self))}"
+            )
+        self.counts.add(bins.day, bins.minute, sums)
 
     def presence(self, users: Sequence[str], time: datetime) -> Presence:
         """Return what all evidence so far says, over all time."""
@@ -135,6 +144,12 @@ class Estimator(Component):
                 " home, other users or another estimator"
             )
         self.counts.recall(learned["counts"], today)
+
+
+def _written_at(cls: type[Estimator]) -> str:
+    """Return where a class's `sums` is written, for messages."""
+    code = cls.sums.__code__
+    return f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in sums)"
 
 
 def normalized(weights: F64) -> F64:

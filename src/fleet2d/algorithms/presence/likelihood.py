@@ -1,20 +1,25 @@
 """Full likelihood: stays as a hidden chain, of which empty views are evidence, too."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
-from fleet2d.algorithms.presence.counts import Bins, joined
+from fleet2d.algorithms.presence.anyone import unknown_seen
+from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import Habits, Layout, Person, stretches_of, watched_patches
+from fleet2d.algorithms.presence.person import Habits, Layout, Person, stretches, watched_patches
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
+from fleet2d.kernels.evidence import sum_places
+from fleet2d.kernels.stays import Stretches
 from fleet2d.units import Share
+
+I64 = NDArray[np.int64]
 
 # Earlier days that are gone through again when a day is over, in turn; and how many are kept.
 REVISITS = 2
@@ -81,8 +86,8 @@ class Likelihood(Estimator):
         super().begin(rooms, users, half_life)
         self.people: list[Person] = []
         self.learned: Mapping[str, Any] = {}
-        self.parts: list[Bins] = []  # of the day under way
-        self.days: list[Bins] = []  # those that are gone through again, without their views
+        self.parts: list[Day] = []  # of the day under way
+        self.days: list[Day] = []  # those that are gone through again, without their views
         self.hours: list[F64] = []  # their sums by hour
         self.turn = 0  # of the day gone through last
 
@@ -132,24 +137,24 @@ class Likelihood(Estimator):
     def observe(self, bins: Bins) -> None:
         """Take in evidence that follows on that before."""
         for day in by_day(bins):
-            self.take_in(day)
-            watched = watched_patches(day)
+            part = self.take_in(day)
             places = [
-                person.follow(stretches_of(day, user, self.together, watched))
+                person.follow(part.stretches(user, self.together))
                 for user, person in enumerate(self.people)
             ]
-            self.counts.add(day.day, day.minute, self._values(places, day))
+            self.counts.add_hours(*self._by_hour(places, part))
 
-    def take_in(self, bins: Bins) -> None:
+    def take_in(self, bins: Bins) -> "Day":
         """Take in evidence of one day, from which is learned when the next has begun."""
         if not self.people:
             self._meet(bins)
-        day = int(bins.day[0])
-        if day != self.counts.today:
+        part = Day.of(bins)
+        if part.number != self.counts.today:
             if self.parts:
-                self._end_day(day)
-            self.counts.begin_day(day)
-        self.parts.append(bins)
+                self._end_day(part.number)
+            self.counts.begin_day(part.number)
+        self.parts.append(part)
+        return part
 
     def _meet(self, bins: Bins) -> None:
         layout, habits = Layout.of(bins, self.stages), Habits(self.detection, self.restless)
@@ -162,22 +167,33 @@ class Likelihood(Estimator):
                     " home, other users, another estimator, or one with other stages"
                 )
 
-    def _values(self, places: list[F64], bins: Bins) -> F64:
-        """Return what adds up: places p, p (1 - p), and 1: float64 (bins, users + 1, width)."""
-        rows = with_anyone(places, unknown_seen(bins)) if self.users else places[0][:, None]
-        return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
+    def _by_hour(self, places: list[F64], day: "Day") -> tuple[I64, F64]:
+        """Return the hours of bins, as ordinal * 24 + hour, and what adds up in each.
+
+        That is places p, p (1 - p), and 1: float64 (hours, users + 1, width).
+        """
+        hour = day.minute // 60
+        first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
+        sums = sum_places(np.stack(places), day.unknown, self.users, first)
+        return day.number * 24 + hour[first], sums
+
+    def _whole_day(self, places: list[F64], day: "Day") -> F64:
+        """Return what adds up in each hour of a day: float64 (24, users + 1, width)."""
+        hours, sums = self._by_hour(places, day)
+        found = np.zeros((24, *sums.shape[1:]))
+        found[hours % 24] = sums
+        return found
 
     def _end_day(self, following: int) -> None:
         """Smooth the day under way as a whole, learn from it, and go through earlier ones again."""
-        bins, self.parts = joined(self.parts), []
-        watched = watched_patches(bins)
+        day, self.parts = Day.joined(self.parts), []
         places = [
-            person.end_day(stretches_of(bins, user, self.together, watched))
+            person.end_day(day.stretches(user, self.together))
             for user, person in enumerate(self.people)
         ]
-        self.counts.hours = by_hour(bins, self._values(places, bins))
+        self.counts.hours = self._whole_day(places, day)
         self.hours.append(self.counts.hours)
-        self.days.append(bins._replace(by_patch=None))
+        self.days.append(day._replace(watched=None, seen=None))
         for _ in range(REVISITS):
             self.turn = (self.turn - 1) % len(self.days)
             self._revisit(self.turn)
@@ -189,11 +205,11 @@ class Likelihood(Estimator):
 
     def _revisit(self, number: int) -> None:
         """Go through a day again, and put what it says now in place of what it said."""
-        bins, today = self.days[number], self.counts.today
-        weight = self.counts.faded(today - int(bins.day[0]))
+        day = self.days[number]
+        weight = self.counts.faded(self.counts.today - day.number)
         places = [person.revisit(number, weight) for person in self.people]
-        hours = by_hour(bins, self._values(places, bins))
-        self.counts.put(int(bins.day[0]), self.hours[number], hours)
+        hours = self._whole_day(places, day)
+        self.counts.put(day.number, self.hours[number], hours)
         self.hours[number] = hours
 
     def remember(self) -> dict[str, Any]:
@@ -207,16 +223,45 @@ class Likelihood(Estimator):
         self.learned = learned.get("stays", {})
 
 
+class Day(NamedTuple):
+    """Evidence of one day, or of a part of it, as the chains of users need it.
+
+    Attributes:
+        number: Of the day, as `date.toordinal` counts.
+        minute: int64 (bins,), since midnight.
+        unknown: bool (bins, rooms), where somebody was perceived who is no user.
+        watched: uint8 (bins, patches), from `watched_patches`; None once the day is learned from.
+        seen: int64 (bins, users + 1, patches), as in Parts; None likewise.
+    """
+
+    number: int
+    minute: I64
+    unknown: NDArray[np.bool_]
+    watched: NDArray[np.uint8] | None
+    seen: I64 | None
+
+    @classmethod
+    def of(cls, bins: Bins) -> Self:
+        """Return evidence of one day."""
+        number, watched = int(bins.day[0]), watched_patches(bins)
+        return cls(number, bins.minute, unknown_seen(bins), watched, bins.parts.seen)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return parts of a day that follow each other as one."""
+        if len(parts) == 1:
+            return parts[0]
+        number, *columns = zip(*parts, strict=True)
+        return cls(number[0], *(np.concatenate(column) for column in columns))
+
+    def stretches(self, user: int, longest: int) -> Stretches:
+        """Return the evidence of one user, bins that are alike taken together."""
+        assert self.watched is not None
+        assert self.seen is not None
+        return stretches(self.minute, self.watched, self.seen, user, longest)
+
+
 def by_day(bins: Bins) -> list[Bins]:
     """Return evidence as that of its days."""
     ends = [*(np.flatnonzero(np.diff(bins.day)) + 1).tolist(), len(bins.day)]
     return [bins.part(a, b) for a, b in pairwise([0, *ends]) if a < b]
-
-
-def by_hour(bins: Bins, values: F64) -> F64:
-    """Sum the values of the bins of a day by hour: float64 (24, *)."""
-    hour = bins.minute // 60
-    first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
-    sums = np.zeros((24, *values.shape[1:]))
-    sums[hour[first]] = np.add.reduceat(values, first, axis=0)
-    return sums

@@ -226,10 +226,13 @@ def watched_patches(bins: Bins) -> NDArray[np.uint8]:
     One in which somebody unknown was perceived, who may be any user, doesn't count as watched.
     """
     seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
-    whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
-    shown: NDArray[np.uint8] = np.rint(whole).astype(np.uint8)
+    shown = bins.parts.shown_parts
+    if shown is None:
+        whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
+        shown = np.rint(whole).astype(np.uint8)
     if users:
-        shown[seen[:, -1] > seen[:, :-1].sum(axis=1)] = 0
+        known = seen[:, 0] if users == 1 else seen[:, :-1].sum(axis=1)
+        shown = np.where(seen[:, -1] > known, np.uint8(0), shown)
     return shown
 
 
@@ -246,5 +249,19 @@ def stretches_of(
             the same.
     """
     watched = watched_patches(bins) if watched is None else watched
-    seen = np.ascontiguousarray(bins.parts.seen[:, user])
-    return take_together(bins.minute, watched, seen, longest)
+    return stretches(bins.minute, watched, bins.parts.seen, user, longest)
+
+
+def stretches(
+    minute: I64, watched: NDArray[np.uint8], seen: I64, user: int, longest: int
+) -> Stretches:
+    """Return the evidence of one user, as `stretches_of`.
+
+    Args:
+        minute: int64 (bins,), since midnight.
+        watched: uint8 (bins, patches), from `watched_patches`.
+        seen: int64 (bins, users + 1, patches), as in Parts.
+        user: Row of the user; the last is anybody.
+        longest: Most bins of a stretch.
+    """
+    return take_together(minute, watched, np.ascontiguousarray(seen[:, user]), longest)

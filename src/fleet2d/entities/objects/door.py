@@ -103,6 +103,19 @@ def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
     return found
 
 
+def how_to_hang_a_door(plan: FloorPlan, name: str) -> str:
+    """Return what to write so that a doorway of a plan can be shut, for messages."""
+    names = [doorway.name for doorway in plan.doorways]
+    if not names:
+        return ""
+    found = doorways_named(plan, name)
+    doorway = found[0].name if found else names[0]
+    return (
+        ". A doorway that the picture shows is open until a door hangs in it: objects:"
+        f" {{{name}: {{type: door, doorway: {doorway}}}}}; the doorways are: {', '.join(names)}"
+    )
+
+
 def _squared(doorway: Doorway, x: float, y: float) -> float:
     (x0, y0), (x1, y1) = doorway.start, doorway.end
     return float(((x0 + x1) / 2 - x) ** 2 + ((y0 + y1) / 2 - y) ** 2)

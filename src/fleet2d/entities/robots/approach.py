@@ -1,5 +1,6 @@
 """Ways of a robot: how long they take, and where one to a person ends."""
 
+import math
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import ScenarioError
-from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.kernels.headings import TURN, UNIT, cosine, heading_of, sine, turn_between
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 # Where a shut door is in the way, it tries again after so long.
 AT_A_DOOR = timedelta(seconds=10)
+# Places about a person that are tried to keep a distance.
+DIRECTIONS = 32
 
 Spot = tuple[int, int]
 
@@ -54,6 +57,38 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> Spot:
             if _distance(person, point) <= reach and _is_free(actor, point):
                 return int(point[0]), int(point[1])
     return int(goal[0]), int(goal[1])
+
+
+def spot_back(now: Situation, x: float, y: float, distance: float) -> Spot:
+    """Return the nearest lattice point from which a robot keeps a distance to a person.
+
+    Args:
+        now: The situation.
+        x: Where the person is [m].
+        y: Where the person is [m].
+        distance: How far to keep [m], as the crow flies.
+
+    Returns:
+        A free point of the person's room at that distance; where the robot is, if it is no nearer
+        or there is no such point.
+    """
+    actor, home = now.actor, now.home
+    lattice, here = home.plan.lattice, (actor.state.x, actor.state.y)
+    person = lattice.to_lattice((x, y)).tolist()
+    reach = math.ceil(distance * lattice.units_per_m)
+    if _distance(person, here) >= reach:
+        return here
+    room, spots = home.plan.room_at(x, y), []
+    for i in range(DIRECTIONS):
+        heading = i * TURN // DIRECTIONS
+        spot = (
+            person[0] + reach * cosine(heading) // UNIT,
+            person[1] + reach * sine(heading) // UNIT,
+        )
+        in_room = home.plan.room_at(*lattice.to_metres(spot).tolist()) == room
+        if in_room and _is_free(actor, np.array(spot)):
+            spots.append(spot)
+    return min(spots, key=lambda spot: _distance(spot, here), default=here)
 
 
 def approach(now: Situation, plan: "Plan", x: float, y: float, distance: float) -> "Plan":

@@ -11,7 +11,7 @@ from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed
-from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_camera, face
+from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_camera, face, spot_back
 from fleet2d.entities.robots.belief import ANYONE, room_belief
 from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import PlacementError
@@ -94,7 +94,7 @@ class Find(Behavior):
         default=2, ge=1, le=8, description="in a room it looks round from so many places at most"
     )
     distance: Length = Field(
-        default=1.5, ge=0.3, le=10, description="how near it comes to who is found [m]"
+        default=1.5, ge=0.3, le=10, description="how far it stays from who is found [m]"
     )
     stay: Duration = Field(
         default=timedelta(minutes=1), description="how long it stays with who is found"
@@ -189,6 +189,9 @@ class Find(Behavior):
     def _found(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
         self.search = None
         approach(now, plan.note("found", self.user), x, y, self.distance)
+        back = spot_back(now, x, y, self.distance)
+        if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
+            plan.go_to_point(*back)
         face(plan, *now.home.plan.lattice.to_lattice((x, y)).tolist())
         return plan.stay(self.stay)
 

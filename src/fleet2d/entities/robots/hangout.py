@@ -10,13 +10,13 @@ from pydantic import Field
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.hours import Hours, holds
+from fleet2d.entities.kinds import kept_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import face
 from fleet2d.entities.robots.belief import ANYONE, room_belief
 from fleet2d.entities.robots.looking import Views, views_of
 from fleet2d.entities.robots.places import Nearness, Places
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.vocabulary import PRIORITY
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import Length, PositiveDuration, Share
 
@@ -87,9 +87,8 @@ class Hangout(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the places, and rate what doesn't depend on where people are."""
-        there = {name for room in actor.home.rooms for name in (room.name, room.type)}
-        named = [name for name in self.avoid if name in there or name not in PRIORITY]
-        self.avoided = frozenset(r.index for name in named for r in actor.rooms((name,)))
+        avoided = kept_rooms(actor, "hangout.avoid", self.avoid, needed=False)
+        self.avoided = frozenset(room.index for room in avoided)
         self.places = Places(actor, self.avoided, self.off_doors)
         if not len(self.places.points):
             raise PlacementError(

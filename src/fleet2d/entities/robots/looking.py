@@ -48,6 +48,12 @@ def views_of(actor: "Actor", room: "Room", enough: float, most: int) -> Views:
         enough: The part of the room to be shown before no more places are added.
         most: How many places at most.
     """
+    home, space = actor.home, actor.space
+    key = "views", home.walls, space, actor.part, sight_range(actor), room.index, enough, most
+    return home.kept(key, lambda: _find_views(actor, room, enough, most))
+
+
+def _find_views(actor: "Actor", room: "Room", enough: float, most: int) -> Views:
     plan = actor.home.plan
     stands = spread(actor.space.cells(room.index, actor.part), STANDS_TRIED)
     targets = spread(np.argwhere(plan.room_of_cell == room.index), TARGETS_TRIED)

@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.furniture import stops_at
+from fleet2d.entities.kinds import kept_places
 from fleet2d.entities.place import Place, Point
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration, problem
@@ -55,10 +57,11 @@ class Patrol(Behavior):
             self.stops = [actor.point(point) for point in self.waypoints]
             return
         if self.rooms == "all":
-            rooms = actor.reachable_rooms()
+            stops = [actor.middle(room) for room in actor.reachable_rooms()]
         else:
-            rooms = [room for names in self.rooms for room in actor.rooms(names)]  # type: ignore[arg-type]
-        self.stops = [actor.middle(room) for room in dict.fromkeys(rooms)]
+            kept = kept_places(actor, "patrol.rooms", self.rooms)
+            stops = [stop for place in kept for stop in stops_at(actor, place)]
+        self.stops = list(dict.fromkeys(stops))
 
     def decide(self, now: Situation) -> Plan:
         """Plan one round."""

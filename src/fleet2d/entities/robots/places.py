@@ -8,6 +8,7 @@ import shapely
 from numpy.typing import NDArray
 
 from fleet2d.entities.robots.looking import sight_range
+from fleet2d.floorplan.kept import read_only
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
 
@@ -26,6 +27,7 @@ PITCH = 0.5
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
+Seats = tuple[I64, ...]
 Nearness = Literal["room", "view", "path"]
 
 
@@ -47,10 +49,21 @@ class Places:
             off_doors: How far from every doorway a place is [m].
         """
         self._actor = actor
+        home, people = actor.home, actor.home.space(PERSON, opens_doors=True)
+        # What it depends on; robots of other runs in the same home share it.
+        body = actor.space, actor.part, actor.entity.radius
+        self._key = (*body, people, home.objects, avoid, off_doors)
+        self.points, self.room, seats, self.block, self.prox = home.kept(
+            ("places", *self._key), lambda: self._lay_out(avoid, off_doors)
+        )
+        self._seats = dict(enumerate(seats))
+
+    def _lay_out(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64, Seats, F64, F64]:
+        """Return the points, their rooms, the seats of each room, `block` and `prox`."""
         self.points, self.room = self._candidates(avoid, off_doors)
-        self._seats = {room.index: self._seats_of(room) for room in actor.home.rooms}
-        self.block = self._blocking()
-        self.prox = self._proximity()
+        seats = tuple(read_only(self._seats_of(room)) for room in self._actor.home.rooms)
+        block, prox = read_only(self._blocking()), read_only(self._proximity())
+        return read_only(self.points), read_only(self.room), seats, block, prox
 
     def nearness(self, by: Nearness, tau: float) -> F64:
         """Return how near each place is to who is in each room: float64 (n, rooms), 0 to 1.
@@ -58,6 +71,11 @@ class Places:
         `room`: 1 in the same room. `view`: the share of the room's seats in range and in sight.
         `path`: exp(-t / tau), with t the seconds on foot to the nearest point of the room.
         """
+        actor = self._actor
+        key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), actor.speed)
+        return actor.home.kept(key, lambda: read_only(self._find_nearness(by, tau)))
+
+    def _find_nearness(self, by: Nearness, tau: float) -> F64:
         rooms = self._actor.home.rooms
         if by == "path":
             return np.stack([self._path(room, tau) for room in rooms], axis=1)

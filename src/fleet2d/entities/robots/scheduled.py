@@ -8,8 +8,9 @@ from pydantic import Field
 
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.furniture import stop_at
 from fleet2d.entities.hours import DAY
-from fleet2d.entities.place import Place, Point, RoomChoice, is_point
+from fleet2d.entities.place import Place
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import AT_A_DOOR
 from fleet2d.units import Duration, TimeOfDay
@@ -50,7 +51,7 @@ class Scheduled(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the stops."""
-        self.stops = [_stop(actor, visit.place) for visit in self.visits]
+        self.stops = [stop_at(actor, visit.place) for visit in self.visits]
         self.asked = actor.clock.start - timedelta(microseconds=1)
         self.waiting: list[tuple[datetime, int]] = []  # due by then, not made, not yet too late
 
@@ -98,9 +99,3 @@ class Scheduled(Behavior):
                 if day.weekday() in weekdays_of(visit.on)
             ]
             yield from (entry for entry in sorted(today) if entry[0] > since)
-
-
-def _stop(actor: "Actor", place: RoomChoice | Point) -> tuple[int, int]:
-    if is_point(place):
-        return actor.point(place)  # type: ignore[arg-type]
-    return actor.middle(actor.rooms(place)[0])  # type: ignore[arg-type]

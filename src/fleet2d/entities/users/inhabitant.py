@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from pydantic import Field
 
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import matching_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Seat, Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.laws import KNOTS, Law, exponential
-from fleet2d.routines.planner import NO_GAP_S, REST, SLEEP, Doing
+from fleet2d.routines.laws import KNOTS, Bits, Law, exponential
+from fleet2d.routines.planner import NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ GOING_ON = DOINGS_A_DAY // 2
 NEARLY_OVER_US = 90 * SECOND_US
 # One turns to the side by up to half of two to the power of that: an eighth of a turn.
 SIDEWAYS_BITS = 10
-DRAWN_BITS = 30
 
 
 class Setting(NamedTuple):
@@ -63,12 +63,14 @@ class _Last:
     Attributes:
         which: The day's ordinal and the number of the doing.
         place: Where.
+        base: Where what was interrupted is done.
         step: Up to which step that was planned.
         given_up: What is not to be gone on with.
     """
 
     which: tuple[int, int] | None = None
     place: Spot | Seat | None = None
+    base: Spot | Seat | None = None
     step: int = -1
     given_up: tuple[int, int] | None = None
 
@@ -113,11 +115,21 @@ class Inhabitant(Behavior):
         self.last = _Last()
         self.clock = actor.clock
         self.spots = spots
+        self.own_part = actor.reachable_rooms()
         self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
+        self._leave_out(actor)
         exclusive = (s for s in self.settings.values() if s.activity.exclusive)
         self.private_rooms = {room.index for setting in exclusive for room in setting.rooms}
         if sleeps_in is not None:
             self.settings[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
+
+    def _leave_out(self, actor: "Actor") -> None:
+        """Rest instead of what this home has no room for, and note it."""
+        none = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]
+        for name in none:
+            rooms = " or ".join(self.settings[name].activity.rooms)
+            actor.notes.append(f"activities.{name}.rooms: left out, for this home has no {rooms}")
+            self.settings[name] = self.settings[REST]
 
     def decide(self, now: Situation) -> Plan:
         """Plan the rest of the date.
@@ -166,7 +178,7 @@ class Inhabitant(Behavior):
         last = self.last
         if which == last.given_up:
             doing = doing._replace(activity=REST)
-        setting = self._at_present(self.settings[doing.activity])
+        setting = self._at_present(self._in_its_room(doing))
         if not (setting.rooms or setting.activity.away):
             if plan.time_us <= plan.began[0] * self.clock.step_us:
                 plan.note("way_blocked", doing.activity).stay_until(end_us)
@@ -176,10 +188,17 @@ class Inhabitant(Behavior):
         draws = Draws(self.key, number + GOING_ON if goes_on else number)
         if not goes_on:
             last.place = None
+            last.base = None if doing.role == PLANNED else last.base
             if setting.activity.away:
                 plan.leave_home()
             elif doing.activity != REST or doing.end - doing.begin >= NO_GAP_S:
-                last.place = self._go(plan, setting, draws)
+                if doing.role == RESUMES and last.base is not None:
+                    last.place = last.base
+                    _settle_at(plan, setting, last.base)
+                else:
+                    last.place = self._go(plan, setting, draws)
+                if doing.role == PLANNED:
+                    last.base = last.place
             plan.note("activity", doing.activity)
         if last.place is not None and self.small_moves and setting.restless:
             last.place = self._fidget(plan, setting, last.place, end_us, draws)
@@ -196,14 +215,52 @@ class Inhabitant(Behavior):
             setting = setting._replace(rooms=reached, seats=seats)
         return setting._replace(stores=self.spots.reached(setting.stores))
 
+    def _in_its_room(self, doing: Doing) -> Setting:
+        """Return where a doing is done, in the room that its household chose for it, if any."""
+        setting = self.settings[doing.activity]
+        room = next((room for room in self.own_part if room.index == doing.room), None)
+        return setting if room is None else self._within(setting, room)
+
+    def _within(self, setting: Setting, room: "Room") -> Setting:
+        """Return where an activity is done in a given room."""
+        did = setting.activity
+        seats = self.spots.at_furniture(did.objects, [room], did.posture)
+        return setting._replace(rooms=[room], seats=seats)
+
     def _go(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
         """Go to where the activity is done: a place at its furniture, else a spot in its room."""
+        choose = setting.activity.choose
+        if choose == "here":
+            return self._stay_in_the_room(plan, setting, draws)
+        if choose == "nearest" and len(setting.rooms) > 1:
+            setting = self._within(setting, self._nearest(plan, setting.rooms))
         room = draws.choice(setting.rooms)
+        if choose == "each_time":
+            setting = self._within(setting, room)
         place: Spot | Seat = (
             draws.choice(setting.seats) if setting.seats else draws.choice(self.spots.in_room(room))
         )
         _settle_at(plan, setting, place)
         return place
+
+    def _stay_in_the_room(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
+        """Do something in the room where one is: at its furniture, else on the spot."""
+        plan.come_home()
+        room = self.spots.room_at(plan.x, plan.y)
+        seats = [] if room is None else self._within(setting, room).seats
+        place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
+        _settle_at(plan, setting, place)
+        return place
+
+    def _nearest(self, plan: Plan, rooms: list["Room"]) -> "Room":
+        """Return the room whose middle is nearest, as the crow flies."""
+        x, y = self.spots.in_metres(plan.x, plan.y)
+
+        def distance(room: "Room") -> float:
+            across, along = room.anchor_xy[0] - x, room.anchor_xy[1] - y
+            return across * across + along * along
+
+        return min(rooms, key=distance)
 
     def _fidget(
         self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
@@ -213,8 +270,8 @@ class Inhabitant(Behavior):
         Returns:
             The place that one ends at.
         """
-        bits = _Bits(draws)
-        next_us = [plan.time_us + bits.wait_us(law) for _, law in setting.restless]
+        bits = Bits(draws)
+        next_us = [plan.time_us + _wait_us(law, bits) for _, law in setting.restless]
         facing = plan.heading
         end_us -= NEARLY_OVER_US
         while True:
@@ -232,7 +289,7 @@ class Inhabitant(Behavior):
             else:
                 self._fetch(plan, setting, place, end_us, draws)
                 facing = plan.heading
-            next_us[k] = plan.time_us + bits.wait_us(law)
+            next_us[k] = plan.time_us + _wait_us(law, bits)
 
     def _go_elsewhere(
         self, plan: Plan, setting: Setting, place: Spot | Seat, draws: Draws
@@ -263,7 +320,11 @@ class Inhabitant(Behavior):
     def _setting(self, actor: "Actor", activity: Activity) -> Setting:
         if activity.away:
             return Setting(activity, [], [], [], (), activity.fetch_takes.table())
-        rooms = self._own_rooms(actor, activity.rooms)
+        rooms = (
+            self._own_rooms(actor, activity.rooms)
+            if activity.choose == "own"
+            else self._all_rooms(actor, activity.rooms)
+        )
         restless = [
             (what, exponential(seconds(mean)))
             for what in ("shifts", "moves", "fetches")
@@ -287,10 +348,15 @@ class Inhabitant(Behavior):
         seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
         return self._setting(actor, sleep)._replace(rooms=[room], seats=seats)
 
+    def _all_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
+        """Return the rooms of all kinds that a list names and that there are."""
+        rooms = [r for name in names for r in self.own_part if name in (r.name, r.type)]
+        return list(dict.fromkeys(rooms)) or _match(actor, names)[1]
+
     def _own_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
         """Return the rooms that a list of names stands for: of several of a kind, its own one."""
         name, rooms = _match(actor, names)
-        if name == "any":
+        if name == "any" or not rooms:
             return rooms
         return [Draws(actor.stream(f"room of {name}"), 0).choice(rooms)]
 
@@ -299,6 +365,8 @@ def _match(actor: "Actor", names: "RoomChoice") -> tuple[str, list["Room"]]:
     try:
         return matching_rooms(names, actor.home.rooms, actor.reachable_rooms())
     except PlacementError as error:
+        if is_kind(actor, names):
+            return "", []
         raise PlacementError(f"{actor.path}: {error}") from None
 
 
@@ -318,22 +386,6 @@ def _settle_at(plan: Plan, setting: Setting, place: Spot | Seat) -> None:
         plan.take(setting.activity.posture)
 
 
-class _Bits:
-    """Small draws, several from each draw of a stream."""
-
-    def __init__(self, draws: Draws) -> None:
-        self._draws = draws
-        self._left = self._bits = 0
-
-    def take(self, count: int) -> int:
-        """Return a number from 0 to 2**count - 1, all equally likely."""
-        if self._left < count:
-            self._bits, self._left = self._draws.below(1 << DRAWN_BITS), DRAWN_BITS
-        value = self._bits & ((1 << count) - 1)
-        self._bits >>= count
-        self._left -= count
-        return value
-
-    def wait_us(self, law: Law) -> int:
-        """Return one of a law's quantiles [us]: fine enough for when somebody stirs."""
-        return law.knots[self.take(KNOTS.bit_length() - 1)] * SECOND_US
+def _wait_us(law: Law, bits: Bits) -> int:
+    """Return one of a law's quantiles [us]: fine enough for when somebody stirs."""
+    return law.knots[bits.take(KNOTS.bit_length() - 1)] * SECOND_US

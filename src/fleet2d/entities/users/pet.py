@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.kinds import kept_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spots
 from fleet2d.problems import problem
@@ -55,8 +56,8 @@ class Pet(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the rooms that it may enter."""
-        named = [room for name in self.rooms for room in actor.rooms((name,))]
-        self.entered = list(dict.fromkeys(named)) or actor.reachable_rooms()
+        named = kept_rooms(actor, "pet.rooms", self.rooms)
+        self.entered = named or actor.reachable_rooms()
         self.places = Spots(actor)
         self.laws = self.nap.table(), self.stop.table()
         self.naps = 0

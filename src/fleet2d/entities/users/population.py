@@ -11,7 +11,9 @@ from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
+from fleet2d.routines.interruptions import body_of, interrupted
 from fleet2d.routines.laws import weighted
+from fleet2d.routines.needs import activities_of, usual_errands, usual_needs
 from fleet2d.routines.planner import REST, Doing
 from fleet2d.routines.timeuse import activities, told_apart, works_at_home
 from fleet2d.streams import Draws, stream_key
@@ -34,6 +36,12 @@ class Population(Inhabitant):
         default="any", description="whose days; any: drawn by the groups' shares of the people"
     )
 
+    bodily_needs: bool = Field(
+        default=True,
+        description="whether an adult's needs and errands interrupt what is done, which the survey"
+        " doesn't tell: its shares count them as what they interrupt",
+    )
+
     def start(self, actor: "Actor") -> None:
         """Draw who it is, and find where its activities are done."""
         self.days = actor.stream("day")
@@ -45,9 +53,12 @@ class Population(Inhabitant):
         self.states = [survey.first_state(self.people, draws, self.first)]
         self.known: dict[int, Sequence[Doing]] = {}
         known = catalogue()
-        self.settle(
-            actor, {name: known[name] for name in (*activities(self.people), REST)}, Spots(actor)
-        )
+        names = {*activities(self.people), REST}
+        self.body, self.interruptions = None, actor.stream("needs")
+        if self.bodily_needs:
+            self.body = body_of(usual_needs(), usual_errands(), known)
+            names |= activities_of(usual_needs(), usual_errands())
+        self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
         """Return where one likely is at that time."""
@@ -72,7 +83,10 @@ class Population(Inhabitant):
         blocks, after = survey.live(self.people, Draws(self.days, ordinal), ordinal, state)
         if len(self.states) == ordinal - self.first + 1:
             self.states.append(after)
-        return told_apart(self.people, blocks, self.at_home, Draws(self.details, ordinal))
+        day = told_apart(self.people, blocks, self.at_home, Draws(self.details, ordinal))
+        if self.body is None:
+            return day
+        return interrupted(self.body, Draws(self.interruptions, ordinal), day)
 
 
 def _drawn_group(draws: Draws) -> str:

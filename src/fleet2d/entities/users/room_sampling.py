@@ -10,8 +10,10 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.kinds import kept_places
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spot, Spots
+from fleet2d.errors import PlacementError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyTakes, Takes
@@ -73,10 +75,18 @@ class RoomSampling(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the rooms; those of a kind have equal parts of its share."""
-        total = sum(self.shares.values())
+        names = [(name,) for name in self.shares if name != AWAY]
+        there = {name for (name,) in kept_places(actor, "room_sampling.shares", names)} | {AWAY}
+        kept = {name: share for name, share in self.shares.items() if name in there}
+        total = sum(kept.values())
+        if total <= 0:
+            raise PlacementError(
+                f"room_sampling.shares: nothing is left of it in this home: {', '.join(kept)} have"
+                " a share of 0"
+            )
         chances: dict[int | None, float] = {}
         self.rooms: dict[int | None, Room | None] = {None: None}
-        for name, share in self.shares.items():
+        for name, share in kept.items():
             rooms: Sequence[Room | None] = [None] if name == AWAY else actor.rooms((name,))
             for room in rooms:
                 index = None if room is None else room.index
@@ -101,8 +111,10 @@ class RoomSampling(Behavior):
         stop = self.stops[weighted(draws, [stop.chance for stop in self.stops])]
         dwell_us = self.law.draw(draws) * SECOND_US
         if stop.room is None:
-            self._walk(actor, plan, Spot(*actor.way_out))
-            plan.leave_home().stay(timedelta(microseconds=dwell_us))
+            if not plan.away:  # who is out already stays out
+                self._walk(actor, plan, Spot(*actor.way_out))
+                plan.leave_home()
+            plan.stay(timedelta(microseconds=dwell_us))
             return
         self._walk(actor, plan, draws.choice(self.spots.in_room(stop.room)))
         owed = self.debt_us[stop.room.index]

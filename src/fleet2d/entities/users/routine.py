@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.users.inhabitant import SECOND_US, Inhabitant, rooms_at
+from fleet2d.entities.users.private_rooms import private_rooms
 from fleet2d.entities.users.spots import Spots
 from fleet2d.errors import PlacementError
 from fleet2d.problems import did_you_mean, problem
@@ -78,7 +79,9 @@ class Routine(Inhabitant):
                     f"{actor.path}: it is no member of its household"
                     f"{did_you_mean(actor.name, members)} Its members are: {', '.join(members)}"
                 )
-            self.lives = Lives(self.household, actor.seed, actor.clock.start.toordinal() - 1)
+            first = actor.clock.start.toordinal() - 1
+            rooms = private_rooms(self.household, actor.home)
+            self.lives = Lives(self.household, actor.seed, first, rooms)
             spots = Spots(actor, members.index(actor.name), len(members))
             sleeps_in = self.household.bedrooms()[actor.name]
             side = self.household.side_of_bed(actor.name)
@@ -134,7 +137,7 @@ class Routine(Inhabitant):
             return None
         date = clock.start + timedelta(microseconds=begins_us)
         midnight_us = clock.elapsed(datetime.fromordinal(date.toordinal()))
-        for begin, end in self.lives.in_use(date.toordinal(), self.name):
+        for begin, end in self.lives.in_use(date.toordinal(), self.name, room):
             if begins_us - WAY_US < midnight_us + end * SECOND_US and (
                 midnight_us + begin * SECOND_US < ends_us
             ):

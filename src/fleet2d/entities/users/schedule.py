@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.kinds import kept_places
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.problems import problem, problem_at
@@ -89,11 +90,12 @@ class Schedule(Behavior):
         self.week = self._week()
         self.plan: Plan | None = None  # the last one it made, and the midnight up to which it is
         self.until = actor.clock.start
-        for entry in {entry for day in self.week for entry in day}:
-            if entry.place and is_point(entry.place):
-                actor.point(entry.place)  # type: ignore[arg-type]
-            elif entry.place:
-                actor.rooms(entry.place)  # type: ignore[arg-type]
+        places = dict.fromkeys(entry.place for day in self.week for entry in day if entry.place)
+        for place in places:
+            if is_point(place):
+                actor.point(place)  # type: ignore[arg-type]
+        there = {(), *kept_places(actor, "schedule.days", places)}
+        self.week = [[entry for entry in day if entry.place in there] for day in self.week]
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
         """Return the place of the last item before the run."""

@@ -8,6 +8,7 @@ from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
+    from fleet2d.entities.place import Point
     from fleet2d.entities.plan import Plan
     from fleet2d.floorplan.objects import UsePlace
     from fleet2d.floorplan.plan import Room
@@ -69,6 +70,15 @@ class Spots:
         if not actor.home.hinders:
             return rooms
         return [room for room in rooms if len(actor.space.cells(room.index, actor.part))]
+
+    def in_metres(self, x: int, y: int) -> "Point":
+        """Return a lattice point [m]."""
+        xy: Point = tuple(self._actor.home.plan.lattice.to_metres((x, y)).tolist())
+        return xy
+
+    def room_at(self, x: int, y: int) -> "Room | None":
+        """Return the room that holds a lattice point."""
+        return self._actor.home.plan.room_at(*self.in_metres(x, y))
 
     def in_room(self, room: "Room") -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import HOURS
+from fleet2d.floorplan.kept import read_only
 from fleet2d.kernels.mesh import SUB
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
     from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.space import Space
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
@@ -88,9 +90,14 @@ def walking_distances(home: "Home") -> F64:
     Where no way leads it is twice the longest way there is.
 
     Returns:
-        float64 (rooms, rooms), symmetric.
+        float64 (rooms, rooms), symmetric, read-only.
     """
-    space, lattice = home.space(RADIUS), home.plan.lattice
+    space = home.space(RADIUS)
+    return home.kept(("walking distances", space), lambda: read_only(_distances(home, space)))
+
+
+def _distances(home: "Home", space: "Space") -> F64:
+    lattice = home.plan.lattice
     places = []
     for room in home.rooms:
         x, y = lattice.to_lattice(room.anchor_xy).tolist()

@@ -20,6 +20,7 @@ from fleet2d.scenario.published.reader import Reader
 from fleet2d.scenario.published.sections import (
     convert_floorplan,
     convert_outputs,
+    convert_sight,
     convert_simulation,
     read_step,
 )
@@ -68,6 +69,7 @@ def _convert(reader: Reader, old: Path, new: Path) -> dict[str, Any]:
         "floorplan": floorplan,
         "users": users,
         "robots": {},
+        "sight": convert_sight(reader),
         "artifacts": convert_outputs(reader, step),
     }
     if reader.get(("robot",)) is None:

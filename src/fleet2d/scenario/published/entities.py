@@ -113,6 +113,7 @@ def _walk(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
     return {
         "type": "meander",
         "speed": pace,
+        "at_walls": "stay",
         **_sway(reader, (*keys, "ang_speed"), step_s),
     }
 
@@ -132,9 +133,9 @@ def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
         )
     reader.remark(
         keys,
-        "metres per step there, a speed here, and the same walk at this step; at a wall it turns"
-        " away, where the published Fleet2D kept to small turns, and a move across a wall is never"
-        " made, where that one looked at the end of the move only",
+        "metres per step there, a speed here, and the same rule of walking at this step, with"
+        " at_walls: stay; a move across a wall is never made, where the published Fleet2D looked at"
+        " the end of the move only",
     )
     return speed
 
@@ -147,7 +148,7 @@ def _sway(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
     limit = _TURN_LIMIT_STD * sway / float(step_s)
     reader.remark(
         keys,
-        "degrees per step there, per square root of a second here, and the same walk at this step;"
+        "degrees per step there, per square root of a second here, and the same law at this step;"
         " turns are cut at 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
     )
     if limit > _FASTEST_TURN_DEG_S:

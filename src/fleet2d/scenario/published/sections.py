@@ -108,11 +108,18 @@ def _windows(reader: Reader) -> None:
         )
     if reader.truth((*_SIMULATION, "show_progress")) is False:
         reader.remark((*_SIMULATION, "show_progress"), "left out: `fleet2d run --quiet` shows none")
-    if reader.get((*_SIMULATION, "fov_provider")) is not None:
-        reader.remark(
-            (*_SIMULATION, "fov_provider"),
-            "left out: there is one way of seeing here, and it is exact",
-        )
+
+
+def convert_sight(reader: Reader) -> dict[str, Any]:
+    """Return the section `sight`: the method that is called as the provider is."""
+    keys: Keys = (*_SIMULATION, "fov_provider")
+    provider = reader.text(keys)
+    if provider == "Flashlight":
+        reader.remark(keys, "kept: sight.method is flashlight; left out, sight is exact")
+        return {"method": {"type": "flashlight"}}
+    if provider:
+        reader.remark(keys, "left out: lines of sight are worked out exactly here")
+    return {}
 
 
 def convert_outputs(reader: Reader, step: timedelta) -> dict[str, Any]:

@@ -1,0 +1,145 @@
+"""How fast studies are: overhead per variant, speed-up by workers, memory of the driver, reading.
+
+    python benchmarks/studies.py                    # all but the thousand months
+    python benchmarks/studies.py months --workers 2 # the paper's 10 x 10 x 10 runs of 30 days
+
+Run it on a machine that does nothing else.
+"""
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+from fleet2d.studies.driver import RunOptions, check_study, run_study
+from fleet2d.studies.engine import Outcome
+from fleet2d.studies.execution import Event, Executor, Finished, SerialExecutor
+from fleet2d.studies.jobs import Job, StudyJob
+from fleet2d.studies.local import LocalExecutor
+from fleet2d.studies.reader import open_study
+from fleet2d.studies.record import record_of
+from fleet2d.studies.schedule import Schedule
+
+EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
+HOUR = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+
+
+class MadeUpExecutor:
+    """Gives back results without simulating: what is left is the driver."""
+
+    workers = 1
+
+    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+        """Yield a record of usual size for each task."""
+        numbers = {f"metric_{i}.ana.value": 0.1 * i for i in range(30)}
+        while (task := tasks.take(self)) is not None:
+            if isinstance(job, StudyJob):
+                outcome = Outcome("complete", f"{task.number:064x}", numbers, {}, {"total": 0.03})
+                yield Finished(task, record_of(task, outcome).encode(), 1)
+            else:  # set-ups
+                yield Finished(task, b"", 1)
+
+
+def run(study: Any, folder: Path, executor: Executor) -> float:
+    """Run a study and return the seconds that it took."""
+    began = time.perf_counter()
+    run_study(check_study(study), folder, executor, RunOptions())
+    return time.perf_counter() - began
+
+
+def overhead(folder: Path, seeds: int = 200) -> None:
+    """Print what a variant takes beside its own run."""
+    study = {"base": HOUR, "axes": {"robots.astro.speed": [0.3, 0.6]}, "replicates": seeds}
+    run({**study, "replicates": 1}, folder / "warm", SerialExecutor())
+    seconds = run(study, folder / "overhead", SerialExecutor())
+    own = open_study(folder / "overhead").variants["wall_s"].sum()
+    count = 2 * seeds
+    print(f"overhead per variant: {1000 * (seconds - own) / count:.1f} ms ({count} of one hour,")
+    print(f"  {1000 * own / count:.1f} ms each, in one process; checks and data set included)")
+
+
+def speedup(folder: Path, days: int = 5, seeds: int = 40) -> None:
+    """Print how much faster two workers are than one, start included and not."""
+    base = {**HOUR, "simulation": {"duration": {"days": days}}}
+    study = {"base": base, "axes": {"robots.astro.speed": [0.3, 0.6]}, "replicates": seeds}
+    seconds = {n: run(study, folder / f"workers{n}", LocalExecutor(n)) for n in (1, 2)}
+    print(
+        f"{2 * seeds} variants of {days} days: {seconds[1]:.1f} s by 1 worker, {seconds[2]:.1f} s"
+        f" by 2: {seconds[1] / seconds[2]:.2f} times"
+    )
+
+
+def driver(folder: Path, variants: int = 100_000) -> None:
+    """Print time and memory of a driver of many variants, in a process of its own."""
+    speeds = [round(0.1 + i / 1000, 3) for i in range(variants // 1000)]
+    study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 1000}
+    seconds = run(study, folder / "many", MadeUpExecutor())
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    files = sum(path.is_file() for path in (folder / "many").rglob("*"))
+    size = sum(path.stat().st_size for path in (folder / "many").rglob("*") if path.is_file())
+    print(
+        f"driver of {variants:,} variants: {seconds:.0f} s, {1000 * seconds / variants:.2f} ms"
+        f" each, {peak:.0f} MB at most, {files} files of {size / 1e6:.0f} MB"
+    )
+    began = time.perf_counter()
+    run_study(check_study(study), folder / "many", MadeUpExecutor(), RunOptions())
+    print(f"  going on with nothing to do: {time.perf_counter() - began:.1f} s")
+
+
+def reading(folder: Path) -> None:
+    """Print how long a study of 1,000 variants takes to open and sum up."""
+    speeds = [round(0.1 + i / 1000, 3) for i in range(100)]
+    study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 10}
+    run(study, folder / "thousand", MadeUpExecutor())
+    code = (
+        "import time; began = time.perf_counter()\n"
+        "import fleet2d\n"
+        f"study = fleet2d.open_study({str(folder / 'thousand')!r})\n"
+        "opened = time.perf_counter()\n"
+        "study.summary('metric_1.ana.value', ['robots.astro.speed'])\n"
+        "first = time.perf_counter()\n"
+        "again = fleet2d.open_study(study.location)\n"
+        "again.summary('metric_1.ana.value', ['robots.astro.speed'])\n"
+        "print(f'opening and aggregating 1,000 variants: {first - began:.2f} s with imports,'\n"
+        "      f' {time.perf_counter() - first:.3f} s again')\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+
+
+def months(folder: Path, workers: int) -> None:
+    """Print how long the paper's thousand months take."""
+    file = EXAMPLES / "ten_by_ten_by_ten.yaml"
+    seconds = run(file, folder / "months", LocalExecutor(workers))
+    counts = open_study(folder / "months").counts
+    print(
+        f"the paper's {counts.total} variants of 30 days by {workers} workers:"
+        f" {seconds / 60:.1f} min, {counts.failed} failed"
+    )
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", nargs="*", default=["overhead", "speedup", "driver", "reading"])
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    print(f"load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    with tempfile.TemporaryDirectory() as folder:
+        for name in arguments.what:
+            if name == "months":
+                months(Path(folder), arguments.workers)
+            else:
+                {"overhead": overhead, "speedup": speedup, "driver": driver, "reading": reading}[
+                    name
+                ](Path(folder))
+
+
+if __name__ == "__main__":
+    main()

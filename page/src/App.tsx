@@ -1,0 +1,242 @@
+/** The page: controls, plan, panels, timeline. */
+
+import { useSignal } from "@preact/signals";
+import type { ComponentType } from "preact";
+import { KEYS } from "./keyboard";
+import { LiveControls } from "./live/LiveControls";
+import { BeliefsPanel } from "./panels/BeliefsPanel";
+import { EventsPanel, KindChoice } from "./panels/EventsPanel";
+import { Inspect } from "./panels/Inspect";
+import { LayersPanel } from "./panels/LayersPanel";
+import { MetricsPanel } from "./panels/MetricsPanel";
+import { Now } from "./panels/Now";
+import { slowMoment } from "./panels/slow";
+import { Plan } from "./plan/Plan";
+import * as state from "./state";
+import { Timeline } from "./timeline/Timeline";
+
+const PANELS: Record<state.Panel, [string, ComponentType]> = {
+  now: ["Now", Now],
+  inspect: ["Inspect", Inspect],
+  beliefs: ["Beliefs", BeliefsPanel],
+  events: ["Events", EventsPanel],
+  metrics: ["Metrics", MetricsPanel],
+  layers: ["Layers", LayersPanel],
+};
+
+export function App() {
+  const runs = state.runs.value;
+  const two = runs.length > 1;
+  return (
+    <div class={two ? "app two" : "app"}>
+      <Header />
+      <Notes />
+      <main>
+        <div class="plans">
+          {runs.map((run, i) => (
+            <Plan key={i} run={run} other={two ? (runs[i === 0 ? 1 : 0] ?? null) : null} title={two ? run.facts.title : ""} />
+          ))}
+        </div>
+        <Panels />
+      </main>
+      <Controls />
+      <Timeline />
+    </div>
+  );
+}
+
+function Header() {
+  const run = state.run.value!;
+  const { facts } = run;
+  const days = facts.steps * facts.step_us / 86_400e6;
+  const length = days >= 2 ? `${Math.round(days)} days` : `${(days * 24).toFixed(1)} h`;
+  return (
+    <header>
+      <h1>{state.runs.value.map((entry) => entry.facts.title).join(" · ")}</h1>
+      <p>
+        {length} in {facts.home.name.slice(0, 24)}, seed {facts.seed ?? "–"}
+        {facts.digest ? `, digest ${facts.digest.slice(0, 8)}` : ""}
+        {facts.status !== "complete" && !state.live.value ? <strong class="status"> {facts.status}</strong> : ""}
+      </p>
+    </header>
+  );
+}
+
+function Notes() {
+  const notes = state.runs.value.flatMap((run) => [...run.facts.notes, ...run.problems.value]);
+  if (notes.length === 0) return null;
+  return (
+    <details class="notes">
+      <summary>{notes.length === 1 ? "1 note" : `${notes.length} notes`}</summary>
+      <ul role="status">
+        {notes.map((note) => (
+          <li key={note}>{note}</li>
+        ))}
+      </ul>
+    </details>
+  );
+}
+
+function Panels() {
+  const active = state.panel.value;
+  const Content = PANELS[active][1];
+  const move = (event: KeyboardEvent): void => {
+    const by = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+    if (!by) return;
+    const at = (state.PANELS.indexOf(active) + by + state.PANELS.length) % state.PANELS.length;
+    state.panel.value = state.PANELS[at]!;
+    document.getElementById(`tab-${state.PANELS[at]}`)?.focus();
+  };
+  return (
+    <aside aria-label="Details">
+      <div role="tablist" aria-label="Panels" onKeyDown={move}>
+        {state.PANELS.map((name) => (
+          <button
+            key={name}
+            id={`tab-${name}`}
+            type="button"
+            role="tab"
+            aria-selected={name === active}
+            aria-controls="panel"
+            tabIndex={name === active ? 0 : -1}
+            onClick={() => {
+              state.panel.value = name;
+            }}
+          >
+            {PANELS[name][0]}
+          </button>
+        ))}
+      </div>
+      <div id="panel" role="tabpanel" aria-labelledby={`tab-${active}`} tabIndex={0}>
+        <Content />
+      </div>
+    </aside>
+  );
+}
+
+function Controls() {
+  const run = state.run.value!;
+  const playing = state.playing.value;
+  return (
+    <div class="controls" role="toolbar" aria-label="Time">
+      {state.live.value ? (
+        <LiveControls />
+      ) : (
+        <button
+          type="button"
+          class="play"
+          aria-pressed={playing}
+          onClick={() => {
+            state.playing.value = !playing;
+          }}
+        >
+          {playing ? "❚❚ Pause" : "▶ Play"}
+        </button>
+      )}
+      {!state.live.value && <SpeedChoice />}
+      <GoTo />
+      <output class="clock" aria-label="Shown moment">
+        day {run.clock.day(slowMoment.value)} · {run.clock.text(slowMoment.value)}
+      </output>
+      <span class="group">
+        <button type="button" aria-label="Previous event" onClick={() => state.jump(false)}>
+          ‹
+        </button>
+        <KindChoice />
+        <button type="button" aria-label="Next event" onClick={() => state.jump(true)}>
+          ›
+        </button>
+      </span>
+      <span class="group">
+        <button type="button" aria-label="Zoom in" onClick={() => state.zoom(0.5)}>
+          +
+        </button>
+        <button type="button" aria-label="Zoom out" onClick={() => state.zoom(2)}>
+          −
+        </button>
+        <button type="button" onClick={() => state.setRange(state.beginUs.value, state.endUs.value)}>
+          Whole run
+        </button>
+        <button
+          type="button"
+          onClick={() => {
+            const start = run.clock.dayStart(run.clock.day(state.moment.value));
+            state.setRange(start, start + 86_400e6);
+          }}
+        >
+          Day
+        </button>
+      </span>
+      <Help />
+    </div>
+  );
+}
+
+function speedText(factor: number): string {
+  return factor >= 86_400 ? "a day a second" : factor >= 3600 ? `${factor / 3600} h a second` : `${factor} ×`;
+}
+
+function SpeedChoice() {
+  const choices = state.SPEEDS.includes(state.speed.value) ? state.SPEEDS : [...state.SPEEDS, state.speed.value];
+  return (
+    <select
+      aria-label="Speed"
+      value={String(state.speed.value)}
+      onChange={(event) => {
+        state.speed.value = Number(event.currentTarget.value);
+      }}
+    >
+      {choices.map((factor) => (
+        <option key={factor} value={String(factor)}>
+          {speedText(factor)}
+        </option>
+      ))}
+    </select>
+  );
+}
+
+function GoTo() {
+  const wrong = useSignal(false);
+  const run = state.run.value!;
+  return (
+    <form
+      class="goto"
+      onSubmit={(event) => {
+        event.preventDefault();
+        const input = event.currentTarget.querySelector("input")!;
+        const us = run.clock.parse(input.value, state.moment.value);
+        wrong.value = us === null;
+        if (us === null) return;
+        state.goTo(us);
+        input.blur();
+      }}
+    >
+      <input
+        id="goto"
+        aria-label="Go to a time, such as day 3 18:30"
+        placeholder="day 3 18:30"
+        aria-invalid={wrong.value}
+        size={12}
+      />
+      <button type="submit">Go</button>
+    </form>
+  );
+}
+
+function Help() {
+  return (
+    <details class="help">
+      <summary>Keys</summary>
+      <dl>
+        {KEYS.map(([keys, words]) => (
+          <div key={keys}>
+            <dt>
+              <kbd>{keys}</kbd>
+            </dt>
+            <dd>{words}</dd>
+          </div>
+        ))}
+      </dl>
+    </details>
+  );
+}

@@ -1,0 +1,83 @@
+/** The address holds the moment and the view, so that it can be shared. */
+
+import { effect } from "@preact/signals";
+import type { Run } from "./data/run";
+import * as state from "./state";
+
+const DELAY_MS = 250;
+
+/** What the address says of the view, without the leading #. */
+export function addressOf(run: Run): string {
+  const { clock } = run;
+  const [from, to] = state.range.value;
+  const words = new URLSearchParams();
+  words.set("at", momentText(clock.startMs, state.moment.value));
+  if (from > state.beginUs.value || to < state.endUs.value) {
+    words.set("from", momentText(clock.startMs, from));
+    words.set("to", momentText(clock.startMs, to));
+  }
+  words.set("show", state.SWITCHES.filter((name) => state.shown.value.has(name)).join(","));
+  words.set("panel", state.panel.value);
+  words.set("speed", String(state.speed.value));
+  const optional = {
+    select: state.selected.value,
+    layer: state.layer.value,
+    belief: state.belief.value,
+    kind: state.eventKind.value,
+    theme: state.theme.value === "auto" ? "" : state.theme.value,
+  };
+  for (const [name, value] of Object.entries(optional)) if (value) words.set(name, value);
+  return words.toString();
+}
+
+export function applyAddress(text: string, run: Run): void {
+  const words = new URLSearchParams(text.replace(/^#/, ""));
+  const us = (name: string): number | null => {
+    const value = words.get(name);
+    const ms = value === null ? NaN : Date.parse(`${value}Z`);
+    return Number.isNaN(ms) ? null : (ms - run.clock.startMs) * 1000;
+  };
+  const [from, to, at] = [us("from"), us("to"), us("at")];
+  if (from !== null && to !== null && to > from) state.setRange(from, to);
+  if (at !== null) state.goTo(at);
+  const show = words.get("show");
+  if (show !== null) {
+    const names = show.split(",");
+    state.shown.value = new Set(state.SWITCHES.filter((name) => names.includes(name)));
+  }
+  const panel = state.PANELS.find((name) => name === words.get("panel"));
+  if (panel) state.panel.value = panel;
+  const speed = Number(words.get("speed"));
+  if (speed > 0 && speed <= 86_400) state.speed.value = speed;
+  state.selected.value = words.get("select") ?? "";
+  state.layer.value = words.get("layer") ?? "";
+  state.belief.value = words.get("belief") ?? "";
+  state.eventKind.value = words.get("kind") ?? "";
+  const theme = words.get("theme");
+  if (theme === "light" || theme === "dark") state.theme.value = theme;
+}
+
+/** Keep the address up to date, and follow it when it is changed. */
+export function followAddress(run: Run): void {
+  let written = "";
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  effect(() => {
+    const address = addressOf(run);
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      written = `#${address}`;
+      try {
+        history.replaceState(null, "", written);
+      } catch {
+        // A frame in a notebook has no address of its own.
+      }
+    }, DELAY_MS);
+  });
+  addEventListener("hashchange", () => {
+    if (location.hash !== written) applyAddress(location.hash, run);
+  });
+}
+
+function momentText(startMs: number, us: number): string {
+  return new Date(startMs + us / 1000).toISOString().slice(0, 23).replace(".000", "");
+}

@@ -1,0 +1,199 @@
+// Written by `python -m fleet2d.viewer.typescript` from fleet2d.viewer.contract.
+
+/** A room: its colours on the plan and in lanes, and where its name is written [m]. */
+export interface RoomFacts {
+  name: string;
+  type: string;
+  color: string;
+  deep_color: string;
+  anchor: [number, number];
+  area_m2: number;
+}
+
+/** A door: its jambs [m], and whether it is open and locked when the run starts. */
+export interface DoorFacts {
+  name: string;
+  start: [number, number];
+  end: [number, number];
+  open: boolean;
+  locked: boolean;
+}
+
+/** A piece of furniture: its outline [m], and whom it stops: nothing, path or sight. */
+export interface ObjectFacts {
+  name: string;
+  type: string;
+  outline: [number, number][];
+  blocks: string;
+}
+
+/** A home: outlines in metres, cells as runs of equal rooms. `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of cells), row by row from the lowest; -1 is no room. `place_cells` are the same for places in cells that a wall cuts. */
+export interface HomeFacts {
+  name: string;
+  cell: number;
+  origin_units: [number, number];
+  units_per_m: number;
+  columns: number;
+  rows: number;
+  bounds: [number, number, number, number];
+  area_m2: number;
+  free: [number, number][][][];
+  rooms: RoomFacts[];
+  room_cells: number[];
+  place_cells: number[];
+  doorways: [[number, number], [number, number]][];
+  doors: DoorFacts[];
+  objects: ObjectFacts[];
+  no_go: [number, number][][];
+  entrance: [number, number] | null;
+}
+
+/** A camera: range [m], angles [rad], offset forward and to the left [m]. */
+export interface CameraFacts {
+  name: string;
+  near: number;
+  far: number;
+  angle: number;
+  forward: number;
+  left: number;
+  heading: number;
+  pan: number[];
+  pan_us: number;
+}
+
+/** A user or a robot. */
+export interface BodyFacts {
+  name: string;
+  robot: boolean;
+  color: string;
+  radius: number;
+  cameras: CameraFacts[];
+  behaviors: string[];
+}
+
+/** A column of a table. */
+export interface ColumnFacts {
+  name: string;
+  kind: string;
+  unit: string;
+  description: string;
+}
+
+/** A table of the run, and what put it out. */
+export interface TableFacts {
+  name: string;
+  rows: number;
+  bytes: number;
+  role: "log" | "algorithm" | "metric" | "layer";
+  columns: ColumnFacts[];
+}
+
+/** From this step on, sight ends at the walls of this number. */
+export interface WallsChange {
+  step: number;
+  walls: number;
+}
+
+/** What ends sight, as a mesh [lattice]: flat lists of x and y, and of three per triangle. */
+export interface WallsFacts {
+  vertices: number[];
+  triangles: number[];
+  neighbors: number[];
+}
+
+/** Something to mark on the timeline: an intervention, or how an expectation came out. */
+export interface MarkFacts {
+  step: number;
+  end: number;
+  kind: "intervention" | "held" | "violated" | "open";
+  label: string;
+}
+
+/** Stretches in which a robot noticed a user: steps `first` to `last`, both included. `false` marks stretches in which what was noticed was not that user. */
+export interface SightingFacts {
+  robot: string;
+  user: string;
+  first: number[];
+  last: number[];
+  false: boolean[];
+}
+
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. */
+export interface RunFacts {
+  title: string;
+  status: string;
+  notes: string[];
+  start: string;
+  step_us: number;
+  steps: number;
+  first_step: number;
+  end_step: number;
+  seed: number | null;
+  digest: string | null;
+  version: string;
+  home: HomeFacts;
+  bodies: BodyFacts[];
+  tables: TableFacts[];
+  walls: WallsChange[];
+  marks: MarkFacts[];
+  metrics: Record<string, unknown>;
+  scenario: Record<string, unknown>;
+  walks_every_s: number;
+}
+
+/** Why something can't be shown. */
+export interface Problem {
+  message: string;
+}
+
+/** What the page shows: runs, by title; the first may be under way. */
+export interface SessionFacts {
+  runs: string[];
+  live: boolean;
+  version: string;
+}
+
+/** A body at a step of a running simulation [lattice], and the way ahead: time [us], x, y. */
+export interface LiveBody {
+  name: string;
+  x: number;
+  y: number;
+  heading: number;
+  away: boolean;
+  ahead: [number, number, number][];
+  note: string;
+}
+
+/** An event of a running simulation. */
+export interface LiveEvent {
+  step: number;
+  entity: string;
+  event: string;
+  user: string;
+  detail: string;
+}
+
+/** The state of a running simulation; `speed` 0 is as fast as it goes. */
+export interface LiveFrame {
+  step: number;
+  paused: boolean;
+  done: boolean;
+  speed: number;
+  achieved: number;
+  bodies: LiveBody[];
+  seen: [string, string][];
+  doors: Record<string, boolean>;
+  beliefs: Record<string, number[]>;
+  events: LiveEvent[];
+  walls: number;
+  message: string;
+}
+
+/** What the page asks a running simulation to do; `x` and `y` in metres. */
+export interface LiveOrder {
+  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "call" | "replan" | "end";
+  target: string;
+  value: number;
+  x: number;
+  y: number;
+}

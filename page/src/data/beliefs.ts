@@ -1,0 +1,74 @@
+/** What algorithms believe: shares per room, as they were put out. */
+
+import type { Home } from "./home";
+import type { Table } from "./parquet";
+import { lastAtMost } from "./search";
+
+/** Tables with these columns say in which share of time, or how probably, somebody is in a room. */
+const SHARE_COLUMNS = ["share", "probability", "p"];
+
+export interface Belief {
+  us: number;
+  /** By room, in the order of the home; the last is away. */
+  shares: Float64Array;
+}
+
+export class Beliefs {
+  constructor(
+    readonly name: string,
+    private readonly series: Map<string, { us: number[]; shares: Float64Array[] }>,
+  ) {}
+
+  get users(): string[] {
+    return [...this.series.keys()];
+  }
+
+  /** What was believed of a user at a moment; null before the first output. */
+  at(user: string, us: number): Belief | null {
+    const mine = this.series.get(user);
+    if (!mine) return null;
+    const i = lastAtMost(mine.us, us);
+    return i < 0 ? null : { us: mine.us[i]!, shares: mine.shares[i]! };
+  }
+
+  /** Moments of all outputs, in order. */
+  get moments(): number[] {
+    return this.series.values().next().value?.us ?? [];
+  }
+}
+
+/** Read the outputs of an algorithm; null where they are no shares per room. */
+export async function readBeliefs(
+  name: string,
+  table: Table,
+  home: Home,
+  stepUs: number,
+): Promise<Beliefs | null> {
+  const column = SHARE_COLUMNS.find((name) => table.has(name));
+  if (!column || !table.has("room")) return null;
+  const steps = await table.numbers("step");
+  const shares = await table.numbers(column);
+  const room = await table.words("room");
+  const user = table.has("user") ? await table.words("user") : null;
+  const index = room.words.map((word) => {
+    const found = home.roomIndex(word);
+    return found >= 0 ? found : home.facts.rooms.length;
+  });
+  const series = new Map<string, { us: number[]; shares: Float64Array[] }>();
+  for (let i = 0; i < steps.length; i++) {
+    const key = user ? (user.words[user.codes[i]!] ?? "") : "";
+    let mine = series.get(key);
+    if (!mine) {
+      mine = { us: [], shares: [] };
+      series.set(key, mine);
+    }
+    const us = steps[i]! * stepUs;
+    if (mine.us[mine.us.length - 1] !== us) {
+      mine.us.push(us);
+      mine.shares.push(new Float64Array(home.facts.rooms.length + 1));
+    }
+    const place = room.codes[i]! >= 0 ? index[room.codes[i]!]! : home.facts.rooms.length;
+    mine.shares[mine.shares.length - 1]![place]! += shares[i]!;
+  }
+  return new Beliefs(name, series);
+}

@@ -1,0 +1,212 @@
+/** One run: everything that the page shows of it, read when it is needed. */
+
+import { signal } from "@preact/signals";
+import type { BodyFacts, RunFacts, SightingFacts, TableFacts } from "../contract";
+import { type Beliefs, readBeliefs } from "./beliefs";
+import { Clock } from "./clock";
+import { Events, readEvents } from "./events";
+import { Home } from "./home";
+import { LayerTable } from "./layers";
+import { Observations, type ObservationSource } from "./observations";
+import { Table } from "./parquet";
+import { roomStretches } from "./rooms";
+import { lastAtMost } from "./search";
+import { Walls } from "./sight";
+import type { RunSource } from "./source";
+import type { Stretches } from "./stretches";
+import { readTracks, Track } from "./tracks";
+
+const NO_STRETCHES: Stretches = { from: [], to: [], value: [] };
+
+export class Run {
+  readonly clock: Clock;
+  readonly home: Home;
+  tracks = new Map<string, Track>();
+  rooms = new Map<string, Stretches>();
+  events = new Events();
+  beliefs: Beliefs[] = [];
+  sightings: SightingFacts[] = [];
+  observations: ObservationSource | null = null;
+  /** Goes up by one whenever something more of the run was read. */
+  readonly version = signal(0);
+  /** What could not be read, in plain words. */
+  readonly problems = signal<string[]>([]);
+  /** Ways ahead of bodies in a live run [lattice]; a stored run knows them from its tracks. */
+  ahead = new Map<string, number[]>();
+  /** What behaviors of a live run say of themselves. */
+  behaviorNotes = new Map<string, string>();
+
+  private readonly walls = new Map<number, Walls | null>();
+  private readonly layers = new Map<string, Promise<LayerTable>>();
+
+  constructor(
+    readonly facts: RunFacts,
+    private readonly source: RunSource,
+  ) {
+    this.clock = new Clock(facts.start, facts.step_us, facts.steps);
+    this.home = new Home(facts.home);
+  }
+
+  static async open(source: RunSource): Promise<Run> {
+    return new Run(await source.facts(), source);
+  }
+
+  get beginUs(): number {
+    return this.facts.first_step * this.clock.stepUs;
+  }
+
+  get endUs(): number {
+    return Math.min(this.facts.end_step, this.clock.steps) * this.clock.stepUs;
+  }
+
+  get bodies(): readonly BodyFacts[] {
+    return this.facts.bodies;
+  }
+
+  body(name: string): BodyFacts | undefined {
+    return this.facts.bodies.find((body) => body.name === name);
+  }
+
+  changed(): void {
+    this.version.value++;
+  }
+
+  /** Read where everybody is; until then only the home can be shown. */
+  async readPoses(): Promise<void> {
+    const name = this.facts.walks_every_s > 0 ? "poses" : "key_frames";
+    const facts = this.facts.tables.find((table) => table.name === "key_frames");
+    if (!facts) {
+      this.report("The run stored no key frames: nobody can be shown. Run it with artifacts.key_frames: true.");
+      return;
+    }
+    await this.attempt(async () => {
+      const table = await Table.open(await this.source.table(name, name === "poses" ? 0 : facts.bytes));
+      this.tracks = await readTracks(
+        table,
+        this.bodies.map((body) => body.name),
+        {
+          unitsPerM: this.facts.home.units_per_m,
+          originUnits: this.facts.home.origin_units,
+          startMs: this.clock.startMs,
+          stepUs: this.clock.stepUs,
+        },
+      );
+    });
+    this.changed();
+  }
+
+  /** Read what the first picture does without: events, lanes, beliefs. */
+  async readRest(): Promise<void> {
+    await this.attempt(async () => {
+      const table = await this.open("events");
+      if (table) this.events = await readEvents(table, this.clock);
+    });
+    this.changed();
+    for (const body of this.bodies) {
+      const track = this.tracks.get(body.name);
+      if (track) this.rooms.set(body.name, roomStretches(track, this.home, this.clock));
+      this.changed();
+      await new Promise((resolve) => setTimeout(resolve));
+    }
+    await this.attempt(async () => {
+      this.sightings = await this.source.sightings();
+    });
+    for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
+      await this.attempt(async () => {
+        const table = await this.open(facts.name);
+        const beliefs = table && (await readBeliefs(facts.name, table, this.home, this.clock.stepUs));
+        if (beliefs) this.beliefs.push(beliefs);
+      });
+    }
+    await this.attempt(async () => {
+      const table = await this.open("observations");
+      if (table) this.observations = new Observations(table);
+    });
+    this.changed();
+  }
+
+  /** Open a table of the run; null where there is none or it is empty. */
+  async open(name: string): Promise<Table | null> {
+    const facts = this.tableFacts(name);
+    if (!facts || facts.rows === 0) return null;
+    return Table.open(await this.source.table(name, facts.bytes));
+  }
+
+  tableFacts(name: string): TableFacts | undefined {
+    return this.facts.tables.find((table) => table.name === name);
+  }
+
+  roomsOf(name: string): Stretches {
+    return this.rooms.get(name) ?? NO_STRETCHES;
+  }
+
+  /** What ends sight at a moment; null while it isn't read yet. */
+  wallsAt(us: number): Walls | null {
+    const { walls } = this.facts;
+    const steps = walls.map((entry) => entry.step);
+    const change = walls[Math.max(0, lastAtMost(steps, Math.floor(us / this.clock.stepUs)))];
+    return change ? this.wallsOf(change.walls) : null;
+  }
+
+  wallsOf(number: number): Walls | null {
+    const known = this.walls.get(number);
+    if (known !== undefined) return known;
+    this.walls.set(number, null);
+    void this.attempt(async () => {
+      this.walls.set(number, new Walls(await this.source.walls(number)));
+      this.changed();
+    });
+    return null;
+  }
+
+  layer(name: string): Promise<LayerTable> {
+    let layer = this.layers.get(name);
+    if (!layer) {
+      layer = this.open(`layer.${name}`).then((table) => {
+        if (!table) throw new Error(`the layer ${name} is empty`);
+        return LayerTable.open(table, this.home);
+      });
+      this.layers.set(name, layer);
+    }
+    return layer;
+  }
+
+  /** Whether a door stands open at a moment. */
+  doorOpen(name: string, us: number): boolean {
+    const facts = this.facts.home.doors.find((door) => door.name === name);
+    const rows = this.doorEvents(name);
+    const i = lastAtMost(rows.us, us);
+    return i < 0 ? (facts?.open ?? true) : rows.open[i]!;
+  }
+
+  private doorRows = new Map<string, { us: number[]; open: boolean[]; seen: number }>();
+
+  private doorEvents(name: string): { us: number[]; open: boolean[] } {
+    let rows = this.doorRows.get(name);
+    if (!rows || rows.seen !== this.events.rows.length) {
+      const mine = this.events.rows.filter(
+        (row) => row.entity === name && (row.event === "opened" || row.event === "shut"),
+      );
+      rows = {
+        us: mine.map((row) => row.us),
+        open: mine.map((row) => row.event === "opened"),
+        seen: this.events.rows.length,
+      };
+      this.doorRows.set(name, rows);
+    }
+    return rows;
+  }
+
+  report(problem: string): void {
+    if (!this.problems.value.includes(problem)) this.problems.value = [...this.problems.value, problem];
+  }
+
+  /** Do something that may fail, and report why it did. */
+  async attempt(work: () => Promise<void>): Promise<void> {
+    try {
+      await work();
+    } catch (error) {
+      this.report(error instanceof Error ? error.message : String(error));
+    }
+  }
+}

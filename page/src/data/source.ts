@@ -1,0 +1,137 @@
+/** Where the page's data come from: the server, or the page's own file. */
+
+import type { AsyncBuffer } from "hyparquet";
+import type { Problem, RunFacts, SessionFacts, SightingFacts, WallsFacts } from "../contract";
+
+const WHOLE_BYTES = 8_000_000;
+const BLOCK_BYTES = 1 << 20;
+
+export interface RunSource {
+  facts(): Promise<RunFacts>;
+  sightings(): Promise<SightingFacts[]>;
+  walls(number: number): Promise<WallsFacts>;
+  table(name: string, bytes: number): Promise<AsyncBuffer>;
+}
+
+/** Everything of a run that a file holds which plays without a server. */
+export interface EmbeddedRun {
+  facts: RunFacts;
+  sightings: SightingFacts[];
+  walls: WallsFacts[];
+  /** Parquet files by name, base64. */
+  tables: Record<string, string>;
+}
+
+export interface Session {
+  facts: SessionFacts;
+  sources: RunSource[];
+}
+
+async function fetched(url: string, init?: RequestInit): Promise<Response> {
+  const response = await fetch(url, init);
+  if (!response.ok) {
+    const problem = (await response.json().catch(() => null)) as Problem | null;
+    throw new Error(problem?.message ?? `${url}: ${response.status}`);
+  }
+  return response;
+}
+
+async function json<T>(url: string): Promise<T> {
+  return (await (await fetched(url)).json()) as T;
+}
+
+export class ServedRun implements RunSource {
+  constructor(private readonly base: string) {}
+
+  facts(): Promise<RunFacts> {
+    return json(`${this.base}/facts.json`);
+  }
+
+  sightings(): Promise<SightingFacts[]> {
+    return json(`${this.base}/sightings.json`);
+  }
+
+  walls(number: number): Promise<WallsFacts> {
+    return json(`${this.base}/walls/${number}.json`);
+  }
+
+  async table(name: string, bytes: number): Promise<AsyncBuffer> {
+    const url = `${this.base}/tables/${encodeURIComponent(name)}.parquet`;
+    if (bytes > WHOLE_BYTES) return rangedBuffer(url, bytes);
+    return await (await fetched(url)).arrayBuffer();
+  }
+}
+
+/** A file on the server of which only the parts that are read are fetched, each once. */
+export function rangedBuffer(url: string, byteLength: number): AsyncBuffer {
+  const blocks = new Map<number, Promise<ArrayBuffer>>();
+  const block = (index: number): Promise<ArrayBuffer> => {
+    let content = blocks.get(index);
+    if (!content) {
+      const first = index * BLOCK_BYTES;
+      const last = Math.min(byteLength, first + BLOCK_BYTES) - 1;
+      const headers = { Range: `bytes=${first}-${last}` };
+      content = fetched(url, { headers }).then((response) => response.arrayBuffer());
+      blocks.set(index, content);
+      if (blocks.size > 64) blocks.delete(blocks.keys().next().value!);
+    }
+    return content;
+  };
+  return {
+    byteLength,
+    async slice(start: number, end: number = byteLength): Promise<ArrayBuffer> {
+      const first = Math.floor(start / BLOCK_BYTES);
+      const last = Math.floor((end - 1) / BLOCK_BYTES);
+      const parts = await Promise.all(
+        Array.from({ length: last - first + 1 }, (_, i) => block(first + i)),
+      );
+      const joined = new Uint8Array(end - start);
+      parts.forEach((part, i) => {
+        const at = (first + i) * BLOCK_BYTES - start;
+        const from = Math.max(0, -at);
+        const until = Math.min(part.byteLength, end - start - at);
+        joined.set(new Uint8Array(part, from, until - from), at + from);
+      });
+      return joined.buffer;
+    },
+  };
+}
+
+class HeldRun implements RunSource {
+  constructor(private readonly held: EmbeddedRun) {}
+
+  facts(): Promise<RunFacts> {
+    return Promise.resolve(this.held.facts);
+  }
+
+  sightings(): Promise<SightingFacts[]> {
+    return Promise.resolve(this.held.sightings);
+  }
+
+  walls(number: number): Promise<WallsFacts> {
+    const walls = this.held.walls[number];
+    return walls ? Promise.resolve(walls) : Promise.reject(new Error("these walls are not in the file"));
+  }
+
+  table(name: string): Promise<AsyncBuffer> {
+    const content = this.held.tables[name];
+    if (content === undefined) return Promise.reject(new Error(`the file holds no table ${name}`));
+    const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
+    return Promise.resolve(bytes.buffer);
+  }
+}
+
+/** What the page shows: the runs in its own file, else those of the server that it came from. */
+export async function openSession(): Promise<Session> {
+  const held = document.getElementById("fleet2d-runs");
+  if (held?.textContent) {
+    const runs = JSON.parse(held.textContent) as EmbeddedRun[];
+    const titles = runs.map((run) => run.facts.title);
+    return {
+      facts: { runs: titles, live: false, version: runs[0]?.facts.version ?? "" },
+      sources: runs.map((run) => new HeldRun(run)),
+    };
+  }
+  const facts = await json<SessionFacts>("session.json");
+  return { facts, sources: facts.runs.map((_, i) => new ServedRun(`run/${i}`)) };
+}

@@ -1,0 +1,85 @@
+/** The whole page by keyboard alone. */
+
+import { status } from "./live/feed";
+import { order } from "./live/orders";
+import * as state from "./state";
+
+export const KEYS: [string, string][] = [
+  ["Space", "play, pause"],
+  [", .", "a step back, forward"],
+  ["← →", "a hundredth of the view back, forward; with Shift a tenth"],
+  ["[ ]", "a day back, forward"],
+  ["p n", "previous, next event of the chosen kind"],
+  ["+ −", "zoom in, out"],
+  ["0", "the whole run"],
+  ["< >", "slower, faster"],
+  ["Home End", "begin, end"],
+  ["1 … 6", "panels"],
+  ["g", "go to a time"],
+  ["f", "search events"],
+  ["t", "light, dark"],
+];
+
+const DAY_US = 86_400e6;
+
+const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
+  " ": () => {
+    if (state.live.value) void order({ action: status.value?.paused ? "resume" : "pause" });
+    else state.playing.value = !state.playing.value;
+  },
+  ",": () => step(-1),
+  ".": () => step(1),
+  ArrowLeft: (event) => state.goTo(state.moment.value - stride(event)),
+  ArrowRight: (event) => state.goTo(state.moment.value + stride(event)),
+  "[": () => state.goTo(state.moment.value - DAY_US),
+  "]": () => state.goTo(state.moment.value + DAY_US),
+  n: () => state.jump(true),
+  p: () => state.jump(false),
+  "+": () => state.zoom(0.5),
+  "=": () => state.zoom(0.5),
+  "-": () => state.zoom(2),
+  "0": () => state.setRange(state.beginUs.value, state.endUs.value),
+  "<": () => state.faster(-1),
+  ">": () => state.faster(1),
+  Home: () => state.goTo(state.beginUs.value),
+  End: () => state.goTo(state.endUs.value),
+  t: () => {
+    state.theme.value = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+  },
+  g: () => document.getElementById("goto")?.focus(),
+  f: () => {
+    state.panel.value = "events";
+    requestAnimationFrame(() => document.getElementById("search")?.focus());
+  },
+};
+
+function step(by: 1 | -1): void {
+  const stepUs = state.run.value?.clock.stepUs ?? 1e6;
+  state.goTo((Math.round(state.moment.value / stepUs) + by) * stepUs);
+}
+
+function stride(event: KeyboardEvent): number {
+  const [from, to] = state.range.value;
+  const stepUs = state.run.value?.clock.stepUs ?? 1e6;
+  return Math.max(stepUs, Math.round(((to - from) * (event.shiftKey ? 0.1 : 0.01)) / stepUs) * stepUs);
+}
+
+export function followKeyboard(): void {
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const at = event.target as HTMLElement;
+    if (at.matches("input:not([type=checkbox]):not([type=radio]), select, textarea")) {
+      if (event.key === "Escape") at.blur();
+      return;
+    }
+    if (event.key === " " && at.matches("button, a, [role=tab], input")) return;
+    if (event.key.startsWith("Arrow") && at.matches("input, [role=tab]")) return;
+    const panel = state.PANELS[Number(event.key) - 1];
+    const action = ACTIONS[event.key];
+    if (!panel && !action) return;
+    if (panel) state.panel.value = panel;
+    else action!(event);
+    if (event.key !== " ") state.follow.value = false;
+    event.preventDefault();
+  });
+}

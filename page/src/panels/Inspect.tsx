@@ -1,0 +1,142 @@
+/** One body, door or room: its state, its plan, why it does so, its history. */
+
+import { durationText } from "../data/clock";
+import type { EventRow } from "../data/events";
+import type { Run } from "../data/run";
+import { lastAtMost } from "../data/search";
+import { valueAt } from "../data/stretches";
+import * as state from "../state";
+import { bodyState } from "./Now";
+import { slowMoment } from "./slow";
+
+const SHOWN_EVENTS = 12;
+
+export function Inspect() {
+  const name = state.selected.value;
+  const run = state.run.value!;
+  void run.version.value;
+  if (!name) return <p class="hint">Choose somebody, a door or a room: click on the plan, or on a name.</p>;
+  if (run.body(name)) return <BodyView run={run} name={name} />;
+  if (run.facts.home.doors.some((door) => door.name === name)) return <DoorView run={run} name={name} />;
+  if (run.home.roomIndex(name) >= 0) return <RoomView run={run} name={name} />;
+  return <p class="hint">There is no {name} in this run.</p>;
+}
+
+function Facts({ rows }: { rows: [string, string][] }) {
+  return (
+    <dl>
+      {rows
+        .filter(([, value]) => value)
+        .map(([name, value]) => (
+          <div key={name}>
+            <dt>{name}</dt>
+            <dd>{value}</dd>
+          </div>
+        ))}
+    </dl>
+  );
+}
+
+function BodyView({ run, name }: { run: Run; name: string }) {
+  void run.version.value;
+  const us = slowMoment.value;
+  const body = run.body(name)!;
+  const now = bodyState(run, name, us);
+  const why = run.behaviorNotes.get(name) ?? noteOf(run, name, us);
+  const rows: [string, string][] = [
+    ["kind", body.robot ? "robot" : "user"],
+    ["room", now?.room ?? "not stored"],
+    ["since", now ? since(run, name, us) : ""],
+    ["place", now && !now.away ? `${now.x.toFixed(2)} m, ${now.y.toFixed(2)} m` : ""],
+    ["heading", now && !now.away ? `${now.headingDeg.toFixed(0)}°` : ""],
+    ["activity", now?.activity ?? ""],
+    ["sees", now?.sees.join(", ") ?? ""],
+    ["next", nextPlace(run, name, us)],
+    ["why", why],
+    ["behaviors", body.behaviors.join(", ")],
+  ];
+  return (
+    <div data-inspected={name}>
+      <h3>{name}</h3>
+      <Facts rows={rows} />
+      <h4>History</h4>
+      <History run={run} rows={run.events.rows.filter((row) => row.entity === name || row.user === name)} us={us} />
+    </div>
+  );
+}
+
+/** The last note of a behavior: an event that is neither sight nor activity. */
+function noteOf(run: Run, name: string, us: number): string {
+  const routine = new Set(["user_seen", "user_lost", "activity", "left_home", "came_home"]);
+  for (let i = run.events.after(us) - 1; i >= 0; i--) {
+    const row = run.events.rows[i]!;
+    if (row.entity === name && !routine.has(row.event)) {
+      return `${row.event.replaceAll("_", " ")} ${row.detail} (${run.clock.text(row.us)})`;
+    }
+  }
+  return "";
+}
+
+function since(run: Run, name: string, us: number): string {
+  const lane = run.roomsOf(name);
+  const i = lastAtMost(lane.from, us);
+  return i < 0 ? "" : `${run.clock.text(lane.from[i]!)}, ${durationText(us - lane.from[i]!)} ago`;
+}
+
+function nextPlace(run: Run, name: string, us: number): string {
+  const lane = run.roomsOf(name);
+  const i = lastAtMost(lane.from, us) + 1;
+  if (i >= lane.from.length) return "";
+  const room = run.home.roomName(lane.value[i]!);
+  return `${room} in ${durationText(lane.from[i]! - us)}`;
+}
+
+export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]; us: number }) {
+  const at = lastAtMost(rows.map((row) => row.us), us) + 1;
+  const shown = rows.slice(Math.max(0, at - SHOWN_EVENTS), at + 3);
+  return (
+    <ol class="events">
+      {shown.map((row) => (
+        <li key={row.index} class={row.us > us ? "later" : ""}>
+          <button type="button" class="link" onClick={() => state.goTo(row.us)}>
+            <time>{run.clock.text(row.us)}</time> {row.event.replaceAll("_", " ")} {row.user} {row.detail}
+          </button>
+        </li>
+      ))}
+      {shown.length === 0 && <li>no events</li>}
+    </ol>
+  );
+}
+
+function DoorView({ run, name }: { run: Run; name: string }) {
+  void run.version.value;
+  const us = slowMoment.value;
+  return (
+    <div data-inspected={name}>
+      <h3>{name}</h3>
+      <Facts rows={[["kind", "door"], ["now", run.doorOpen(name, us) ? "open" : "shut"]]} />
+      <h4>History</h4>
+      <History run={run} rows={run.events.rows.filter((row) => row.entity === name)} us={us} />
+    </div>
+  );
+}
+
+function RoomView({ run, name }: { run: Run; name: string }) {
+  void run.version.value;
+  const us = slowMoment.value;
+  const index = run.home.roomIndex(name);
+  const room = run.facts.home.rooms[index]!;
+  const here = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);
+  return (
+    <div data-inspected={name}>
+      <h3>{name.replaceAll("_", " ")}</h3>
+      <Facts
+        rows={[
+          ["kind", room.type.replaceAll("_", " ")],
+          ["area", `${room.area_m2.toFixed(1)} m²`],
+          ["here now", here.map((body) => body.name).join(", ") || "nobody"],
+        ]}
+      />
+    </div>
+  );
+}

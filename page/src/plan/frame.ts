@@ -1,0 +1,49 @@
+/** From lattice units and metres to pixels of a canvas: the plan fits it, and can be zoomed. */
+
+import type { Home } from "../data/home";
+
+const EDGE = 0.03;
+/** Pixels below the plan, for its scale. */
+export const FOOT = 18;
+
+export class Frame {
+  private constructor(
+    readonly scale: number,
+    private readonly left: number,
+    private readonly bottom: number,
+    private readonly home: Home,
+  ) {}
+
+  static fit(home: Home, width: number, height: number, zoom = 1, shift: readonly [number, number] = [0, 0]): Frame {
+    const [x0, y0, x1, y1] = home.facts.bounds;
+    const edge = 0.35 + EDGE * Math.max(x1 - x0, y1 - y0);
+    const fitting = Math.min(width / (x1 - x0 + 2 * edge), (height - FOOT) / (y1 - y0 + 2 * edge));
+    const scale = fitting * zoom;
+    const left = width / 2 - ((x0 + x1) / 2) * scale + shift[0];
+    const bottom = (height - FOOT) / 2 + ((y0 + y1) / 2) * scale + shift[1];
+    return new Frame(scale, left, bottom, home);
+  }
+
+  /** Pixels of a place in metres. */
+  x(metres: number): number {
+    return this.left + metres * this.scale;
+  }
+
+  y(metres: number): number {
+    return this.bottom - metres * this.scale;
+  }
+
+  /** Pixels of a place in lattice units. */
+  ux(units: number): number {
+    return this.x(this.home.metres(units, 0));
+  }
+
+  uy(units: number): number {
+    return this.y(this.home.metres(units, 1));
+  }
+
+  /** The place [m] of a pixel. */
+  place(px: number, py: number): [number, number] {
+    return [(px - this.left) / this.scale, (this.bottom - py) / this.scale];
+  }
+}

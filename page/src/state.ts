@@ -1,0 +1,90 @@
+/** What the page shows at present: signals that every part reads, and few functions that change them. */
+
+import { batch, computed, signal } from "@preact/signals";
+import type { Run } from "./data/run";
+
+export const SPEEDS = [1, 10, 60, 600, 3600, 14_400, 86_400];
+export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs"] as const;
+export type Switch = (typeof SWITCHES)[number];
+export const PANELS = ["now", "inspect", "beliefs", "events", "metrics", "layers"] as const;
+export type Panel = (typeof PANELS)[number];
+export type Theme = "auto" | "light" | "dark";
+
+export const runs = signal<Run[]>([]);
+/** The moment that is shown [us since the start]. */
+export const moment = signal(0);
+/** The part of the run that the timeline shows [us]. */
+export const range = signal<[number, number]>([0, 1]);
+export const playing = signal(false);
+export const speed = signal(60);
+export const selected = signal("");
+export const eventKind = signal("");
+export const search = signal("");
+export const shown = signal<ReadonlySet<Switch>>(new Set(["names", "furniture", "ways", "sight", "observations"]));
+export const layer = signal("");
+export const panel = signal<Panel>("now");
+export const belief = signal("");
+export const theme = signal<Theme>("auto");
+export const live = signal(false);
+export const follow = signal(true);
+
+export const run = computed<Run | null>(() => runs.value[0] ?? null);
+/** The part of the runs that can be shown [us]. */
+export const beginUs = computed(() => Math.min(...runs.value.map((entry) => entry.beginUs)));
+export const endUs = computed(() => Math.max(1, ...runs.value.map((entry) => (entry.version.value, entry.endUs))));
+
+const SHORTEST_US = 10e6;
+
+export function goTo(us: number): void {
+  const end = endUs.value;
+  const last = Math.max(beginUs.value, end - (run.value?.clock.stepUs ?? 1));
+  const at = Math.max(beginUs.value, Math.min(last, us));
+  batch(() => {
+    moment.value = at;
+    const [from, to] = range.value;
+    if (at < from || at > to) setRange(at - (to - from) / 2, at + (to - from) / 2);
+  });
+}
+
+export function setRange(from: number, to: number): void {
+  const [begin, end] = [beginUs.value, endUs.value];
+  const whole = end - begin;
+  const length = Math.max(Math.min(SHORTEST_US, whole), Math.min(whole, to - from));
+  const start = Math.max(begin, Math.min(end - length, from));
+  range.value = [start, start + length];
+}
+
+/** Zoom about a moment: a factor below 1 shows less. */
+export function zoom(factor: number, about = moment.value): void {
+  const [from, to] = range.value;
+  setRange(about - (about - from) * factor, about + (to - about) * factor);
+}
+
+export function pan(us: number): void {
+  const [from, to] = range.value;
+  setRange(from + us, to + us);
+}
+
+export function toggle(name: Switch): void {
+  const now = new Set(shown.value);
+  if (!now.delete(name)) now.add(name);
+  shown.value = now;
+}
+
+export function faster(by: 1 | -1): void {
+  const at = SPEEDS.findIndex((entry) => entry >= speed.value);
+  const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, (at < 0 ? SPEEDS.length : at) + by))];
+  speed.value = next ?? speed.value;
+}
+
+export function jump(forward: boolean): void {
+  const event = run.value?.events.next(eventKind.value, moment.value, forward);
+  if (event) goTo(event.us);
+}
+
+export function select(name: string): void {
+  batch(() => {
+    selected.value = name;
+    if (name) panel.value = "inspect";
+  });
+}

@@ -1,0 +1,110 @@
+/** Colours of what is drawn on canvases, in light and in dark. */
+
+import { computed, effect, signal } from "@preact/signals";
+import { theme } from "./state";
+
+export interface Colors {
+  ground: string;
+  panel: string;
+  text: string;
+  quiet: string;
+  line: string;
+  wall: string;
+  furniture: string;
+  furnitureEdge: string;
+  door: string;
+  view: string;
+  viewEdge: string;
+  alarm: string;
+  cursor: string;
+  halo: string;
+  hatch: string;
+}
+
+const LIGHT: Colors = {
+  ground: "#ffffff",
+  panel: "#f6f7f8",
+  text: "#2d3138",
+  quiet: "#5d626a",
+  line: "#d5d8dc",
+  wall: "#3b4048",
+  furniture: "rgba(251,250,247,0.75)",
+  furnitureEdge: "#8b9099",
+  door: "#8a5a2b",
+  view: "rgba(255,210,63,0.42)",
+  viewEdge: "#b98900",
+  alarm: "#c8452f",
+  cursor: "#c8452f",
+  halo: "rgba(255,255,255,0.8)",
+  hatch: "#cfd2d6",
+};
+
+const DARK: Colors = {
+  ground: "#16181c",
+  panel: "#1e2126",
+  text: "#e6e8eb",
+  quiet: "#a4a9b1",
+  line: "#3a3f47",
+  wall: "#aab0b9",
+  furniture: "rgba(22,24,28,0.45)",
+  furnitureEdge: "#858b95",
+  door: "#d49a5c",
+  view: "rgba(255,210,63,0.24)",
+  viewEdge: "#e0b13a",
+  alarm: "#ff7a63",
+  cursor: "#ff7a63",
+  halo: "rgba(22,24,28,0.8)",
+  hatch: "#4a5059",
+};
+
+const query = typeof matchMedia === "function" ? matchMedia("(prefers-color-scheme: dark)") : null;
+const preferred = signal(query?.matches ?? false);
+query?.addEventListener("change", (event) => {
+  preferred.value = event.matches;
+});
+
+export const dark = computed(() => (theme.value === "auto" ? preferred.value : theme.value === "dark"));
+export const colors = computed(() => (dark.value ? DARK : LIGHT));
+
+export function followTheme(): void {
+  effect(() => {
+    document.documentElement.dataset.theme = dark.value ? "dark" : "light";
+  });
+}
+
+type Rgb = [number, number, number];
+
+export function rgb(color: string): Rgb {
+  return [1, 3, 5].map((at) => Number.parseInt(color.slice(at, at + 2), 16)) as Rgb;
+}
+
+/** A colour between two, as `#rrggbb`: 0 is the first. */
+export function mix(one: string, other: string, share: number): string {
+  const [a, b] = [rgb(one), rgb(other)];
+  const parts = a.map((part, i) => Math.round(part + (b[i]! - part) * share));
+  return `#${parts.map((part) => part.toString(16).padStart(2, "0")).join("")}`;
+}
+
+/** A body's colour, legible on the ground: dark ones are lighter in the dark. */
+export function bodyColor(color: string, inDark = dark.value): string {
+  if (!inDark) return color;
+  const [red, green, blue] = rgb(color);
+  const bright = 0.3 * red + 0.59 * green + 0.11 * blue;
+  return bright < 110 ? mix(color, "#ffffff", 0.55) : color;
+}
+
+/** A room's colour on the plan. */
+export function roomColor(pale: string, deep: string, inDark = dark.value): string {
+  return inDark ? mix(deep, DARK.ground, 0.72) : pale;
+}
+
+/** The brighter part of viridis: words are legible over it. */
+const SCALE = ["#2c728e", "#21918c", "#27ad81", "#5ec962", "#aadc32", "#fde725"];
+
+/** The colour of a value between 0 and 1. */
+export function scaleColor(share: number): Rgb {
+  const at = Math.max(0, Math.min(1, share)) * (SCALE.length - 1);
+  const i = Math.min(SCALE.length - 2, Math.floor(at));
+  const [a, b] = [rgb(SCALE[i]!), rgb(SCALE[i + 1]!)];
+  return a.map((part, k) => Math.round(part + (b[k]! - part) * (at - i))) as Rgb;
+}

@@ -1,0 +1,43 @@
+import { describe, expect, it } from "vitest";
+import { Clock, durationText } from "../src/data/clock";
+
+const clock = new Clock("2026-01-05T06:00:00", 1e6, 10 * 86_400);
+
+describe("a clock", () => {
+  it("writes local time, whatever the time zone of the browser", () => {
+    expect(clock.text(30e6)).toBe("Mon 5 Jan 06:00:30");
+    expect(clock.iso(0)).toBe("2026-01-05T06:00:00");
+  });
+
+  it("counts days by date", () => {
+    expect([clock.day(0), clock.day(18 * 3600e6 - 1), clock.day(18 * 3600e6)]).toEqual([1, 1, 2]);
+    expect(clock.dayStart(1)).toBe(-6 * 3600e6);
+  });
+
+  it.each([
+    ["day 3 18:30", (2 * 24 + 12.5) * 3600e6],
+    ["2026-01-05 07:00", 3600e6],
+    ["2026-01-05T07:00:01", 3601e6],
+    ["step 12", 12e6],
+    ["day 2", 18 * 3600e6],
+  ])("reads %s", (text, us) => {
+    expect(clock.parse(text)).toBe(us);
+  });
+
+  it("takes a time of day as that of the day shown", () => {
+    expect(clock.parse("08:15", 20 * 3600e6)).toBe((18 + 8.25) * 3600e6);
+  });
+
+  it.each(["", "noon", "day 99", "25:00", "2027-01-01"])("reads no moment from '%s'", (text) => {
+    expect(clock.parse(text)).toBeNull();
+  });
+
+  it("writes durations in few words", () => {
+    expect([durationText(5e6), durationText(95e6), durationText(3660e6), durationText(90_000e6)]).toEqual([
+      "5 s",
+      "1 min 35 s",
+      "1 h 1 min",
+      "1 d 1 h",
+    ]);
+  });
+});

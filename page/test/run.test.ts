@@ -1,0 +1,105 @@
+import { beforeAll, describe, expect, it } from "vitest";
+import { AWAY, roomOf } from "../src/data/rooms";
+import type { Run } from "../src/data/run";
+import { Walls } from "../src/data/sight";
+import { differences, timeByValue, valueAt } from "../src/data/stretches";
+import { TURN } from "../src/data/tracks";
+import { comparisonAt } from "../src/plan/beliefs";
+import { expected, held, wholeRun } from "./fixture";
+
+let run: Run;
+
+beforeAll(async () => {
+  run = await wholeRun();
+});
+
+describe("a stored run", () => {
+  it("is read without a problem", () => {
+    expect(run.problems.value).toEqual([]);
+  });
+
+  it.each(Object.keys(expected.poses))("has the poses of %s that Python rebuilds, to the last unit", (name) => {
+    const track = run.tracks.get(name)!;
+    const said = expected.poses[name]!;
+    expected.steps.forEach((step, i) => {
+      const pose = track.poseAt(step * run.clock.stepUs);
+      expect(pose.x).toBe(run.home.units(said.x[i]!, 0));
+      expect(pose.y).toBe(run.home.units(said.y[i]!, 1));
+      expect(pose.heading).toBe(Math.round((said.heading[i]! * TURN) / (2 * Math.PI)) % TURN);
+      expect(pose.away).toBe(said.away[i]);
+    });
+  });
+
+  it.each(Object.keys(expected.poses))("has the rooms of %s at the steps and in the lane", (name) => {
+    const track = run.tracks.get(name)!;
+    expected.steps.forEach((step, i) => {
+      const us = step * run.clock.stepUs;
+      const room = expected.poses[name]!.room[i];
+      expect(roomOf(track, run.home, us)).toBe(room);
+      expect(valueAt(run.roomsOf(name), us)).toBe(room);
+    });
+  });
+
+  it("has the visible regions that Python finds", () => {
+    const walls = new Walls(held.walls[openWalls()]!);
+    for (const region of expected.regions) {
+      const outline = walls.outline(run.home.units(region.x, 0), run.home.units(region.y, 1));
+      expect(areaOf(outline) / run.facts.home.units_per_m ** 2).toBeCloseTo(region.area, 9);
+    }
+  });
+
+  it("sees nothing from inside a wall", () => {
+    expect(new Walls(held.walls[0]!).outline(-50, -50)).toEqual([]);
+  });
+
+  it("finds observations at each step of a stretch in which somebody was noticed", async () => {
+    const lane = run.sightings.find((entry) => entry.user === "ana")!;
+    const step = lane.first[0]!;
+    await run.observations!.load(step);
+    expect(run.observations!.at(step)!.map((row) => row.user)).toContain("ana");
+  });
+
+  it("knows doors before and after they move", () => {
+    const first = run.events.rows.find((row) => row.entity === "bath_door" && row.event === "shut")!;
+    expect(run.doorOpen("bath_door", first.us - 1)).toBe(true);
+    expect(run.doorOpen("bath_door", first.us)).toBe(false);
+    expect(run.doorOpen("office_door", 0)).toBe(false);
+  });
+
+  it("compares beliefs with the share of time until now", () => {
+    const comparison = comparisonAt(run, run.clock.endUs - 1)!;
+    const sum = (values: Float64Array): number => values.slice(0, -1).reduce((total, part) => total + part, 0);
+    expect(sum(comparison.believed)).toBeCloseTo(1, 6);
+    expect(sum(comparison.truth)).toBeCloseTo(1, 6);
+  });
+
+  it("reads its layers", async () => {
+    const layer = await (await run.layer("explored.astro")).at(run.clock.steps);
+    expect([layer!.low, layer!.high]).toEqual([0, 1]);
+  });
+
+  it("differs from itself nowhere", () => {
+    expect(differences(run.roomsOf("ana"), run.roomsOf("ana")).from).toEqual([]);
+  });
+
+  it("counts all of its time", () => {
+    const time = timeByValue(run.roomsOf("ana"), run.facts.home.rooms.length, run.clock.endUs);
+    expect(time.reduce((sum, part) => sum + part, 0)).toBe(run.clock.endUs);
+    expect(AWAY).toBe(-1);
+  });
+});
+
+/** The arrangement in which every door is open: the mesh with the fewest wall edges. */
+function openWalls(): number {
+  const walls = held.walls.map((entry) => entry.neighbors.filter((neighbor) => neighbor < 0).length);
+  return walls.indexOf(Math.min(...walls));
+}
+
+function areaOf(outline: readonly number[]): number {
+  let doubled = 0;
+  for (let i = 0; i < outline.length; i += 2) {
+    const k = (i + 2) % outline.length;
+    doubled += outline[i]! * outline[k + 1]! - outline[k]! * outline[i + 1]!;
+  }
+  return doubled / 2;
+}

@@ -1,0 +1,35 @@
+#include "legs.hpp"
+
+#include <cmath>
+#include <cstdlib>
+
+namespace fleet2d {
+
+Moment Legs::turn(Moment now, i64 headings, f64 turn_rate) {
+    const i64 sign = headings > 0 ? 1 : -1;
+    for (i64 left = std::abs(headings); left > 0;) {
+        const i64 part = std::min(left, TURN / 3);
+        left -= part;
+        now.time = later(now.time, static_cast<f64>(part) * 1e6 / turn_rate);
+        now.heading = (now.heading + sign * part) & (TURN - 1);
+        mark(now);
+    }
+    return now;
+}
+
+Moment Legs::walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate) {
+    const auto timed = time_route(route, now.time, now.heading, speed, turn_rate);
+    const View<const i64, 2> rows = timed;
+    for (i64 i = 1; i < rows.size(); ++i) mark({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3), 0});
+    const View<const i64> last = rows[rows.size() - 1];
+    return {last[0], last[1], last[2], last[3], now.away};
+}
+
+Array<i64, 2> Legs::rows() const {
+    auto made = Array<i64, 2>::empty({size(), 5});
+    i64* row = made.data();
+    for (const auto& numbers : rows_) row = std::copy(numbers.begin(), numbers.end(), row);
+    return made;
+}
+
+}  // namespace fleet2d

@@ -1,0 +1,46 @@
+// The breakpoints of a plan, gathered while it is built leg by leg.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "motion.hpp"
+
+namespace fleet2d {
+
+// Where a plan has got to.
+struct Moment {
+    i64 time;     // us
+    i64 x, y;     // lattice units
+    i64 heading;  // 1/4096 turn
+    i64 away;     // 1 = not at home
+};
+
+class Legs {
+public:
+    // A breakpoint.
+    void mark(const Moment& now) { rows_.push_back({now.time, now.x, now.y, now.heading, now.away}); }
+
+    // Turn on the spot by a number of headings, counter-clockwise if positive; at most a third of a turn between
+    // two breakpoints, so that the shorter way is the one meant. Returns where it ends.
+    Moment turn(Moment now, i64 headings, f64 turn_rate);
+
+    // Walk along a route (n, 2), as `time_route`, at home. Returns where it ends.
+    Moment walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate);
+
+    i64 size() const { return static_cast<i64>(rows_.size()); }
+    // All breakpoints, (n, 5).
+    Array<i64, 2> rows() const;
+    // One column of them.
+    template <class T>
+    Array<T> column(std::size_t number) const {
+        auto made = Array<T>::empty({size()});
+        for (i64 i = 0; i < size(); ++i) made[i] = static_cast<T>(rows_[static_cast<std::size_t>(i)][number]);
+        return made;
+    }
+
+private:
+    std::vector<std::array<i64, 5>> rows_;  // time, x, y, heading, away
+};
+
+}  // namespace fleet2d

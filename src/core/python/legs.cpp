@@ -1,0 +1,86 @@
+#include "../legs.hpp"
+
+#include "arrays.hpp"
+#include "motion.hpp"
+#include "subjects.hpp"
+
+namespace fleet2d {
+
+namespace {
+
+constexpr i64 MOST = i64{1} << 29;  // coordinates and headings: their squares fit in 64 bits
+using Row = std::tuple<i64, i64, i64, i64, i64>;
+
+Moment checked(i64 time, i64 x, i64 y, i64 heading, i64 away) {
+    require(-LATEST <= time && time <= LATEST, "time must be at most 2**61 us");
+    for (const i64 number : {x, y, heading}) require(-MOST < number && number < MOST, "a pose must be within 2**29 of 0");
+    require(away == 0 || away == 1, "away must be 0 or 1");
+    return {time, x, y, heading, away};
+}
+
+void add_checked(Legs& legs, View<const i64, 2> rows) {
+    require(rows.shape[1] == 5, "rows must be (n, 5)");
+    for (i64 i = 0; i < rows.size(); ++i) {
+        legs.mark(checked(rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3), rows(i, 4)));
+    }
+}
+
+Row plain(const Moment& now) {
+    return {now.time, now.x, now.y, now.heading, now.away};
+}
+
+}  // namespace
+
+void bind_legs(nb::module_& m) {
+    nb::class_<Legs>(m, "Legs", "The breakpoints of a plan, gathered while it is built leg by leg.")
+        .def(nb::init<>())
+        .def("__len__", &Legs::size)
+        .def(
+            "mark",
+            [](Legs& self, i64 time, i64 x, i64 y, i64 heading, i64 away) {
+                self.mark(checked(time, x, y, heading, away));
+            },
+            "time"_a, "x"_a, "y"_a, "heading"_a, "away"_a,
+            "Add a breakpoint: time [us], x, y [lattice], heading [1/4096 turn], away.")
+        .def("add", &add_checked, "rows"_a, "Add breakpoints, int64 (n, 5).")
+        .def(
+            "turn",
+            [](Legs& self, i64 time, i64 x, i64 y, i64 heading, i64 away, i64 headings, f64 turn_rate) {
+                require(-(i64{1} << 40) < headings && headings < i64{1} << 40, "headings must be within 2**40 of 0");
+                require(turn_rate > 0, "turn_rate must be above 0");
+                return plain(self.turn(checked(time, x, y, heading, away), headings, turn_rate));
+            },
+            "time"_a, "x"_a, "y"_a, "heading"_a, "away"_a, "headings"_a, "turn_rate"_a,
+            R"(Turn on the spot by a number of headings, counter-clockwise if positive.
+
+Returns:
+    time, x, y, heading, away when that is done.)")
+        .def(
+            "walk",
+            [](Legs& self, i64 time, i64 heading, View<const i64, 2> route, f64 speed, f64 turn_rate) {
+                require(route.size() > 0 && route.shape[1] == 2, "route must be (n, 2), one point or more");
+                require(all_in_range(route, -MOST, MOST), "route must be within 2**29 of 0");
+                require(speed > 0 && turn_rate > 0, "speed and turn_rate must be above 0");
+                return plain(self.walk(checked(time, 0, 0, heading, 0), route, speed, turn_rate));
+            },
+            "time"_a, "heading"_a, "route"_a, "speed"_a, "turn_rate"_a,
+            R"(Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
+
+Returns:
+    time, x, y, heading, away when that is done.)")
+        .def("rows", &Legs::rows, "Return all breakpoints: int64 (n, 5).")
+        .def(
+            "track",
+            [](const Legs& self) {
+                return std::make_tuple(self.column<i64>(0), self.column<i64>(1), self.column<i64>(2),
+                                       self.column<i64>(3), self.column<u8>(4));
+            },
+            "Return all breakpoints by column: time, x, y, heading, int64 (n,), and away, uint8 (n,).")
+        .def("__getstate__", &Legs::rows)
+        .def("__setstate__", [](Legs& self, View<const i64, 2> rows) {
+            new (&self) Legs();
+            add_checked(self, rows);
+        });
+}
+
+}  // namespace fleet2d

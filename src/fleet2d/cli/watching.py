@@ -1,0 +1,99 @@
+"""Commands to watch runs with: view, and the HTML file of `export`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleet2d.cli.arguments import split
+from fleet2d.errors import InputError, RunDirectoryError
+
+
+def view(
+    what: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="RUN_DIR...|SCENARIO.yaml [KEY.PATH=VALUE]...",
+            help="Stored runs, up to four; or a scenario that runs while it is watched.",
+        ),
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Whether to open the browser.")] = True,
+    seed: Annotated[int | None, typer.Option(help="Of a scenario: its seed.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Of a scenario: directory of the run.")] = None,
+) -> None:
+    """Show runs in the browser, on this machine only; end it with Ctrl-C."""
+    names = list(what or [])
+    directories = [Path(name) for name in names]
+    if names and all(path.is_dir() for path in directories):
+        if seed is not None or out is not None:
+            raise InputError("--seed and --out are for a scenario, not for stored runs")
+        _view_runs(directories, port, browser=browser)
+        return
+    scenario, overrides = split(names)
+    if scenario is not None and scenario.endswith("/"):
+        raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
+    from fleet2d.viewer.live import watch_scenario
+
+    watch_scenario(
+        scenario,
+        overrides,
+        seed=seed,
+        out=out,
+        port=port,
+        open_browser=browser,
+        announce=_announce,
+    )
+
+
+def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
+    from fleet2d.artifacts.manifest import FILE_NAME
+    from fleet2d.viewer.serve import MOST_RUNS, serve
+
+    if len(directories) > MOST_RUNS:
+        raise InputError(
+            f"{len(directories)} runs don't fit side by side: give at most {MOST_RUNS}"
+        )
+    for path in directories:
+        if not (path / FILE_NAME).exists():
+            raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")
+    serve(directories, port=port, open_browser=browser, announce=_announce)
+
+
+def _announce(address: str) -> None:
+    typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")
+
+
+def film(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[Path | None, typer.Option(help="Film to write: .mp4, .gif or .webp.")] = None,
+    begin: Annotated[
+        str | None, typer.Option("--from", help="Where it begins, such as 'day 3'.")
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
+    speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
+    height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
+) -> None:
+    """Make a film of a stretch of a stored run."""
+    from fleet2d.artifacts.reader import open_run
+    from fleet2d.viewer.film import write_film
+    from fleet2d.viewer.moments import steps_of
+
+    run = open_run(directory)
+    first, last = steps_of(run, begin, end)
+    target = out or directory / "film.mp4"
+    frames = write_film(run, target, first, last, speed=speed, height=height)
+    typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
+
+
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[Path | None, typer.Option(help="HTML file to write.")] = None,
+) -> None:
+    """Write a report of a stored run: what ran, metrics, figures, how to run it again."""
+    from fleet2d.artifacts.reader import open_run
+    from fleet2d.viewer.report import write_report
+
+    target = out or directory / "report.html"
+    write_report(open_run(directory), target)
+    typer.echo(target)

@@ -1,0 +1,370 @@
+"""Steering a simulation: looking at its state, stepping it, and doing things to it from outside."""
+
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+from pydantic import ValidationError
+
+from fleet2d.algorithms.algorithm import Algorithm
+from fleet2d.artifacts.reader import Run
+from fleet2d.clock import Clock, next_time
+from fleet2d.engine.interventions import Change, Decide, Drive, Intervention, Put, Replan
+from fleet2d.engine.state import State
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.plan import Plan
+from fleet2d.errors import InputError, ScenarioError
+from fleet2d.events import Event, EventKind, Listener
+from fleet2d.floorplan.change import HomeChange
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels.headings import TURN, in_radians
+from fleet2d.problems import did_you_mean
+from fleet2d.scenario.model import Scenario
+from fleet2d.units import parse_duration
+
+
+class Steering(ABC):
+    """What scripts, tests and outside minds may see of a simulation, and do to it.
+
+    Attributes:
+        scenario: What is simulated.
+        clock: Its steps.
+    """
+
+    scenario: Scenario
+    clock: Clock
+    _state: State
+    _run: Run | None
+
+    @abstractmethod
+    def _run_to(
+        self, end: int, on_progress: Callable[[Any], None] | None = None, spans: int | None = None
+    ) -> None:
+        """Simulate up to a step, or so many spans."""
+
+    # State
+
+    @property
+    def step(self) -> int:
+        """The next step to simulate; 0 at first."""
+        return self._state.bodies.step
+
+    @property
+    def home(self) -> Home:
+        """The home, as it is at present."""
+        return self._state.home
+
+    @property
+    def time(self) -> datetime:
+        """The local time of the next step."""
+        return self.clock.time(self.step)
+
+    @property
+    def done(self) -> bool:
+        """Whether all steps are simulated."""
+        return self.step >= self.clock.steps
+
+    @property
+    def state(self) -> dict[str, dict[str, Any]]:
+        """Where everybody is at the next step: x, y [m], heading [rad], room, away.
+
+        And of doors whether they are open and locked, of sensors whether they are on.
+        """
+        bodies = {actor.name: self._state_of(actor) for actor in self._state.actors}
+        doors = {
+            name: {"open": i not in self.home.shut, "locked": i in self.home.locked}
+            for i, name in enumerate(self._state.changes.names)
+        }
+        if self._state.sensors.names:
+            self._state.settle(self.step)
+        return bodies | doors | {name: {"on": on} for name, on in self._state.sensors.on.items()}
+
+    @property
+    def actors(self) -> dict[str, Actor]:
+        """Everybody in the run, by name: configuration, behaviors and plan."""
+        return {actor.name: actor for actor in self._state.actors}
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """The newest output of each algorithm, by name."""
+        return dict(self._state.learners.outputs)
+
+    @property
+    def algorithms(self) -> dict[str, Algorithm]:
+        """The algorithms in the run, by name: configuration, and what they have learned."""
+        return {
+            learner.name: learner.component
+            for learner in self._state.learners.all
+            if isinstance(learner.component, Algorithm)
+        }
+
+    # Running
+
+    def advance(self, steps: int | Mapping[str, Plan] = 1) -> None:
+        """Simulate so many steps, or up to the end of the run; or take decisions from outside.
+
+        Args:
+            steps: How many; or a plan for each body that is `pending`, from `plan`: then the run
+                goes on up to the next step at which a body that is driven has to decide.
+
+        Raises:
+            InputError: The number is negative, the run is finished, or a body that is driven has
+                no plan.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 h", seed=4)
+            >>> simulation.drive("astro")
+            >>> while simulation.pending():
+            ...     plan = simulation.plan("astro").go_to("kitchen").stay(timedelta(minutes=20))
+            ...     simulation.advance({"astro": plan})
+            >>> simulation.done
+            True
+        """
+        if isinstance(steps, Mapping):
+            self._take_decisions(steps)
+            return
+        steps = operator.index(steps)
+        if steps < 0:
+            raise InputError(f"advance({steps}): time only goes forward; branch a copy instead")
+        self._run_to(min(self.clock.steps, self.step + steps))
+
+    def run_until(
+        self,
+        when: int | str | datetime | timedelta | None = None,
+        *,
+        event: str | None = None,
+        entity: str | None = None,
+        timeout: str | timedelta | None = None,
+    ) -> Event | None:
+        """Simulate up to a step, a local time or an event; the step after is next then.
+
+        Args:
+            when: A step, a local time, a time since the start, or a time of day ("19:00": the next
+                time that it is).
+            event: A kind of event, as the table of events has it, instead.
+            entity: The body or object that it has to happen to; None: any.
+            timeout: How long to wait for the event at most; None: up to the end of the run.
+
+        Returns:
+            The event, or None if there was none, or none was waited for.
+
+        Raises:
+            InputError: The time is past, the run is finished, or there is no such event or body.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.run_until("19:00")
+            >>> simulation.time.hour
+            19
+            >>> simulation.run_until(event="user_seen", entity="astro", timeout="12 h").detail
+            'ana'
+        """
+        if event is None:
+            step = self._step_of(when)
+            if step < self.step:
+                raise InputError(
+                    f"run_until(step {step}): it is step {self.step} already, {self.time}; branch a"
+                    " copy before that"
+                )
+            self._run_to(min(self.clock.steps, step))
+            return None
+        return self._run_until_event(event, entity, timeout)
+
+    def _step_of(self, when: int | str | datetime | timedelta | None) -> int:
+        if when is None:
+            raise InputError("run_until(): say a time, or event=…")
+        if isinstance(when, str):
+            when = next_time(when, self.time)
+        if isinstance(when, datetime):
+            when = when - self.clock.start
+        if isinstance(when, timedelta):
+            return self.clock.step_at_or_after(when // timedelta(microseconds=1))
+        return operator.index(when)
+
+    def _run_until_event(
+        self, event: str, entity: str | None, timeout: str | timedelta | None
+    ) -> Event | None:
+        state, end = self._state, self.clock.steps
+        known = {*EventKind, *(n for a in state.actors for b in a.behaviors for n in b.records)}
+        _check_name("event", event, known)
+        if entity is not None:
+            _check_name("entity", entity, [*self.actors, *self.scenario.objects])
+        if timeout is not None:
+            wait = parse_duration(timeout) if isinstance(timeout, str) else timeout
+            end = min(
+                end, self.step + self.clock.step_at_or_after(wait // timedelta(microseconds=1))
+            )
+        state.wait_for(frozenset({event}))
+        try:
+            while self.step < end:
+                before = self.step
+                self._run_to(end, spans=1)
+                for found in state.events.since(before):
+                    if found.event == event and entity in (None, found.entity):
+                        return found
+        finally:
+            state.wait_for(frozenset())
+        return None
+
+    def events(self, since: int = 0) -> list[Event]:
+        """Return what happened from a step on, up to the present one, in order.
+
+        Raises:
+            InputError: Events of that step are no longer kept: read the table `events`.
+        """
+        self._state.settle(self.step)
+        return self._state.events.since(since)
+
+    def listen(self, function: Callable[[Sequence[Event]], None]) -> None:
+        """Call a function with what happens, as it becomes known: not always in order of step."""
+        self._state.events.sinks.append(Listener(function))
+
+    # Interventions: each is kept in the manifest, and done again by `reproduce`.
+
+    def replan(self, name: str) -> None:
+        """Let a body's behaviors decide anew at the present step, whatever it is doing.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+        """
+        self._intervene(Replan(step=self.step, entity=self._body(name).name))
+
+    def change(self, change: HomeChange | None = None, /, **what: Any) -> None:
+        """Change the home at the present step: ``simulation.change(shut="bath_door")``.
+
+        Args:
+            change: The change; or
+            what: its keys, as in the scenario's `changes`.
+
+        Raises:
+            ScenarioError: The keys are no change.
+            ComponentError: There is nothing of that name.
+        """
+        try:
+            asked = HomeChange(**what) if change is None else change
+        except ValidationError as error:
+            raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
+        self._state.changes.check(asked, "a script")
+        self._intervene(Change(step=self.step, change=asked))
+
+    def put(self, name: str, place: Any, heading_deg: float | None = None) -> None:
+        """Put a body somewhere at the present step, as if it were carried; it decides anew there.
+
+        Args:
+            name: The body.
+            place: A room, a list of kinds of rooms, or a point (x, y) [m].
+            heading_deg: Where it faces, counter-clockwise from +x; None: as before.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+            PlacementError: There is no such place, or its body doesn't fit there.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.put("ana", "kitchen")
+            >>> simulation.advance()
+            >>> simulation.state["ana"]["room"].startswith("kitchen")
+            True
+        """
+        actor = self._body(name)
+        x, y = actor.find_anywhere(place, self.step * self.clock.step_us, "put")
+        heading = actor.state.heading
+        if heading_deg is not None:
+            heading = round(heading_deg / 360 * TURN) % TURN
+        self._intervene(Put(step=self.step, entity=name, x=x, y=y, heading=heading))
+
+    def drive(self, name: str) -> None:
+        """Take the decisions of a body into one's own hands: see `pending` and `advance`.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+        """
+        row = list(self.actors).index(self._body(name).name)
+        self._intervene(Drive(step=self.step, entity=name))
+        self._state.driven.add(row)
+        self._state.bodies.ask_at[row] = self.step
+
+    def pending(self) -> list[str]:
+        """Return the bodies that are driven, and have to decide at the present step."""
+        state = self._state
+        if self.done:
+            return []
+        due = set(state.bodies.due(self.step))
+        return [state.actors[row].name for row in sorted(due & state.driven)]
+
+    def plan(self, name: str) -> Plan:
+        """Return a plan that begins here and now, to be filled and handed to `advance`.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+        """
+        return Plan(self._body(name), self.step)
+
+    def decide(self, name: str, plan: Plan) -> None:
+        """Let a driven body follow a plan from the present step on; time does not go on.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+            InputError: The body isn't driven.
+        """
+        row = list(self.actors).index(self._body(name).name)
+        if row not in self._state.driven:
+            raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
+        self._intervene(Decide(step=self.step, entity=name, plan=plan.data()))
+
+    def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
+        """Follow plans from outside up to the next step at which a driven body has to decide."""
+        missing = [name for name in self.pending() if name not in plans]
+        if missing:
+            raise InputError(
+                f"advance(): {missing[0]} has to decide now, and there is no plan for it"
+            )
+        for name, plan in plans.items():
+            self.decide(name, plan)
+        while not self.done:
+            self._run_to(self.clock.steps, spans=1)
+            if self.pending():
+                return
+
+    def _body(self, name: str) -> Actor:
+        actors = self.actors
+        if name not in actors:
+            raise ScenarioError(
+                f"there is nobody named {name!r}{did_you_mean(name, actors)}"
+                f" There are: {', '.join(actors)}"
+            )
+        return actors[name]
+
+    def _intervene(self, intervention: Intervention) -> None:
+        if self._run is not None:
+            raise InputError("the run is finished: nothing can be done to it any more")
+        self._state.intervene(intervention)
+
+    def _state_of(self, actor: Actor) -> dict[str, Any]:
+        state = actor.state
+        x, y = self.home.plan.lattice.to_metres([state.x, state.y]).tolist()
+        room = None if state.away else self.home.plan.room_at(x, y)
+        return {
+            "x": x,
+            "y": y,
+            "heading": in_radians(state.heading),
+            "room": room.name if room else None,
+            "away": bool(state.away),
+        }
+
+
+def _check_name(what: str, name: str, known: Iterable[str]) -> None:
+    """Refuse a name that there isn't."""
+    names = list(known)
+    if name not in names:
+        raise InputError(
+            f"there is no {what} {name!r}{did_you_mean(name, names)} There are:"
+            f" {', '.join(map(str, names))}"
+        )

@@ -1,0 +1,82 @@
+"""Furniture as places: "sofa" is where a body uses the sofa, or stands before it."""
+
+from typing import TYPE_CHECKING
+
+from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, parse_place
+from fleet2d.streams import Draws
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.floorplan.objects import PlacedObject
+    from fleet2d.floorplan.plan import Room
+
+
+def furniture_of(actor: "Actor", place: RoomChoice | Point) -> "PlacedObject | None":
+    """Return the piece of furniture that a place names, if it names one and no room before it.
+
+    Of several of a kind, a body has its own for the whole run, among those that it gets to.
+    """
+    if is_point(place):
+        return None
+    rooms = {name for room in actor.reachable_rooms() for name in (room.name, room.type)}
+    for name in place:
+        if name == ANY or name in rooms:
+            return None
+        pieces = [
+            thing
+            for thing in actor.home.objects
+            if name in (thing.name, thing.type) and _gets_to(actor, thing)
+        ]
+        if pieces:
+            return Draws(actor.stream(f"object of {name}"), 0).choice(pieces)
+    return None
+
+
+def room_of_furniture(actor: "Actor", place: RoomChoice | Point) -> "list[Room]":
+    """Return the room from which the furniture of a place is used; none if it names none."""
+    thing = furniture_of(actor, place)
+    if thing is None:
+        return []
+    plan = actor.home.plan
+    room = plan.room_at(*plan.lattice.to_metres(actor.place_at(thing, 0).approach).tolist())
+    return [] if room is None else [actor.home.rooms[room.index]]
+
+
+def seat_at(actor: "Actor", place: object) -> "PlacedObject | None":
+    """Return the furniture that a person sits on, lies on or stands at for a place, if any."""
+    return furniture_of(actor, parse_place(place)) if actor.entity.uses_furniture else None
+
+
+def stop_at(actor: "Actor", place: RoomChoice | Point) -> tuple[int, int]:
+    """Return the lattice point at which a body stops for a place.
+
+    A point is that itself, a room the middle of it, furniture where one steps up to it.
+
+    Raises:
+        PlacementError: There is no such place, or it can't be reached.
+    """
+    if is_point(place):
+        return actor.point(place)  # type: ignore[arg-type]
+    thing = furniture_of(actor, place)
+    if thing is not None:
+        return actor.place_at(thing, 0).approach
+    return actor.middle(actor.rooms(place)[0])  # type: ignore[arg-type]
+
+
+def stops_at(actor: "Actor", place: RoomChoice | Point) -> list[tuple[int, int]]:
+    """Return all lattice points at which a body stops for a place: one in each room of a kind."""
+    if is_point(place) or furniture_of(actor, place) is not None:
+        return [stop_at(actor, place)]
+    return [actor.middle(room) for room in actor.rooms(place)]  # type: ignore[arg-type]
+
+
+def _gets_to(actor: "Actor", thing: "PlacedObject") -> bool:
+    """Tell whether a body gets to the first place at which a piece of furniture is used."""
+    if not thing.uses:
+        return False
+    x, y = actor.place_at(thing, 0).approach
+    use = thing.uses[0]
+    at = actor.home.plan.lattice.to_lattice(use.approach or (use.x, use.y)).tolist()
+    # From nearby if that is too tight, but not from another room behind a wall.
+    far = actor.home.plan.lattice.units_per_m
+    return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= far * far)

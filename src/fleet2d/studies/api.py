@@ -1,0 +1,169 @@
+"""Studies from Python: `fleet2d.study` and `fleet2d.map_runs`."""
+
+import pickle
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+from fleet2d.errors import ComponentError, InputError
+from fleet2d.studies.catalogue import Changed
+from fleet2d.studies.driver import RunOptions, check_study, run_study
+from fleet2d.studies.execution import Executor, Lost, SerialExecutor, cores
+from fleet2d.studies.jobs import FunctionJob
+from fleet2d.studies.local import LocalExecutor
+from fleet2d.studies.progress import observing
+from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.record import Task
+from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.specification import read_specification
+
+if TYPE_CHECKING:
+    from fleet2d.artifacts.reader import Run
+    from fleet2d.scenario.model import Scenario
+
+Result = TypeVar("Result")
+ExecutorName = Literal["local", "ray", "serial"]
+
+
+def study(
+    source: str | Path | Mapping[str, Any],
+    out: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    executor: ExecutorName | Executor = "local",
+    fail_fast: bool = False,
+    changed: Changed | None = None,
+) -> Study:
+    """Run a study, or what is missing of it, and open it.
+
+    Args:
+        source: A study file, or the same as a mapping.
+        out: A folder, or a location like s3://bucket/study; None: studies/NAME.
+        workers: Processes at a time; None: one per core.
+        executor: Where they run: `local`, `ray`, `serial` (in this process), or one of your own.
+        fail_fast: End with the first variant that fails.
+        changed: What to do with results of other code or scenarios: `redo` or `keep`; None
+            refuses to mix them.
+
+    Raises:
+        InputError: Something is wrong, or the folder holds results that don't belong.
+        ArtifactError: Results can't be written; what is finished is kept.
+
+    Example:
+        >>> import fleet2d
+        >>> speeds = {"robots.astro.speed": [0.3, 0.6]}
+        >>> base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+        >>> fleet2d.study({"base": base, "axes": speeds}, out="speeds")  # doctest: +SKIP
+        <Study speeds: 2 of 2 variants complete>
+    """
+    specification = read_specification(source)
+    location = out or default_location(specification.name)
+    with observing(show=sys.stderr.isatty()) as observer:
+        options = RunOptions(fail_fast, changed, observer)
+        run_study(check_study(specification), location, make_executor(executor, workers), options)
+    return open_study(location)
+
+
+def map_runs(
+    function: "Callable[[Run], Result]",
+    scenarios: "Iterable[str | Path | Mapping[str, Any] | Scenario]",
+    *,
+    workers: int | None = None,
+    executor: ExecutorName | Executor = "local",
+) -> list[Result]:
+    """Run scenarios in processes of their own, and return what a function makes of each run.
+
+    Args:
+        function: Called with each run where it was run; what it returns is sent back. A function
+            of a script or a notebook, or a lambda, wants the package cloudpickle.
+        scenarios: The scenarios, as `fleet2d.run` takes them, each with a seed.
+        workers: Processes at a time; None: one per core.
+        executor: Where they run.
+
+    Returns:
+        The results in the order of the scenarios.
+
+    Raises:
+        InputError: A scenario is wrong, or the function can't be sent.
+        Exception: What the function raises.
+
+    Example:
+        >>> import fleet2d, operator
+        >>> hours = [fleet2d.load_scenario("simulation.duration=1 h", seed=s) for s in range(2)]
+        >>> digests = fleet2d.map_runs(operator.attrgetter("digest"), hours)  # doctest: +SKIP
+    """
+    listed = tuple(_portable(scenario) for scenario in scenarios)
+    tasks = Schedule(Task(i, i, "", "") for i in range(len(listed)))
+    results: dict[int, Result] = {}
+    if not listed:
+        return []
+    job = FunctionJob(pickled(function), listed)
+    events = make_executor(executor, workers).run(job, tasks)
+    try:
+        for event in events:
+            if isinstance(event, Lost):
+                raise ComponentError(f"scenario {event.task.index}: {event.reason}")
+            succeeded, value = pickle.loads(event.payload)  # noqa: S301 - from our own workers
+            if not succeeded:
+                value.add_note(f"in scenario {event.task.index}")
+                raise value
+            results[event.task.index] = value
+    finally:
+        events.close()
+    return [results[i] for i in range(len(listed))]
+
+
+def make_executor(executor: ExecutorName | Executor, workers: int | None = None) -> Executor:
+    """Return an executor by its name.
+
+    Raises:
+        InputError: There is none of that name, or its package is missing.
+    """
+    if not isinstance(executor, str):
+        return executor
+    if executor == "local":
+        return LocalExecutor(workers or cores())
+    if executor == "serial":
+        return SerialExecutor()
+    if executor == "ray":
+        from fleet2d.studies.ray_executor import RayExecutor
+
+        return RayExecutor(workers)
+    raise InputError(f"there is no executor {executor!r}: give local, ray or serial")
+
+
+def default_location(name: str) -> str:
+    """Return where a study of a name is stored: studies/NAME."""
+    plain = "".join(c if c.isalnum() or c in "_-." else "-" for c in name).strip(".-")
+    return str(Path("studies") / (plain or "study"))
+
+
+def pickled(function: Callable[..., Any]) -> bytes:
+    """Return a function as bytes that another process can read.
+
+    Raises:
+        InputError: It can't be sent.
+    """
+    is_importable = getattr(function, "__module__", "__main__") != "__main__"
+    try:
+        if is_importable:
+            return pickle.dumps(function)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        pass
+    try:
+        import cloudpickle
+    except ImportError:
+        raise InputError(
+            f"{function!r} can't be sent to other processes: put it into a module, or"
+            ' pip install "fleet2d[study]"'
+        ) from None
+    data: bytes = cloudpickle.dumps(function)
+    return data
+
+
+def _portable(scenario: Any) -> Any:
+    """Return a scenario as plain data, which any process reads alike."""
+    from fleet2d.scenario.model import load_scenario
+
+    return load_scenario(scenario).resolved()

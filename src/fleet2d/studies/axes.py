@@ -1,0 +1,385 @@
+"""The kinds of axes of a study; each turns its keys into choices."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.errors import ScenarioError
+from fleet2d.paths import folder_of
+from fleet2d.problems import did_you_mean, problem
+from fleet2d.studies.choice import Choice, Label, key_path, label_values
+from fleet2d.studies.sampling import Method, Parameter, draw, rounded
+
+FLOORPLAN_SUFFIXES = (".json", ".geojson", ".yaml", ".yml")
+
+
+def _texts(value: Any) -> tuple[Any, ...]:
+    """Return one text or a list of them as a tuple; each keeps the folder it was written in."""
+    texts = (value,) if isinstance(value, str | Path) else value
+    if not isinstance(texts, list | tuple) or not all(isinstance(t, str | Path) for t in texts):
+        raise problem(f"found {value!r}; a text, or a list of texts, is wanted")
+    return tuple(texts)
+
+
+Texts = Annotated[Any, BeforeValidator(_texts)]
+
+
+class Axis(Settings):
+    """Base of the axes.
+
+    Attributes:
+        is_population: Whether its values stand for a population (homes, people), over which
+            answers take their intervals.
+    """
+
+    is_population: ClassVar[bool] = False
+
+    when: dict[str, Any] = Field(
+        default={},
+        description="the axis applies only where other axes have these values: {robot: hangout};"
+        " a list: any of them",
+    )
+
+    def columns(self, name: str) -> tuple[str, ...]:
+        """Return the columns that it fills."""
+        return (name,)
+
+    def populations(self, name: str) -> tuple[str, ...]:
+        """Return those of its columns whose values stand for a population."""
+        return self.columns(name) if self.is_population else ()
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return its points in order.
+
+        Raises:
+            InputError: Files are missing, or a package.
+        """
+        raise NotImplementedError
+
+
+class ValuesAxis(Axis):
+    """A list of values of one key, or of several keys that have the same value."""
+
+    key: str | tuple[str, ...] = Field(description="the key path, or several")
+    values: tuple[Any, ...] = Field(min_length=1, description="the values")
+    labels: tuple[str, ...] = Field(default=(), description="what the values are called")
+
+    @model_validator(mode="after")
+    def _as_many_labels(self) -> Self:
+        if self.labels and len(self.labels) != len(self.values):
+            raise problem(f"there are {len(self.labels)} labels for {len(self.values)} values")
+        return self
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each value."""
+        keys = (self.key,) if isinstance(self.key, str) else self.key
+        paths = [key_path(key) for key in keys]
+        labels = self.labels or label_values(self.values)
+        return [
+            Choice({name: label}, tuple((path, value) for path in paths))
+            for label, value in zip(labels, self.values, strict=True)
+        ]
+
+
+class RangeAxis(Axis):
+    """Numbers from one to another, by a step or so many."""
+
+    key: str = Field(description="the key path")
+    range: tuple[float, float] = Field(description="first and last number")
+    step: float | None = Field(default=None, gt=0, description="from one to the next")
+    count: int | None = Field(default=None, ge=2, description="how many, instead of a step")
+    log: bool = Field(default=False, description="with count: by a constant factor")
+    unit: str = Field(default="", description="written behind the number: d, cm, %")
+
+    @model_validator(mode="after")
+    def _step_or_count(self) -> Self:
+        first, last = self.range
+        if (self.step is None) == (self.count is None):
+            raise problem("give step, or count")
+        if not first < last:
+            raise problem(f"found {first:g} to {last:g}; the first is to be below the last")
+        if self.log and (first <= 0 or self.count is None):
+            raise problem("log wants a count, and numbers above 0")
+        return self
+
+    def numbers(self) -> list[float]:
+        """Return the numbers, without the noise of binary fractions.
+
+        >>> RangeAxis(key="a.b", range=(0.1, 0.5), step=0.2).numbers()
+        [0.1, 0.3, 0.5]
+        """
+        first, last = self.range
+        if self.step is not None:
+            steps = math.floor((last - first) / self.step + 1e-9)
+            return [rounded(first + i * self.step, 12) for i in range(steps + 1)]
+        assert self.count is not None
+        shares = [i / (self.count - 1) for i in range(self.count)]
+        if self.log:
+            return [rounded(first * (last / first) ** share) for share in shares]
+        return [rounded(first + share * (last - first), 12) for share in shares]
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each number; whole numbers stay whole."""
+        numbers = self.numbers()
+        whole = all(number.is_integer() for number in numbers)
+        values: list[Any] = [int(number) if whole else number for number in numbers]
+        path = key_path(self.key)
+        return [
+            Choice({name: value}, ((path, f"{value!r} {self.unit}" if self.unit else value),))
+            for value in values
+        ]
+
+
+class OptionsAxis(Axis):
+    """Named options, each a set of changes."""
+
+    options: dict[str, dict[str, Any]] = Field(
+        min_length=1, description="by name: {key path: value, …}"
+    )
+    population: bool = Field(
+        default=False, description="they stand for a population, as homes and people do"
+    )
+
+    def populations(self, name: str) -> tuple[str, ...]:
+        """Return its column if its options stand for a population."""
+        return (name,) if self.population else ()
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each option."""
+        return [
+            Choice({name: label}, tuple((key_path(k), v) for k, v in changes.items()))
+            for label, changes in self.options.items()
+        ]
+
+
+class FloorplansAxis(Axis):
+    """Floor plans: the files of a folder or a pattern, or a list of files."""
+
+    is_population: ClassVar[bool] = True
+
+    floorplans: Texts = Field(description="a folder, a pattern, or files")
+    settings: dict[str, Any] = Field(
+        default={}, description="further keys of the floor plan, such as furnish"
+    )
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each floor plan, called by its file's name.
+
+        Raises:
+            ScenarioError: There is no such file, or one is no floor plan.
+        """
+        files = self._files()
+        labels = [path.stem for path in files]
+        if len(set(labels)) < len(labels):
+            labels = [path.name for path in files]
+        return [
+            Choice({name: label}, ((("floorplan",), self._section(path)),))
+            for label, path in zip(labels, files, strict=True)
+        ]
+
+    def _files(self) -> list[Path]:
+        files: list[Path] = []
+        for pattern in self.floorplans:
+            path = folder_of(pattern) / Path(pattern).expanduser()
+            found = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
+            plans = sorted(p for p in found if p.suffix.lower() in FLOORPLAN_SUFFIXES)
+            if not plans:
+                raise ScenarioError(
+                    f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"
+                    f" pattern or a file that ends in {', '.join(FLOORPLAN_SUFFIXES)}"
+                )
+            files += plans
+        return files
+
+    def _section(self, path: Path) -> dict[str, Any]:
+        from fleet2d.floorplan.load import format_of_file
+
+        return {"type": format_of_file(path), "path": str(path.absolute()), **self.settings}
+
+
+class SyntheticAxis(Axis):
+    """Synthetic homes by their seeds."""
+
+    is_population: ClassVar[bool] = True
+
+    synthetic: int | tuple[int, ...] = Field(
+        description="how many homes, from seed 0 on; or a list of seeds"
+    )
+    first: int = Field(default=0, ge=0, description="the first seed, where a number is given")
+    settings: dict[str, Any] = Field(
+        default={}, description="further keys of the homes, such as area_m2 and furnish"
+    )
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each home, called by its seed."""
+        seeds = self.synthetic
+        if isinstance(seeds, int):
+            seeds = tuple(range(self.first, self.first + seeds))
+        return [
+            Choice(
+                {name: seed},
+                ((("floorplan",), {"type": "synthetic", "seed": seed, **self.settings}),),
+            )
+            for seed in seeds
+        ]
+
+
+class PersonasAxis(Axis):
+    """Personas of one user: the bundled ones, or files of your own."""
+
+    is_population: ClassVar[bool] = True
+
+    personas: Texts = Field(description="all, or a list of names and files")
+    user: str = Field(description="whose persona it is")
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each persona."""
+        from fleet2d.routines.persona import bundled
+
+        personas = bundled() if self.personas == ("all",) else self.personas
+        user = ("users", self.user)
+        return [
+            Choice(
+                {name: Path(persona).stem},
+                (((*user, "type"), "routine"), ((*user, "persona"), persona)),
+            )
+            for persona in personas
+        ]
+
+
+class SampleAxis(Axis):
+    """Random or Latin-hypercube samples of several parameters at once."""
+
+    sample: dict[str, Parameter] = Field(min_length=1, description="the parameters, by column")
+    count: int = Field(ge=1, description="how many samples")
+    method: Method = Field(default="latin_hypercube", description="latin_hypercube or random")
+    seed: int = Field(default=0, ge=0, description="of the samples")
+
+    def columns(self, name: str) -> tuple[str, ...]:
+        """Return a column for each parameter."""
+        return tuple(self.sample)
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each sample.
+
+        Raises:
+            InputError: scipy is missing, which draws Latin hypercubes.
+        """
+        choices = []
+        labels = {
+            column: dict(zip(map(repr, p.choices), label_values(p.choices), strict=True))
+            for column, p in self.sample.items()
+        }
+        for values in draw(self.sample, self.method, self.count, self.seed):
+            shown: dict[str, Label] = {
+                column: labels[column].get(repr(value), value) for column, value in values.items()
+            }
+            changes = tuple(
+                (key_path(self.sample[column].key), self.sample[column].written(value))
+                for column, value in values.items()
+            )
+            choices.append(Choice(shown, changes))
+        return choices
+
+
+class _GroupAxis(Axis):
+    """Axes within an axis."""
+
+    def axes(self) -> "dict[str, Axis]":
+        """Return the axes of the group."""
+        raise NotImplementedError
+
+    def columns(self, name: str) -> tuple[str, ...]:
+        """Return the columns of all of its axes."""
+        return tuple(c for inner, axis in self.axes().items() for c in axis.columns(inner))
+
+    def populations(self, name: str) -> tuple[str, ...]:
+        """Return the columns of its axes whose values stand for a population."""
+        return tuple(c for inner, axis in self.axes().items() for c in axis.populations(inner))
+
+    def _join(self, rows: Iterator[tuple[Choice, ...]]) -> list[Choice]:
+        return [
+            Choice(
+                {column: label for one in row for column, label in one.labels.items()},
+                tuple(change for one in row for change in one.changes),
+            )
+            for row in rows
+        ]
+
+
+class ZipAxis(_GroupAxis):
+    """Axes of equal length that go hand in hand: the first with the first, and so on."""
+
+    zip: "dict[str, AnyAxis]" = Field(min_length=1, description="the axes, by name")
+
+    def axes(self) -> dict[str, Axis]:
+        """Return the axes of the group."""
+        return self.zip
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each place in the lists.
+
+        Raises:
+            ScenarioError: The axes differ in length.
+        """
+        lists = {inner: axis.choices(inner) for inner, axis in self.zip.items()}
+        if len({len(choices) for choices in lists.values()}) > 1:
+            lengths = ", ".join(f"{inner} has {len(choices)}" for inner, choices in lists.items())
+            raise ScenarioError(f"the axes of a zip are to have equally many values: {lengths}")
+        return self._join(zip(*lists.values(), strict=True))
+
+
+class GridAxis(_GroupAxis):
+    """Axes of which every value meets every value; what the axes of a study do anyway."""
+
+    grid: "dict[str, AnyAxis]" = Field(min_length=1, description="the axes, by name")
+
+    def axes(self) -> dict[str, Axis]:
+        """Return the axes of the group."""
+        return self.grid
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each combination; the last axis changes fastest."""
+        lists = (axis.choices(inner) for inner, axis in self.grid.items())
+        return self._join(itertools.product(*lists))
+
+
+KINDS: dict[str, type[Axis]] = {
+    "values": ValuesAxis,
+    "range": RangeAxis,
+    "options": OptionsAxis,
+    "floorplans": FloorplansAxis,
+    "synthetic": SyntheticAxis,
+    "personas": PersonasAxis,
+    "sample": SampleAxis,
+    "zip": ZipAxis,
+    "grid": GridAxis,
+}
+"""The axes by the key that tells them apart."""
+
+
+def _axis_of(value: Any) -> Any:
+    """Choose the kind of an axis by the key that only it has."""
+    if isinstance(value, Axis):
+        return value
+    if not isinstance(value, Mapping):
+        raise problem(f"found {value!r}; an axis is wanted: {{key: PATH, values: […]}}")
+    kinds = [kind for kind in KINDS if kind in value]
+    if len(kinds) != 1:
+        unknown = next((key for key in value if key not in ("key", "when")), "")
+        hint = did_you_mean(unknown, KINDS) if not kinds else "."
+        found = " and ".join(kinds) or ", ".join(map(repr, value)) or "nothing"
+        raise problem(f"found {found}; exactly one of {', '.join(KINDS)} is wanted{hint}")
+    return KINDS[kinds[0]].model_validate(value)
+
+
+AnyAxis = Annotated[Axis, BeforeValidator(_axis_of)]
+"""A field that takes an axis of any kind."""
+
+ZipAxis.model_rebuild()
+GridAxis.model_rebuild()

@@ -1,0 +1,69 @@
+"""What an axis offers: choices, each with its label by column and what it changes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fleet2d.errors import ScenarioError
+from fleet2d.scenario.document import Keys
+
+Label = str | int | float | bool | None
+"""What a variant is called along one axis; None where the axis does not apply."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One point of an axis.
+
+    Attributes:
+        labels: Its label by column; an axis has a column of its name, a group one for each axis.
+        changes: What it sets in the scenario, (key path, value).
+    """
+
+    labels: Mapping[str, Label]
+    changes: tuple[tuple[Keys, Any], ...] = field(default=(), compare=False)
+
+    @property
+    def words(self) -> str:
+        """Return the choice as messages write it.
+
+        >>> Choice({"speed": 0.3, "robot": "slow"}).words
+        'speed = 0.3, robot = slow'
+        """
+        return ", ".join(f"{column} = {label}" for column, label in self.labels.items())
+
+
+def key_path(text: str) -> Keys:
+    """Split 'robots.astro.speed' into its keys.
+
+    Raises:
+        ScenarioError: A part is empty.
+    """
+    keys = tuple(part.strip() for part in text.split("."))
+    if not all(keys):
+        raise ScenarioError(f"found {text!r}; a key path is wanted, like robots.astro.speed")
+    return keys
+
+
+def label_values(values: Sequence[Any]) -> list[Label]:
+    """Return a label for each value: itself, else its `type`, else its number from 1.
+
+    >>> label_values([0.3, "fast"]), label_values([{"type": "patrol"}, {"type": "hangout"}])
+    ([0.3, 'fast'], ['patrol', 'hangout'])
+    """
+    labels = [_own_label(value) for value in values]
+    named = [label for label in labels if label is not None]
+    if len(named) == len(values) and len({repr(label) for label in named}) == len(values):
+        return labels
+    if all(value is None or isinstance(value, str | int | float) for value in values):
+        return ["none" if label is None else label for label in labels]
+    return [f"{number}" for number in range(1, len(values) + 1)]
+
+
+def _own_label(value: Any) -> Label:
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, bool | int | float):
+        return value
+    kind = value.get("type") if isinstance(value, Mapping) else None
+    return str(kind) if isinstance(kind, str) else None

@@ -1,0 +1,182 @@
+"""The one door to the simulator: a study runs scenarios through this module alone.
+
+Whatever processes may share between runs, such as homes, belongs here.
+"""
+
+import sys
+import time
+import traceback
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from fleet2d.engine.inputs import input_files
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import ComponentError
+from fleet2d.scenario.model import Scenario
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from fleet2d.artifacts.reader import Run
+
+Status = Literal["complete", "failed"]
+SEPARATOR = "."
+
+
+@dataclass
+class Outcome:
+    """What came of a variant.
+
+    Attributes:
+        status: `complete` or `failed`.
+        digest: Of the run; None if it failed.
+        metrics: The numbers that are kept, by name like `ltp_error.ana.tv`.
+        tables: The tables that are kept, by name.
+        wall_s: Seconds by phase: `setup`, `simulate`, `total`.
+        peak_rss_mb: The most memory that the process has held [MB].
+        error: What went wrong, in words; None if nothing did.
+        trace: The lines of code on the way to the error.
+    """
+
+    status: Status
+    digest: str | None = None
+    metrics: dict[str, float] = field(default_factory=dict)
+    tables: "dict[str, pa.Table]" = field(default_factory=dict)
+    wall_s: dict[str, float] = field(default_factory=dict)
+    peak_rss_mb: float = 0.0
+    error: str | None = None
+    trace: str | None = None
+
+
+def files_of(scenario: Scenario) -> list[Path]:
+    """Return the files that a scenario reads, and the modules of the user's own."""
+    return input_files(scenario)
+
+
+def check_setup(scenario: Scenario) -> None:
+    """Set a scenario up without running it.
+
+    Raises:
+        InputError: The floor plan or a place in it is wrong.
+        ComponentError: A component can't start.
+    """
+    Simulation(scenario)
+
+
+def run_scenario(
+    scenario: Scenario | Mapping[str, Any] | str | Path | None,
+    out: str | Path | None = None,
+    **settings: Any,
+) -> "Run":
+    """Run a scenario, in memory or stored.
+
+    Raises:
+        Fleet2DError: It is wrong, or a component failed.
+    """
+    return Simulation(scenario, out=out, **settings).run()
+
+
+def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> Outcome:
+    """Run a scenario and return what of it is kept; whatever goes wrong is kept, too.
+
+    Args:
+        scenario: The scenario, with its seed.
+        metrics: Patterns of the numbers to keep.
+        tables: Names of the tables to keep.
+    """
+    began = time.perf_counter()
+    try:
+        run = run_scenario(scenario)
+    except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
+        seconds = {"total": time.perf_counter() - began}
+        return Outcome(
+            "failed",
+            wall_s=seconds,
+            peak_rss_mb=peak_rss_mb(),
+            error=describe_error(error),
+            trace="".join(traceback.format_exception(error)),
+        )
+    wall_s: dict[str, float] = {**run.manifest["wall_s"], "total": time.perf_counter() - began}
+    numbers = dict(flat_numbers(run.metrics))
+    patterns = tuple(metrics)
+    return Outcome(
+        "complete",
+        run.digest,
+        {n: v for n, v in numbers.items() if any(fnmatchcase(n, p) for p in patterns)},
+        {name: run.tables[name] for name in tables if name in run.tables},
+        wall_s,
+        peak_rss_mb(),
+    )
+
+
+def describe_error(error: BaseException) -> str:
+    """Return an error in words, with its kind unless it explains itself."""
+    text = str(error)
+    return text if isinstance(error, ComponentError) else f"{type(error).__name__}: {text}"
+
+
+def flat_numbers(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, float]]:
+    """Yield each number of nested metrics by its name.
+
+    >>> dict(flat_numbers({"sightings": {"ana": 0.4}, "note": "x"}))
+    {'sightings.ana': 0.4}
+    """
+    for name, value in metrics.items():
+        if isinstance(value, Mapping):
+            yield from flat_numbers(value, f"{prefix}{name}{SEPARATOR}")
+        elif isinstance(value, bool | int | float):
+            yield f"{prefix}{name}", float(value)
+
+
+def peak_rss_mb() -> float:
+    """Return the most memory that this process has held [MB]; 0 where it is not known."""
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a scenario runs here.
+
+    Attributes:
+        setup_s: Wall time of its set-up [s].
+        speedup: Simulated time by wall time after that.
+    """
+
+    setup_s: float
+    speedup: float
+
+    def seconds(self, simulated_s: float) -> float:
+        """Return the wall time of a run [s]."""
+        return self.setup_s + simulated_s / self.speedup
+
+
+def measure(scenario: Scenario, simulated_s: float = 86_400.0, most_s: float = 2.0) -> Pace:
+    """Run the beginning of a scenario to see how fast it goes.
+
+    Args:
+        scenario: The scenario.
+        simulated_s: How much of it, if it lasts that long [s].
+        most_s: Wall time after which it is enough [s].
+
+    Raises:
+        Fleet2DError: It is wrong, or a component failed.
+    """
+    began = time.perf_counter()
+    simulation = Simulation(scenario)
+    ready = time.perf_counter()
+    hour = max(1, int(3600e6 / simulation.clock.step_us))
+    while not simulation.done and time.perf_counter() - ready < most_s:
+        simulation.advance(hour)
+        if simulation.step * simulation.clock.step_us / 1e6 >= simulated_s:
+            break
+    wall_s = max(time.perf_counter() - ready, 1e-6)
+    done_s = simulation.step * simulation.clock.step_us / 1e6
+    return Pace(ready - began, done_s / wall_s)

@@ -1,0 +1,104 @@
+"""Who a variant is: a hash of its resolved scenario, its inputs, and the code that computes it."""
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.scenario.model import Scenario
+from fleet2d.studies.engine import files_of
+
+DIGITS = 32  # of the hexadecimal text of a hash
+# What runs, shows or sums up simulations has no part in what they compute.
+_LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate")
+_SUFFIXES = (".py", ".so", ".yaml", ".json")
+_NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
+
+
+@cache
+def code_version() -> str:
+    """Return the version of Fleet2D, and a hash of its files that take part in a run.
+
+    A release always has the same; where Fleet2D is developed, it changes with every edit.
+    """
+    root = Path(fleet2d.__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*")):
+        name = path.relative_to(root)
+        if path.suffix in _SUFFIXES and name.parts[0] not in _LEAVES:
+            digest.update(name.as_posix().encode() + b"\0")
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    python = ".".join(platform.python_version_tuple()[:2])
+    return f"fleet2d {fleet2d.__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
+
+
+class FileHashes:
+    """Hashes of input files, each read once as long as it stays as it is."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, int, int], str] = {}
+
+    def __getitem__(self, path: Path) -> str:
+        """Return the SHA-256 of a file.
+
+        Raises:
+            InputError: It can't be read.
+        """
+        try:
+            status = path.stat()
+            key = (str(path), status.st_mtime_ns, status.st_size)
+            if key not in self._known:
+                self._known[key] = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            raise InputError(
+                f"{path} can't be read: {error.strerror}; a variant needs it"
+            ) from error
+        return self._known[key]
+
+
+def scenario_content(scenario: Scenario) -> dict[str, Any]:
+    """Return what of a resolved scenario has an effect on its results."""
+    content = scenario.resolved()
+    content.pop("name", None)
+    content["simulation"] = {k: v for k, v in content["simulation"].items() if k not in _NO_EFFECT}
+    return content
+
+
+def content_hash(content: Any) -> str:
+    """Return a hash of plain data.
+
+    >>> content_hash({"a": 1, "b": 2}) == content_hash({"b": 2, "a": 1})
+    True
+    """
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
+
+
+def input_hash(scenario: Scenario, files: FileHashes) -> str:
+    """Return a hash of the files that a scenario names: floor plans, logs, modules of one's own.
+
+    Raises:
+        InputError: One can't be read.
+    """
+    return content_hash({str(path): files[path] for path in files_of(scenario)})
+
+
+def identity(content: Mapping[str, Any], inputs: str) -> tuple[str, str]:
+    """Return the identity of a variant, and the part of it that the scenario alone makes up.
+
+    Args:
+        content: Its `scenario_content`, with its seed.
+        inputs: The `input_hash` of its scenario.
+    """
+    scenario = content_hash(content)
+    return content_hash([code_version(), scenario, inputs]), scenario
+
+
+def home_key(content: Mapping[str, Any]) -> str:
+    """Return a hash that is the same for variants that can share a home."""
+    return content_hash([content["floorplan"], content["objects"]])[:8]

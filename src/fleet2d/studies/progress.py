@@ -1,0 +1,120 @@
+"""The progress of a study on a terminal: a bar with rate, time left and failures."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.studies.driver import Observer, SilentObserver
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from fleet2d.studies.record import Record
+    from fleet2d.studies.results import Counts
+    from fleet2d.studies.tune import TuneObserver
+
+
+class BarObserver:
+    """Shows how a study goes on."""
+
+    def __init__(self, progress: "Progress") -> None:
+        """Show nothing yet."""
+        self._progress = progress
+        self._task: TaskID = progress.add_task("checking", total=None)
+        self._began = time.monotonic()
+        self._done = self._failed = 0
+
+    def note(self, text: str) -> None:
+        """Print a remark above the bar."""
+        self._progress.console.print(f"note: {text}", highlight=False, markup=False)
+
+    def checked(self, done: int, total: int) -> None:
+        """Show how many set-ups are checked."""
+        self._progress.update(self._task, completed=done, total=total, description="checking homes")
+
+    def began(self, counts: "Counts", workers: int) -> None:
+        """Show what there is already."""
+        self._began = time.monotonic()
+        self._progress.reset(
+            self._task, total=counts.total, completed=counts.complete, description="running"
+        )
+
+    def ended(self, record: "Record") -> None:
+        """Show one more."""
+        self._done += 1
+        self._failed += not record.is_complete
+        rate = self._done / max(time.monotonic() - self._began, 1e-9)
+        failed = f", {self._failed} failed" if self._failed else ""
+        self._progress.update(self._task, advance=1, description=f"{_rate(rate)}{failed}")
+
+
+def _rate(per_second: float) -> str:
+    """Return a rate in words.
+
+    >>> _rate(12.3), _rate(0.05)
+    ('12.3 variants/s', '3.0 variants/min')
+    """
+    if per_second >= 1:
+        return f"{per_second:.1f} variants/s"
+    return f"{60 * per_second:.1f} variants/min"
+
+
+@contextmanager
+def observing(*, show: bool) -> Iterator[Observer]:
+    """Return what shows the progress of a study, on a terminal only."""
+    if not show:
+        yield SilentObserver()
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns: tuple[Any, ...] = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        yield BarObserver(progress)
+
+
+def in_words(time_span: timedelta) -> str:
+    """Return a span of time as people say it.
+
+    >>> in_words(timedelta(seconds=200)), in_words(timedelta(hours=30))
+    ('3.3 min', '30.0 h')
+    """
+    seconds = time_span.total_seconds()
+    for name, unit in (("years", 31_557_600), ("months", 2_629_800), ("days", 86_400)):
+        if seconds >= 2 * unit:
+            return f"{seconds / unit:,.1f} {name}"
+    for name, unit in (("h", 3600), ("min", 60)):
+        if seconds >= unit:
+            return f"{seconds / unit:.1f} {name}"
+    return f"{seconds:.1f} s"
+
+
+@contextmanager
+def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
+    """Return what shows the progress of a search, on a terminal only."""
+    if not show:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("trials", total=None)
+
+        def ended(done: int, trials: int, best: list[float] | None) -> None:
+            words = "" if best is None else ", ".join(f"{value:.4g}" for value in best)
+            progress.update(task, completed=done, total=trials, description=f"best {words}")
+
+        yield ended

@@ -1,0 +1,104 @@
+"""Random and Latin-hypercube samples of several parameters at once."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.errors import InputError
+from fleet2d.problems import problem
+
+Method = Literal["random", "latin_hypercube"]
+DIGITS = 6  # significant ones of a sampled number: what is printed is what was run
+
+
+class Parameter(Settings):
+    """One sampled or searched parameter: a range, or a list to choose from."""
+
+    key: str = Field(description="the key path that it sets")
+    low: float | None = Field(default=None, description="the smallest value")
+    high: float | None = Field(default=None, description="the largest value")
+    log: bool = Field(default=False, description="uniform in the logarithm")
+    integer: bool = Field(default=False, description="whole numbers only")
+    unit: str = Field(default="", description="written behind the number: d, cm, %")
+    choices: tuple[Any, ...] = Field(default=(), description="instead of a range: a list")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.choices:
+            if self.low is not None or self.high is not None:
+                raise problem("give low and high, or choices, not both")
+            return self
+        if self.low is None or self.high is None or not self.low < self.high:
+            raise problem("low and high are wanted, low below high; or choices")
+        if self.log and self.low <= 0:
+            raise problem(f"low is {self.low:g}; with log it must be above 0")
+        return self
+
+    def at(self, share: float) -> Any:
+        """Return the value at a share of the range, 0 up to 1.
+
+        >>> Parameter(key="a.b", low=1, high=100, log=True).at(0.5)
+        10.0
+        """
+        if self.choices:
+            return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
+        assert self.low is not None
+        assert self.high is not None
+        if self.integer:
+            return min(int(self.low + share * (self.high - self.low + 1)), int(self.high))
+        if self.log:
+            return rounded(math.exp(math.log(self.low) + share * math.log(self.high / self.low)))
+        return rounded(self.low + share * (self.high - self.low))
+
+    def written(self, value: Any) -> Any:
+        """Return the value as the scenario takes it, with its unit.
+
+        >>> Parameter(key="a.b", low=1, high=9, unit="d").written(2.5)
+        '2.5 d'
+        """
+        return f"{value!r} {self.unit}" if self.unit and not self.choices else value
+
+
+def rounded(value: float, digits: int = DIGITS) -> float:
+    """Return a number with so many significant digits.
+
+    >>> rounded(0.123456789)
+    0.123457
+    """
+    return float(f"{value:.{digits}g}")
+
+
+def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np.float64]:
+    """Return points of the unit cube: float64 (count, dimensions), the same at each call.
+
+    Raises:
+        InputError: scipy is missing, which draws Latin hypercubes.
+    """
+    generator = np.random.Generator(np.random.Philox(seed))
+    if method == "random":
+        return generator.random((count, dimensions))
+    try:
+        from scipy.stats import qmc
+    except ImportError:
+        raise InputError('a Latin hypercube needs scipy: pip install "fleet2d[study]"') from None
+    points: NDArray[np.float64] = qmc.LatinHypercube(dimensions, rng=generator).random(count)
+    return points
+
+
+def draw(
+    parameters: Mapping[str, Parameter], method: Method, count: int, seed: int
+) -> list[dict[str, Any]]:
+    """Return `count` samples, each a value by name of parameter."""
+    points = shares(method, count, len(parameters), seed)
+    return [
+        {
+            name: parameter.at(float(share))
+            for (name, parameter), share in zip(parameters.items(), row, strict=True)
+        }
+        for row in points
+    ]

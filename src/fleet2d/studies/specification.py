@@ -1,0 +1,248 @@
+"""What a study file holds, validated."""
+
+import os.path
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.errors import ScenarioError
+from fleet2d.paths import folder_of
+from fleet2d.problems import did_you_mean, problem, problem_at
+from fleet2d.scenario.compose import compose
+from fleet2d.scenario.document import Document, read_document
+from fleet2d.scenario.explain import explain
+from fleet2d.scenario.model import Scenario
+from fleet2d.studies.axes import AnyAxis
+from fleet2d.studies.tune_settings import TuneSettings
+
+SEED = "seed"
+RESERVED = (
+    "variant", "identity", "status", "digest", "error", "wall_s", "setup_s", "simulate_s",
+    "attempts", "step", "time", "scenario", "template", "home_key", "simulated_s", "trace",
+    "peak_rss_mb",
+)  # fmt: skip
+"""Columns of the results, which no axis may be called."""
+
+
+class Rule(Settings):
+    """A change for all variants that fulfil a condition."""
+
+    when: dict[str, Any] = Field(default={}, description="values of axes; a list: any of them")
+    set: dict[str, Any] = Field(min_length=1, description="{key path: value, …}")
+
+
+class Keep(Settings):
+    """What of each run is kept."""
+
+    metrics: tuple[str, ...] = Field(
+        default=("*",), description="names or patterns of numbers, such as ltp_error.*.tv"
+    )
+    tables: tuple[str, ...] = Field(default=(), description="tables of a run, by name")
+
+
+class Comparison(Settings):
+    """A paired comparison that the report shows."""
+
+    metric: str = Field(description="a number, such as ltp_error.ana.tv")
+    against: dict[str, Any] = Field(
+        min_length=1, max_length=1, description="the axis, and the value that others are held to"
+    )
+    by: tuple[str, ...] | None = Field(
+        default=None, description="columns over which intervals go; left out: homes, people, seeds"
+    )
+    within: tuple[str, ...] = Field(
+        default=(), description="axes for whose values the comparison is made one by one"
+    )
+
+
+def _numbers_or_count(value: Any) -> Any:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if value < 1:
+            raise problem(f"found {value}; 1 or more replicates are wanted")
+        return tuple(range(value))
+    return value
+
+
+class StudyFile(Settings):
+    """A study: a base scenario, axes along which it varies, what to keep and to compare."""
+
+    name: str | None = Field(default=None, description="what the study is called in reports")
+    description: str = Field(default="", description="what it is to answer, for the report")
+    base: Any = Field(
+        default=None,
+        description="the scenario: a file, bundled:NAME, or a mapping; left out: bundled:base",
+    )
+    axes: dict[str, AnyAxis] = Field(default={}, description="what varies, by name")
+    replicates: Annotated[
+        tuple[Annotated[int, Field(ge=0, lt=2**63)], ...], BeforeValidator(_numbers_or_count)
+    ] = Field(default=(), description="how many seeds, from 0 on, or a list; left out: the base's")
+    rules: tuple[Rule, ...] = Field(default=(), description="changes for some of the variants")
+    exclude: tuple[dict[str, Any], ...] = Field(
+        default=(), description="combinations to leave out: {axis: value, …}"
+    )
+    keep: Keep = Field(default=Keep(), description="what of each run is kept")
+    compare: tuple[Comparison, ...] = Field(default=(), description="what the report compares")
+    tune: TuneSettings | None = Field(default=None, description="what `fleet2d tune` searches")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_axes(cls, data: Any) -> Any:
+        """Let `robots.astro.speed: [0.3, 0.6]` stand for an axis with that key."""
+        axes = data.get("axes") if isinstance(data, Mapping) else None
+        if not isinstance(axes, Mapping):
+            return data
+        return {**data, "axes": {name: _long_form(name, axis) for name, axis in axes.items()}}
+
+    @model_validator(mode="after")
+    def _columns_differ(self) -> Self:
+        owners: dict[str, str] = {}
+        for name, axis in self.axes.items():
+            for column in axis.columns(name):
+                if column in (SEED, *RESERVED):
+                    message = f"an axis can't be called {column!r}, for results have such a column"
+                    raise problem_at(("axes", name), message)
+                if column in owners:
+                    message = f"the axis {owners[column]!r} has a column {column!r}, too"
+                    raise problem_at(("axes", name), message)
+                owners[column] = name
+        return self
+
+    @model_validator(mode="after")
+    def _conditions_name_columns(self) -> Self:
+        known: list[str] = []
+        for name, axis in self.axes.items():
+            _check_columns(axis.when, known, ("axes", name, "when"), "axes before it")
+            known += axis.columns(name)
+        for i, rule in enumerate(self.rules):
+            _check_columns(rule.when, [*known, SEED], ("rules", i, "when"), "axes")
+        for i, condition in enumerate(self.exclude):
+            _check_columns(condition, [*known, SEED], ("exclude", i), "axes")
+        for i, one in enumerate(self.compare):
+            for key in ("against", "by", "within"):
+                columns = getattr(one, key) or ()
+                _check_columns(columns, [*known, SEED], ("compare", i, key), "axes")
+        return self
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of all axes."""
+        return tuple(c for name, axis in self.axes.items() for c in axis.columns(name))
+
+    @property
+    def populations(self) -> tuple[str, ...]:
+        """The columns whose values stand for a population, the seed last."""
+        inner = (c for name, axis in self.axes.items() for c in axis.populations(name))
+        return (*inner, SEED)
+
+
+def _long_form(name: str, axis: Any) -> Any:
+    if isinstance(axis, list | tuple):
+        if "." not in name:
+            raise problem_at(
+                ("axes", name),
+                f"a bare list is for an axis that is called by its key path, like"
+                f" robots.astro.speed: […]; else write {name}: {{key: PATH, values: […]}}",
+            )
+        return {"key": name, "values": list(axis)}
+    keyless = isinstance(axis, Mapping) and "key" not in axis and "." in name
+    if keyless and axis.keys() & {"values", "range"}:
+        return {"key": name, **axis}
+    return axis
+
+
+def _check_columns(
+    columns: Mapping[str, Any] | tuple[str, ...],
+    known: list[str],
+    location: tuple[str | int, ...],
+    noun: str,
+) -> None:
+    for column in columns:
+        if column not in known:
+            raise problem_at(
+                (*location, column) if isinstance(columns, Mapping) else location,
+                f"there is no axis {column!r}{did_you_mean(column, known)} The {noun}:"
+                f" {', '.join(known) or 'none'}",
+            )
+
+
+@dataclass(frozen=True)
+class Specification:
+    """A study file that was read.
+
+    Attributes:
+        file: What it says, validated.
+        places: Where each key was written.
+        base: The composed base scenario.
+        folder: The folder that relative paths start from.
+        source: The file; None for a mapping.
+    """
+
+    file: StudyFile
+    places: Document
+    base: Document
+    folder: Path
+    source: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """What the study is called."""
+        return self.file.name or (self.source.stem if self.source else "study")
+
+
+def read_specification(source: str | Path | Mapping[str, Any] | Specification) -> Specification:
+    """Read and check a study, without building its variants.
+
+    Args:
+        source: A YAML file, or the same as a mapping.
+
+    Raises:
+        ScenarioError: What is wrong, where it is written, and what is wanted.
+    """
+    if isinstance(source, Specification):
+        return source
+    path: Path | None = None
+    if isinstance(source, Mapping):
+        document, folder = Document(dict(source)), Path.cwd()
+    else:
+        path = Path(source)
+        document, folder = read_document(path), path.absolute().parent
+    try:
+        file = StudyFile.model_validate(document.data)
+    except ValidationError as error:
+        raise explain(error, document) from None
+    return Specification(file, document, _base(file.base, document), folder, path)
+
+
+def _base(base: Any, document: Document) -> Document:
+    """Compose the base scenario; its messages name the lines of the study file."""
+    try:
+        if isinstance(base, Scenario):
+            return compose(base.resolved())
+        if isinstance(base, Mapping):
+            return _inline_base(base, document)
+        if base is None or (isinstance(base, str) and base.startswith("bundled:")):
+            return compose(base)
+        if not isinstance(base, str | Path):
+            raise ScenarioError(f"found {base!r}; a scenario's file or a mapping is wanted")
+        return compose(os.path.relpath(folder_of(base) / Path(base).expanduser()))
+    except ScenarioError as error:
+        where = document.place(("base",))
+        raise ScenarioError(f"{where}{': ' * bool(where)}base: {error}") from None
+
+
+def _inline_base(base: Mapping[str, Any], document: Document) -> Document:
+    extended = base.get("extends") or []
+    parents = extended if isinstance(extended, list) else [extended]
+    paths = [
+        str(p) if str(p).startswith("bundled:") else str(folder_of(p) / Path(str(p)).expanduser())
+        for p in parents
+    ]
+    own = {key: value for key, value in base.items() if key != "extends"}
+    composed = compose({"extends": paths, **own})
+    places = {keys[1:]: where for keys, where in document.places.items() if keys[:1] == ("base",)}
+    composed.places.update((k, where) for k, where in places.items() if k[:1] != ("extends",))
+    return composed

@@ -1,0 +1,236 @@
+"""A search as tasks for workers: settings are asked of Optuna, run on homes, and told back."""
+
+import pickle
+from collections import deque
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.scenario.compose import assignment, changed
+from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.studies.choice import key_path
+from fleet2d.studies.design import Design
+from fleet2d.studies.engine import describe_error, flat_numbers, run_scenario
+from fleet2d.studies.record import Task
+from fleet2d.studies.sampling import Parameter, rounded
+from fleet2d.studies.schedule import Schedule
+
+if TYPE_CHECKING:
+    import optuna
+
+FAILURE = "failure"  # what Optuna keeps the reason of a failed trial under
+
+
+@dataclass(frozen=True)
+class TrialTask(Task):
+    """One variant with one setting, up to a simulated time.
+
+    Attributes:
+        trial: The number of the trial.
+        settings: The values of the searched parameters.
+        until_s: Simulated time at which it ends [s]; None: that of the scenario.
+    """
+
+    trial: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    until_s: float | None = None
+
+
+@dataclass
+class TrialJob:
+    """Runs a variant with a setting, and returns its objectives.
+
+    Attributes:
+        design: The variants.
+        search: The searched parameters.
+        objectives: The names of the numbers.
+    """
+
+    design: Design
+    search: Mapping[str, Parameter]
+    objectives: tuple[str, ...]
+
+    def scenario(
+        self, index: int, settings: Mapping[str, Any], until_s: float | None = None
+    ) -> Scenario:
+        """Return a variant with a setting.
+
+        Raises:
+            ScenarioError: The setting is none that the scenario can have.
+        """
+        scenario = self.design.scenario(index)
+        changes = [
+            assignment(
+                key_path(self.search[name].key),
+                self.search[name].written(value),
+                f"tune.search.{name} = {value}",
+            )
+            for name, value in settings.items()
+        ]
+        if until_s is not None:
+            duration = min(timedelta(seconds=until_s), scenario.simulation.duration)
+            seconds = duration.total_seconds()
+            changes.append(assignment(("simulation", "duration"), seconds, "tune.prune_at"))
+        document = changed(scenario._document, changes)
+        return scenario_of(document, scenario.folder)
+
+    def __call__(self, task: Task) -> bytes:
+        """Return (objectives, error), pickled; one of them is None."""
+        assert isinstance(task, TrialTask)
+        try:
+            run = run_scenario(self.scenario(task.index, task.settings, task.until_s))
+            numbers = dict(flat_numbers(run.metrics))
+            missing = [name for name in self.objectives if name not in numbers]
+            if missing:
+                raise ComponentError(f"the run came to no number {missing[0]!r}")
+            return pickle.dumps(([numbers[name] for name in self.objectives], None))
+        except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
+            return pickle.dumps((None, describe_error(error)))
+
+
+@dataclass
+class _Running:
+    """A trial under way: at which of its stages, and what is known of it."""
+
+    trial: "optuna.Trial"
+    settings: dict[str, Any]
+    stage: int = 0
+    found: list[list[float]] = field(default_factory=list)
+    error: str | None = None
+    left: int = 0
+
+
+class TrialSchedule(Schedule):
+    """Tasks of a search: a new trial is asked for when workers have nothing else to do.
+
+    A trial runs all variants up to each time of `prune_at` before it goes on to the next, each
+    time from the start; Optuna decides in between whether it is worth going on.
+    """
+
+    def __init__(
+        self,
+        study: "optuna.Study",
+        search: Mapping[str, Parameter],
+        variants: Sequence[tuple[int, str]],
+        stages: Sequence[float | None],
+        trials: int,
+    ) -> None:
+        """Ask nothing yet.
+
+        Args:
+            study: Optuna's.
+            search: The searched parameters.
+            variants: Index in the design and home of each variant that a trial runs.
+            stages: Simulated times up to which a trial runs [s]; the last is None.
+            trials: How many trials are to begin.
+        """
+        super().__init__(())
+        self._study, self._search = study, search
+        self._variants, self._stages = variants, stages
+        self._to_begin = trials
+        self._running: dict[int, _Running] = {}
+        self._waiting: deque[TrialTask] = deque()
+        self._numbers = 0
+
+    def __len__(self) -> int:
+        """Return how many tasks there may be."""
+        return len(self._waiting) + self._to_begin * len(self._variants)
+
+    def __bool__(self) -> bool:
+        """Return whether there is anything left to take."""
+        return bool(self._waiting or self._to_begin)
+
+    def take(self, worker: Hashable) -> Task | None:
+        """Return the next task, of a new trial if all others are taken."""
+        if not self._waiting and self._to_begin:
+            self._to_begin -= 1
+            trial = self._study.ask()
+            settings = {name: suggested(trial, name, p) for name, p in self._search.items()}
+            self._running[trial.number] = running = _Running(trial, settings)
+            self._begin_stage(running)
+        return self._waiting.popleft() if self._waiting else None
+
+    def put_back(self, task: Task) -> None:
+        """Let a task be taken again."""
+        assert isinstance(task, TrialTask)
+        self._waiting.appendleft(task)
+
+    def finished(self, task: TrialTask, values: list[float] | None, error: str | None) -> bool:
+        """Take in what came of a task; return whether its trial is over."""
+        running = self._running[task.trial]
+        running.left -= 1
+        running.error = running.error or error
+        if values is not None:
+            running.found.append(values)
+        if running.left:
+            return False
+        if running.error is None and self._goes_on(running):
+            return False
+        del self._running[task.trial]
+        return True
+
+    def _begin_stage(self, running: _Running) -> None:
+        until_s = self._stages[running.stage]
+        running.found, running.left = [], len(self._variants)
+        for index, home in self._variants:
+            self._numbers += 1
+            self._waiting.append(
+                TrialTask(
+                    self._numbers, index, "", home, running.trial.number, running.settings, until_s
+                )
+            )
+
+    def _goes_on(self, running: _Running) -> bool:
+        """Tell Optuna what a stage came to; return whether there is another."""
+        means = [sum(values) / len(values) for values in zip(*running.found, strict=True)]
+        until_s = self._stages[running.stage]
+        if until_s is None:
+            self._study.tell(running.trial, means)
+            return False
+        running.trial.report(means[0], int(until_s))
+        if running.trial.should_prune():
+            self._study.tell(running.trial, state=_state("PRUNED"))
+            return False
+        running.stage += 1
+        self._begin_stage(running)
+        return True
+
+    def fail(self, task: TrialTask) -> None:
+        """Tell Optuna that a trial failed."""
+        trial = self._study.trials[task.trial]
+        if not trial.state.is_finished():
+            self._study.tell(task.trial, state=_state("FAIL"))
+
+
+def suggested(trial: "optuna.Trial", name: str, parameter: Parameter) -> Any:
+    """Return the value that Optuna wants tried."""
+    if parameter.choices:
+        return parameter.choices[trial.suggest_categorical(name, range(len(parameter.choices)))]
+    assert parameter.low is not None
+    assert parameter.high is not None
+    if parameter.integer:
+        low, high = int(parameter.low), int(parameter.high)
+        return trial.suggest_int(name, low, high, log=parameter.log)
+    return rounded(trial.suggest_float(name, parameter.low, parameter.high, log=parameter.log))
+
+
+def _state(name: str) -> Any:
+    from optuna.trial import TrialState
+
+    return TrialState[name]
+
+
+def check_settings(job: TrialJob, index: int) -> None:
+    """Build a variant with the ends of each parameter's range, and with each of its choices.
+
+    Raises:
+        ScenarioError: A value is none that the scenario can have.
+    """
+    for name, parameter in job.search.items():
+        for value in parameter.choices or (parameter.at(0.0), parameter.at(1.0)):
+            try:
+                job.scenario(index, {name: value})
+            except Fleet2DError as error:
+                raise type(error)(f"tune.search.{name}: {error}") from None

@@ -1,0 +1,55 @@
+"""A worker process: `python -m fleet2d.studies.worker`, spoken to through its standard streams.
+
+It ends at once when the process that began it is gone, whatever it is doing.
+"""
+
+import os
+import queue
+import sys
+import threading
+import traceback
+from typing import IO, Any
+
+from fleet2d.studies.pipe import receive, send
+
+READY, RESULT, BROKEN = "ready", "result", "broken"
+
+
+def main() -> None:
+    """Be set up, then do tasks until there are no more."""
+    # What a user's component prints must not get among the messages.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    stream = sys.stdin.buffer
+    try:
+        folder, sys.path[:] = receive(stream)
+        os.chdir(folder)
+        job = receive(stream)
+    except BaseException:  # noqa: BLE001 - whatever an import does is reported
+        send(answers, (BROKEN, traceback.format_exc()))
+        return
+    threading.Thread(target=_listen, args=(stream, tasks), daemon=True).start()
+    send(answers, (READY, None))
+    _work(job, tasks, answers)
+
+
+def _work(job: Any, tasks: "queue.SimpleQueue[Any]", answers: IO[bytes]) -> None:
+    from fleet2d.studies.engine import peak_rss_mb
+
+    while (task := tasks.get()) is not None:
+        send(answers, (RESULT, (task, job(task), peak_rss_mb())))
+    os._exit(0)  # the thread that listens holds the standard input
+
+
+def _listen(stream: IO[bytes], tasks: "queue.SimpleQueue[Any]") -> None:
+    """Take tasks in; end the process when the driver is gone."""
+    try:
+        while True:
+            tasks.put(receive(stream))
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,234 @@
+"""What the page is sent: the types that Python and TypeScript share.
+
+The TypeScript side, ``page/src/contract.ts``, is written from these by
+`fleet2d.viewer.typescript`; a test compares both.
+"""
+
+from typing import Any, Literal, TypedDict
+
+Point = tuple[float, float]
+
+
+class RoomFacts(TypedDict):
+    """A room: its colours on the plan and in lanes, and where its name is written [m]."""
+
+    name: str
+    type: str
+    color: str
+    deep_color: str
+    anchor: Point
+    area_m2: float
+
+
+class DoorFacts(TypedDict):
+    """A door: its jambs [m], and whether it is open and locked when the run starts."""
+
+    name: str
+    start: Point
+    end: Point
+    open: bool
+    locked: bool
+
+
+class ObjectFacts(TypedDict):
+    """A piece of furniture: its outline [m], and whom it stops: nothing, path or sight."""
+
+    name: str
+    type: str
+    outline: list[Point]
+    blocks: str
+
+
+class HomeFacts(TypedDict):
+    """A home: outlines in metres, cells as runs of equal rooms.
+
+    `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of
+    cells), row by row from the lowest; -1 is no room. `place_cells` are the same for places in
+    cells that a wall cuts.
+    """
+
+    name: str
+    cell: float
+    origin_units: tuple[int, int]
+    units_per_m: float
+    columns: int
+    rows: int
+    bounds: tuple[float, float, float, float]
+    area_m2: float
+    free: list[list[list[Point]]]
+    rooms: list[RoomFacts]
+    room_cells: list[int]
+    place_cells: list[int]
+    doorways: list[tuple[Point, Point]]
+    doors: list[DoorFacts]
+    objects: list[ObjectFacts]
+    no_go: list[list[Point]]
+    entrance: Point | None
+
+
+class CameraFacts(TypedDict):
+    """A camera: range [m], angles [rad], offset forward and to the left [m]."""
+
+    name: str
+    near: float
+    far: float
+    angle: float
+    forward: float
+    left: float
+    heading: float
+    pan: list[float]
+    pan_us: int
+
+
+class BodyFacts(TypedDict):
+    """A user or a robot."""
+
+    name: str
+    robot: bool
+    color: str
+    radius: float
+    cameras: list[CameraFacts]
+    behaviors: list[str]
+
+
+class ColumnFacts(TypedDict):
+    """A column of a table."""
+
+    name: str
+    kind: str
+    unit: str
+    description: str
+
+
+class TableFacts(TypedDict):
+    """A table of the run, and what put it out."""
+
+    name: str
+    rows: int
+    bytes: int
+    role: Literal["log", "algorithm", "metric", "layer"]
+    columns: list[ColumnFacts]
+
+
+class WallsChange(TypedDict):
+    """From this step on, sight ends at the walls of this number."""
+
+    step: int
+    walls: int
+
+
+class WallsFacts(TypedDict):
+    """What ends sight, as a mesh [lattice]: flat lists of x and y, and of three per triangle."""
+
+    vertices: list[int]
+    triangles: list[int]
+    neighbors: list[int]
+
+
+class MarkFacts(TypedDict):
+    """Something to mark on the timeline: an intervention, or how an expectation came out."""
+
+    step: int
+    end: int
+    kind: Literal["intervention", "held", "violated", "open"]
+    label: str
+
+
+class SightingFacts(TypedDict):
+    """Stretches in which a robot noticed a user: steps `first` to `last`, both included.
+
+    `false` marks stretches in which what was noticed was not that user.
+    """
+
+    robot: str
+    user: str
+    first: list[int]
+    last: list[int]
+    false: list[bool]
+
+
+class RunFacts(TypedDict):
+    """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown."""
+
+    title: str
+    status: str
+    notes: list[str]
+    start: str
+    step_us: int
+    steps: int
+    first_step: int
+    end_step: int
+    seed: int | None
+    digest: str | None
+    version: str
+    home: HomeFacts
+    bodies: list[BodyFacts]
+    tables: list[TableFacts]
+    walls: list[WallsChange]
+    marks: list[MarkFacts]
+    metrics: dict[str, Any]
+    scenario: dict[str, Any]
+    walks_every_s: float
+
+
+class Problem(TypedDict):
+    """Why something can't be shown."""
+
+    message: str
+
+
+class SessionFacts(TypedDict):
+    """What the page shows: runs, by title; the first may be under way."""
+
+    runs: list[str]
+    live: bool
+    version: str
+
+
+class LiveBody(TypedDict):
+    """A body at a step of a running simulation [lattice], and the way ahead: time [us], x, y."""
+
+    name: str
+    x: int
+    y: int
+    heading: int
+    away: bool
+    ahead: list[tuple[int, int, int]]
+    note: str
+
+
+class LiveEvent(TypedDict):
+    """An event of a running simulation."""
+
+    step: int
+    entity: str
+    event: str
+    user: str
+    detail: str
+
+
+class LiveFrame(TypedDict):
+    """The state of a running simulation; `speed` 0 is as fast as it goes."""
+
+    step: int
+    paused: bool
+    done: bool
+    speed: float
+    achieved: float
+    bodies: list[LiveBody]
+    seen: list[tuple[str, str]]
+    doors: dict[str, bool]
+    beliefs: dict[str, list[float]]
+    events: list[LiveEvent]
+    walls: int
+    message: str
+
+
+class LiveOrder(TypedDict):
+    """What the page asks a running simulation to do; `x` and `y` in metres."""
+
+    action: Literal["pause", "resume", "step", "speed", "door", "place", "call", "replan", "end"]
+    target: str
+    value: float
+    x: float
+    y: float

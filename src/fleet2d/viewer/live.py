@@ -1,0 +1,310 @@
+"""A running simulation on the page: it goes on in a thread, and sends what it comes to."""
+
+import json
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Route
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.viewer.contract import LiveFrame, LiveOrder
+from fleet2d.viewer.home_facts import walls_facts
+from fleet2d.viewer.live_engine import LiveEngine
+from fleet2d.viewer.live_facts import live_facts
+from fleet2d.viewer.responses import json_answer, problem
+from fleet2d.viewer.serve import PageServer
+from fleet2d.viewer.shown_run import compact_json
+
+FRAME_US = 60_000_000  # simulated time from frame to frame where it is run fast
+FRAMES_A_S = 30  # shown at most
+BATCHES_A_S = 30
+MOST_WAITING = 4_000  # frames that wait for a page that doesn't take them
+MOST_BODY = 4_096  # bytes of an order
+ORDER_WAIT_S = 10.0
+IDLE_S = 0.1
+ACTIONS = get_args(get_type_hints(LiveOrder)["action"])
+
+
+class LiveRun:
+    """A simulation that goes on in a thread of its own while pages watch it.
+
+    Attributes:
+        engine: The simulation as it is watched and steered.
+        run: The run once it is finished.
+    """
+
+    def __init__(self, simulation: Simulation, *, paused: bool = False, speed: float = 0.0) -> None:
+        """Prepare; `start` lets it run.
+
+        Args:
+            simulation: The simulation.
+            paused: Whether it waits for the page to let it go on.
+            speed: Times real time; 0 is as fast as it goes.
+        """
+        self.engine = LiveEngine(simulation)
+        self.run: Run | None = None
+        self.failure: BaseException | None = None
+        self._clock = simulation.clock
+        self._paused, self._speed = paused, speed
+        self._achieved = 0.0
+        self._orders: queue.Queue[tuple[LiveOrder, queue.Queue[str]]] = queue.Queue()
+        self._watchers: list[queue.Queue[LiveFrame]] = []
+        self._lock = threading.Lock()
+        self._ending = False
+        self._frame = self._state()
+        self._thread = threading.Thread(target=self._go, daemon=True, name="fleet2d-live")
+
+    def start(self) -> None:
+        """Let the simulation run."""
+        self._thread.start()
+
+    def end(self) -> None:
+        """Stop the simulation where it is, and close the run."""
+        self._ending = True
+        self._thread.join(timeout=60)
+
+    def wait(self) -> None:
+        """Wait until the simulation is over."""
+        self._thread.join()
+
+    def ask(self, order: LiveOrder) -> str:
+        """Hand an order to the simulation; return why it is refused, empty if it is not."""
+        answer: queue.Queue[str] = queue.Queue()
+        self._orders.put((order, answer))
+        try:
+            return answer.get(timeout=ORDER_WAIT_S)
+        except queue.Empty:
+            return "the simulation is over" if self.run else "the simulation does not answer"
+
+    # The thread of the simulation
+
+    def _go(self) -> None:
+        try:
+            while not self._ending:
+                idle = self._paused or self.engine.done
+                self._take_orders(IDLE_S if idle else 0.0)
+                if not self._paused and not self.engine.done:
+                    self._advance()
+        except BaseException as error:  # noqa: BLE001 - is shown on the page and raised by the command
+            self.failure = error
+            self._send({**self._frame, "message": f"the simulation failed: {error}"})
+        finally:
+            self.run = self.engine.finish()
+
+    def _advance(self) -> None:
+        began, before = time.perf_counter(), self.engine.step
+        self.engine.advance(self._slice())
+        self._send(self._state())
+        passed = (self.engine.step - before) * self._clock.step_us / 1e6
+        if self._speed:
+            rest = passed / self._speed - (time.perf_counter() - began)
+            if rest > 0:
+                self._take_orders(rest)
+        took = max(time.perf_counter() - began, 1e-9)
+        self._achieved = 0.9 * self._achieved + 0.1 * passed / took
+
+    def _slice(self) -> int:
+        """Return how many steps to go on by until the next frame."""
+        us = FRAME_US
+        if self._speed:
+            us = min(us, round(self._speed * 1e6 / FRAMES_A_S))
+        return max(1, us // self._clock.step_us)
+
+    def _take_orders(self, seconds: float) -> None:
+        """Do what pages asked for, and go on waiting for more for so long."""
+        until = time.perf_counter() + seconds
+        while not self._ending:
+            rest = until - time.perf_counter()
+            try:
+                order, answer = (
+                    self._orders.get(timeout=rest) if rest > 0 else self._orders.get_nowait()
+                )
+            except queue.Empty:
+                return
+            try:
+                self._obey(order)
+                answer.put("")
+            except (Fleet2DError, ValueError) as error:
+                answer.put(str(error))
+            self._send(self._state())
+
+    def _obey(self, order: LiveOrder) -> None:
+        action = order["action"]
+        if action == "pause":
+            self._paused = True
+        elif action == "resume":
+            self._paused = False
+        elif action == "end":
+            self._ending = True
+        elif action == "speed":
+            if not 0 <= order["value"] <= 1e6:
+                raise InputError("a speed is 0 (as fast as it goes) to 1,000,000 times real time")
+            self._speed = order["value"]
+        elif action == "step":
+            self._paused = True
+            if not self.engine.done:
+                self.engine.advance(max(1, min(86_400, round(order["value"]))))
+        elif self.engine.done:
+            raise InputError("the run is over: nothing can be done to it any more")
+        else:
+            self.engine.apply(order)
+
+    # Frames
+
+    def _state(self) -> LiveFrame:
+        engine = self.engine
+        self._frame = LiveFrame(
+            step=engine.step,
+            paused=self._paused,
+            done=engine.done,
+            speed=self._speed,
+            achieved=self._achieved,
+            bodies=engine.bodies(),
+            seen=engine.seen(),
+            doors=engine.doors(),
+            beliefs=engine.beliefs(),
+            events=engine.events(),
+            walls=engine.walls(),
+            message="",
+        )
+        return self._frame
+
+    def _send(self, frame: LiveFrame) -> None:
+        with self._lock:
+            for watcher in self._watchers:
+                if watcher.qsize() < MOST_WAITING:
+                    watcher.put(frame)
+
+    def frames(self) -> Iterator[list[LiveFrame]]:
+        """Yield the frames of the run from now on, those of a moment together."""
+        watcher: queue.Queue[LiveFrame] = queue.Queue()
+        with self._lock:
+            self._watchers.append(watcher)
+            watcher.put({**self._frame, "events": []})
+        try:
+            while not self._ending:
+                frames = []
+                try:
+                    frames.append(watcher.get(timeout=1.0))
+                except queue.Empty:
+                    yield []
+                    continue
+                while not watcher.empty() and len(frames) < MOST_WAITING:
+                    frames.append(watcher.get_nowait())
+                yield frames
+                time.sleep(1 / BATCHES_A_S)
+        finally:
+            with self._lock:
+                self._watchers.remove(watcher)
+
+    # Routes
+
+    def routes(self) -> list[Route]:
+        """Return what the page asks of a running simulation."""
+        return [
+            Route("/live/facts.json", self._facts),
+            Route("/live/frames", self._stream),
+            Route("/live/order", self._order, methods=["POST"]),
+            Route("/live/walls/{walls:int}.json", self._mesh),
+        ]
+
+    async def _facts(self, _: Request) -> Response:
+        facts = await run_in_threadpool(live_facts, self.engine.simulation)
+        return json_answer(compact_json(facts))
+
+    async def _mesh(self, request: Request) -> Response:
+        try:
+            return json_answer(
+                compact_json(walls_facts(self.engine.mesh(request.path_params["walls"])))
+            )
+        except InputError as error:
+            return problem(str(error))
+
+    async def _stream(self, _: Request) -> Response:
+        def lines() -> Iterator[bytes]:
+            for frames in self.frames():
+                yield b"data: " + compact_json(frames) + b"\n\n" if frames else b": wait\n\n"
+
+        return StreamingResponse(lines(), media_type="text/event-stream")
+
+    async def _order(self, request: Request) -> Response:
+        if request.headers.get("content-type", "").split(";")[0] != "application/json":
+            return problem("an order is JSON", 415)
+        body = await request.body()
+        try:
+            order = read_order(body)
+        except InputError as error:
+            return problem(str(error))
+        refusal = await run_in_threadpool(self.ask, order)
+        return problem(refusal) if refusal else json_answer(b"{}")
+
+
+def read_order(body: bytes) -> LiveOrder:
+    """Return the order that a page sent.
+
+    Raises:
+        InputError: It is none.
+    """
+    refusal = InputError("this is no order that a run can follow")
+    try:
+        content: Any = json.loads(body) if len(body) <= MOST_BODY else None
+        value, x, y = (float(content[key]) for key in ("value", "x", "y"))
+        action, target = content["action"], content["target"]
+    except (ValueError, KeyError, TypeError):
+        raise refusal from None
+    finite = all(abs(number) < 1e9 for number in (value, x, y))
+    if action not in ACTIONS or not isinstance(target, str) or not finite:
+        raise refusal
+    return LiveOrder(action=action, target=target, value=value, x=x, y=y)
+
+
+def watch_scenario(
+    scenario: str | Path | None,
+    overrides: list[str],
+    *,
+    seed: int | None = None,
+    out: Path | None = None,
+    port: int = 0,
+    open_browser: bool = True,
+    announce: Callable[[str], None] = print,
+) -> Run:
+    """Run a scenario while it is watched; return the run once it is closed.
+
+    Args:
+        scenario: As for ``fleet2d.run``.
+        overrides: Changes to it.
+        seed: Its seed.
+        out: Directory of the run; None keeps it in memory.
+        port: Of the page; 0 takes a free one.
+        open_browser: Whether to open the page.
+        announce: Is given the page's address.
+
+    Raises:
+        InputError: The scenario is wrong, or the port is in use.
+    """
+    import webbrowser
+
+    settings: dict[str, Any] = {} if seed is None else {"seed": seed}
+    live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
+    server = PageServer([], port=port, live=live)
+    announce(server.address)
+    live.start()
+    if open_browser:
+        webbrowser.open(server.address)
+    try:
+        server.run()
+    finally:
+        live.end()
+    if live.failure is not None:
+        raise live.failure
+    assert live.run is not None
+    return live.run

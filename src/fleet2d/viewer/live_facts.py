@@ -1,0 +1,57 @@
+"""What the page is told about a running simulation before its first frame."""
+
+import fleet2d
+from fleet2d.artifacts.manifest import plain
+from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.objects.door import Door
+from fleet2d.viewer.contract import DoorFacts, RunFacts, WallsChange
+from fleet2d.viewer.home_facts import home_facts
+from fleet2d.viewer.run_facts import bodies_of
+
+
+def live_facts(simulation: Simulation) -> RunFacts:
+    """Return the facts of a run that is under way: no tables yet."""
+    scenario = plain(simulation.scenario.resolved())
+    clock = simulation.clock
+    entities = {
+        "users": list(simulation.scenario.users),
+        "robots": list(simulation.scenario.robots),
+    }
+    return RunFacts(
+        title=simulation.scenario.name or "live run",
+        status="running",
+        notes=[],
+        start=clock.start.isoformat(),
+        step_us=clock.step_us,
+        steps=clock.steps,
+        first_step=0,
+        end_step=clock.steps,
+        seed=simulation.seed,
+        digest=None,
+        version=fleet2d.__version__,
+        home=home_facts(simulation.home.plan, _doors(simulation)),
+        bodies=bodies_of(scenario, entities),
+        tables=[],
+        walls=[WallsChange(step=0, walls=0)],
+        marks=[],
+        metrics={},
+        scenario=scenario,
+        walks_every_s=0.0,
+    )
+
+
+def _doors(simulation: Simulation) -> list[DoorFacts]:
+    doors = []
+    for name, thing in simulation.scenario.objects.items():
+        if isinstance(thing, Door):
+            doorway = thing.find(simulation.home.plan)
+            doors.append(
+                DoorFacts(
+                    name=name,
+                    start=doorway.start,
+                    end=doorway.end,
+                    open=thing.open,
+                    locked=thing.locked,
+                )
+            )
+    return doors

@@ -1,0 +1,75 @@
+"""How runs and homes show themselves in notebooks."""
+
+import base64
+import html
+import io
+from contextlib import suppress
+from typing import Any
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import Fleet2DError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.viewer.moments import clock_of, step_of
+from fleet2d.viewer.run_facts import run_title
+
+NOTEBOOK_DPI = 100
+
+
+def draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
+    """Draw a run, or a moment of it; see `Run.draw`."""
+    from fleet2d.view.run import run_figure
+    from fleet2d.viewer.pictures import moment_figure, moment_on_axes
+
+    last = run.manifest["steps"] - 1
+    step = last if at is None else at if isinstance(at, int) else step_of(at, clock_of(run), "at")
+    if axes is not None:
+        moment_on_axes(run, min(step, last), axes)
+        return axes
+    return run_figure(run) if at is None else moment_figure(run, step)
+
+
+def draw_plan(plan: FloorPlan, axes: Any) -> Any:
+    """Draw a floor plan; see `FloorPlan.draw`."""
+    from matplotlib.figure import Figure
+
+    from fleet2d.view.floorplan import drawing_style, figure_size, floorplan_axes
+
+    if axes is not None:
+        floorplan_axes(plan, axes, title=False)
+        return axes
+    with drawing_style():
+        figure = Figure(figsize=figure_size(plan))
+        floorplan_axes(plan, figure.add_axes((0, 0, 1, 1)))
+    return figure
+
+
+def plan_png(plan: FloorPlan) -> bytes | None:
+    """Return a picture of a floor plan; None where matplotlib is not installed."""
+    with suppress(Fleet2DError, ImportError):
+        return _png(draw_plan(plan, None))
+    return None
+
+
+def run_html(run: Run) -> str:
+    """Return a run as a notebook shows it: what ran, and its picture."""
+    clock, entities = clock_of(run), run.manifest["entities"]
+    facts = [
+        run.status,
+        f"{clock.start:%Y-%m-%d %H:%M} to {clock.time(clock.steps):%Y-%m-%d %H:%M}",
+        ", ".join([*entities["users"], *entities["robots"]]) or "nobody",
+        f"seed {run.manifest['seed']}",
+        f"digest {run.digest[:12]}" if run.digest else "no digest",
+    ]
+    words = html.escape(" · ".join(facts))
+    picture = ""
+    with suppress(Fleet2DError, ImportError):  # without matplotlib or a plan, there are words
+        content = base64.b64encode(_png(draw_run(run, None, None))).decode()
+        image = f"data:image/png;base64,{content}"
+        picture = f'<img alt="The run in its home" style="max-width:100%" src="{image}">'
+    return f"<div><b>{html.escape(run_title(run))}</b><p>{words}</p>{picture}</div>"
+
+
+def _png(figure: Any) -> bytes:
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
+    return picture.getvalue()

@@ -1,0 +1,141 @@
+"""A part of a run as a run of its own, so that whatever shows a run shows a part of one."""
+
+from collections.abc import Mapping
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.manifest import Manifest
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import ArtifactError
+from fleet2d.viewer.moments import clock_of
+
+KEY_FRAMES = "key_frames"
+
+
+def part_of_run(run: Run, first: int, end: int) -> Run:
+    """Return the part of a run from step `first` to before step `end`, in memory.
+
+    Its steps count from 0, its metrics are left out, and it can't be reproduced. Random walks are
+    kept as the positions they led to.
+
+    Args:
+        run: The run.
+        first: Its first step.
+        end: The step before which it ends.
+
+    Raises:
+        ArtifactError: A table is damaged.
+    """
+    clock = clock_of(run)
+    if (first, end) == (0, clock.steps):
+        return run
+    content = {
+        **run.manifest,
+        "start": clock.time(first).isoformat(),
+        "steps": end - first,
+        "simulated_s": (end - first) * clock.step_us / 1e6,
+        "metrics": {},
+        "tables": {},
+        "digest": None,
+    }
+    names = [name for name in run.tables if not name.startswith("layer.")]
+    tables = {name: _cut(run, name, first, end) for name in names}
+    part = Run(None, Manifest(**_known(content)), names, tables.__getitem__)
+    part.plan = run.plan
+    return part
+
+
+def key_frame_rows(table: Any, first: int, end: int) -> NDArray[np.int64]:
+    """Return the rows of a table of key frames that poses between two steps follow from."""
+    step = table["step"].to_numpy()
+    encoded = table["entity"].cast("string").combine_chunks().dictionary_encode()
+    entity = encoded.indices.to_numpy()
+    kinds = table["kind"].cast("string").combine_chunks().dictionary_encode()
+    planned = [code for code, word in enumerate(kinds.dictionary.to_pylist()) if word == "planned"]
+    reached = ~np.isin(kinds.indices.to_numpy(), planned)
+    kept = np.zeros(len(step), np.bool_)
+    for code in range(len(encoded.dictionary)):
+        mine = np.flatnonzero(entity == code)
+        before = mine[(step[mine] <= first) & reached[mine]]
+        after = mine[step[mine] >= end]
+        low = before[-1] if len(before) else mine[0]
+        high = after[0] if len(after) else mine[-1]
+        kept[mine[(mine >= low) & (mine <= high)]] = True
+    return np.flatnonzero(kept)
+
+
+def _known(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a manifest that this version knows."""
+    return {name: value for name, value in content.items() if name in Manifest.model_fields}
+
+
+def _cut(run: Run, name: str, first: int, end: int) -> Any:
+    """Return the rows of a table in a part of a run, their steps counted from its first."""
+    table = run.tables[name]
+    if name == KEY_FRAMES:
+        table = without_walks(run)
+        table = table.take(key_frame_rows(table, first, end))
+    else:
+        step = table["step"].to_numpy()
+        table = table.take(np.flatnonzero((step >= first) & (step < end)))
+    import pyarrow as pa
+
+    step = np.maximum(table["step"].to_numpy() - first, 0)
+    index = table.schema.get_field_index("step")
+    return table.set_column(index, table.schema.field(index), pa.array(step))
+
+
+def without_walks(run: Run) -> Any:
+    """Return the key frames of a run, random walks step by step.
+
+    Raises:
+        ArtifactError: A walk can't be walked again.
+    """
+    import pyarrow as pa
+
+    table = run.tables[KEY_FRAMES]
+    entity, kind = (table[name].cast("string").to_numpy(False) for name in ("entity", "kind"))
+    walkers = list(dict.fromkeys(entity[kind == "walk"].tolist()))
+    if not walkers:
+        return table
+    every = timedelta(microseconds=run.manifest["step_us"])
+    parts = [table.take(np.flatnonzero(~np.isin(entity, walkers)))]
+    parts += [positions(run, name, every) for name in walkers]
+    return pa.concat_tables([part.cast(plain_schema(table)) for part in parts])
+
+
+def plain_schema(table: Any) -> Any:
+    """Return the schema of a table of key frames, without metadata and with texts as they are."""
+    import pyarrow as pa
+
+    words = {"entity": pa.string(), "kind": pa.string()}
+    return pa.schema([(field.name, words.get(field.name, field.type)) for field in table.schema])
+
+
+def positions(run: Run, name: str, every: timedelta) -> Any:
+    """Return where a body was, every so often, in the columns of key_frames.
+
+    Raises:
+        ArtifactError: The run stored no key frames, or they can't be followed.
+    """
+    import pyarrow as pa
+
+    if KEY_FRAMES not in run.tables:
+        raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
+    path = run.path(name, every)
+    count = len(path.step)
+    return pa.table(
+        {
+            "step": path.step,
+            "time": path.time.astype("M8[us]"),
+            "entity": pa.array([name] * count, pa.string()),
+            "kind": pa.array(["track"] * count, pa.string()),
+            "x": path.x,
+            "y": path.y,
+            "heading": path.heading,
+            "away": path.away,
+        }
+    )

@@ -1,0 +1,187 @@
+"""Pictures of a run: a moment, a stretch, where time was spent, a strip of time, presence."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import InputError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import TEXT_COLOR
+from fleet2d.view.floorplan import (
+    DPI,
+    check_picture,
+    drawing_style,
+    figure_size,
+    floorplan_axes,
+    save_figure,
+)
+from fleet2d.view.layers import COLORS
+from fleet2d.view.life import blurred
+from fleet2d.view.run import draw_run
+from fleet2d.viewer.moments import clock_of
+from fleet2d.viewer.part import part_of_run
+from fleet2d.viewer.run_facts import bodies_of
+from fleet2d.viewer.stage import Stage
+from fleet2d.viewer.strip import draw_strip, strip_rows
+
+FigureKind = Literal["life", "heat", "strip"]
+
+BLUR_M = 0.15
+SAMPLES = 40_000
+HEIGHT_IN = 7.0
+
+
+def draw_moment(run: Run, step: int, path: Path) -> None:
+    """Draw a moment: who is where, what is in view and noticed, the minute before.
+
+    Args:
+        run: The run.
+        step: The step to show.
+        path: Where to: .png, .svg or .pdf. A file there is replaced.
+
+    Raises:
+        InputError: The run has no such step, or the file can't be written.
+        ArtifactError: The run stored no key frames or no floor plan.
+    """
+    check_picture(path)
+    with drawing_style():
+        figure = moment_figure(run, step)
+        save_figure(figure, path)
+
+
+def moment_figure(run: Run, step: int) -> Figure:
+    """Return a figure of a moment; see `draw_moment`."""
+    steps = run.manifest["steps"]
+    if not 0 <= step < steps:
+        raise InputError(f"the run has no step {step}: its last is {steps - 1}")
+    width, height = figure_size(run.plan)
+    figure = Figure(figsize=(width, height * 1.15), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    first, end = _day_around(run, step)
+    Stage(run, first, end, figure=figure).show(step)
+    return figure
+
+
+def moment_on_axes(run: Run, step: int, axes: Axes) -> None:
+    """Draw a moment on axes, in metres; see `draw_moment`."""
+    Stage(run, max(0, step - _minute(run)), step + 1, axes).show(step)
+
+
+def _minute(run: Run) -> int:
+    return max(1, round(60e6 / int(run.manifest["step_us"])))
+
+
+def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = "life") -> None:
+    """Draw a stretch of a run.
+
+    Args:
+        run: The run.
+        first: Its first step.
+        end: The step before which it ends.
+        path: Where to: .png, .svg or .pdf. A file there is replaced.
+        kind: `life`: the home being lived in, and who was where by day. `heat`: where people and
+            robots spent their time. `strip`: a row per body, coloured by room.
+
+    Raises:
+        InputError: The file can't be written.
+        ArtifactError: The run stored no key frames or no floor plan.
+    """
+    check_picture(path)
+    part = part_of_run(run, first, end)
+    if kind == "life":
+        draw_run(part, path)
+        return
+    with drawing_style():
+        save_figure(_heat_figure(part) if kind == "heat" else strip_figure(part), path)
+
+
+def strip_figure(part: Run) -> Figure:
+    """Return a figure of a strip of time: a row per body."""
+    bodies = bodies_of(part.manifest["scenario"], part.manifest["entities"])
+    rows = strip_rows(part, [(body["name"], body["color"]) for body in bodies])
+    figure = Figure(figsize=(10.67, 0.7 + 0.34 * len(rows)), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    height = figure.get_figheight()
+    axes = figure.add_axes((0.08, 0.32 / height, 0.9, 1 - 0.42 / height))
+    draw_strip(part, part.plan, rows, axes)
+    return figure
+
+
+def _heat_figure(part: Run) -> Figure:
+    """Return a figure of where people, and where robots, spent their time."""
+    entities = part.manifest["entities"]
+    groups = [(bucket, entities[bucket]) for bucket in ("users", "robots") if entities[bucket]]
+    if not groups:
+        raise InputError("nobody lives in this run: there is no heat map to draw")
+    width, height = figure_size(part.plan)
+    scale = min(1.0, HEIGHT_IN / height)
+    figure = Figure(figsize=(width * scale * len(groups), height * scale), dpi=DPI)
+    FigureCanvasAgg(figure)
+    share = 1 / len(groups)
+    for number, (bucket, names) in enumerate(groups):
+        axes = figure.add_axes((number * share, 0, share * 0.9, 1))
+        scaled = draw_heat(part, names, axes)
+        words = {"users": "people", "robots": "robots"}[bucket]
+        axes.set_title(f"{words}: hours per day and m²", fontsize=10, color=TEXT_COLOR, y=0.94)
+        bar = figure.add_axes(((number + 0.91) * share, 0.2, 0.012, 0.6))
+        figure.colorbar(scaled, cax=bar).ax.tick_params(labelsize=7)
+    return figure
+
+
+def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
+    """Draw where bodies spent their time, together, over their home.
+
+    Args:
+        run: The run, or a part of one.
+        names: The bodies.
+        axes: Where to draw, in metres.
+
+    Returns:
+        What a scale of the colours is made from: hours per day and m².
+    """
+    plan = run.plan
+    floorplan_axes(plan, axes, title=False)
+    hours = _hours_per_m2(run, plan, names)
+    high = float(hours.max()) or 1.0
+    # A night in one bed would hide the rest: the scale follows the square root.
+    scaled = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
+    image = scaled.to_rgba(hours)
+    image[..., 3] = np.clip(np.sqrt(hours / high) * 3, 0, 0.85) * plan.free
+    left, bottom = plan.lattice.origin
+    right = left + plan.lattice.columns * plan.lattice.cell
+    top = bottom + plan.lattice.rows * plan.lattice.cell
+    extent = (left, right, bottom, top)
+    axes.imshow(image, extent=extent, origin="lower", interpolation="bilinear", zorder=2.1)
+    return scaled
+
+
+def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> NDArray[np.float64]:
+    step_us, steps = run.manifest["step_us"], run.manifest["steps"]
+    every = timedelta(microseconds=int(step_us * -(-steps // SAMPLES)))
+    lattice = plan.lattice
+    time = np.zeros((lattice.rows, lattice.columns))
+    for name in names:
+        path = run.path(name, every)
+        xy = np.stack([path.x, path.y], axis=1)[~path.away]
+        column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
+        row, column = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
+        np.add.at(time, (row, column), 24 / max(1, len(path.x)))
+    return blurred(time, BLUR_M / lattice.cell) / lattice.cell**2
+
+
+def _day_around(run: Run, step: int) -> tuple[int, int]:
+    """Return the steps between which the day of a step lies."""
+    clock = clock_of(run)
+    midnight = clock.time(step).replace(hour=0, minute=0, second=0, microsecond=0)
+    first = clock.step_at_or_after(clock.elapsed(midnight))
+    end = clock.step_at_or_after(clock.elapsed(midnight + timedelta(days=1)))
+    return max(0, first), min(clock.steps, end)

@@ -1,0 +1,156 @@
+"""A report of a run: one HTML page with what ran, metrics, figures, and how to run it again."""
+
+import base64
+import html
+import tempfile
+from collections.abc import Callable, Mapping
+from datetime import timedelta
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import ArtifactError, InputError
+from fleet2d.units import format_duration
+from fleet2d.viewer.files import write_whole
+from fleet2d.viewer.moments import clock_of
+from fleet2d.viewer.run_facts import run_title
+
+DAY = timedelta(days=1)
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+STYLE = """
+:root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
+body { max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+figure { margin: 1rem 0; background: #fff; border-radius: 6px; padding: .5rem; }
+img { width: 100%; height: auto; display: block; }
+figcaption { color: #555; }
+table { border-collapse: collapse; }
+th, td { text-align: left; padding: .15rem 1rem .15rem 0; border-bottom: 1px solid #8884; }
+td { font-variant-numeric: tabular-nums; }
+pre { overflow: auto; background: #8881; padding: .8rem; border-radius: 6px; }
+"""
+
+
+def write_report(run: Run, path: Path) -> None:
+    """Write a report of a run as one HTML page that loads nothing.
+
+    Args:
+        run: The run.
+        path: The file; one that is there is replaced.
+
+    Raises:
+        InputError: The file can't be written.
+    """
+    write_whole(path, report_html(run).encode())
+
+
+def report_html(run: Run) -> str:
+    """Return a report of a run; see `write_report`."""
+    title = html.escape(run_title(run))
+    parts = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{title}: report</title><style>{STYLE}</style></head><body>",
+        f"<h1>{title}</h1>",
+        _what_ran(run),
+        _notes(run),
+        "<h2>Metrics</h2>",
+        _table(list(flat_metrics(run.metrics))) if run.metrics else "<p>The run has none.</p>",
+        "<h2>Figures</h2>",
+        *_figures(run),
+        "<h2>Run it again</h2>",
+        _again(run),
+        "</body></html>\n",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def _what_ran(run: Run) -> str:
+    manifest, clock = run.manifest, clock_of(run)
+    entities = manifest["entities"]
+    rows = [
+        ("status", run.status),
+        ("simulated", f"{clock.start:%Y-%m-%d %H:%M} to {clock.time(clock.steps):%Y-%m-%d %H:%M}"),
+        ("steps", f"{clock.steps:,} of {format_duration(timedelta(microseconds=clock.step_us))}"),
+        ("home", str(manifest["scenario"].get("floorplan", {}).get("name") or "")),
+        ("users", ", ".join(entities["users"]) or "none"),
+        ("robots", ", ".join(entities["robots"]) or "none"),
+        ("seed", str(manifest["seed"])),
+        ("digest", run.digest or "none"),
+        ("versions", ", ".join(f"{k} {v}" for k, v in sorted(manifest["versions"].items()))),
+    ]
+    return _table([row for row in rows if row[1]])
+
+
+def _notes(run: Run) -> str:
+    if not run.notes:
+        return ""
+    return "<ul>" + "".join(f"<li>{html.escape(note)}</li>" for note in run.notes) + "</ul>"
+
+
+def flat_metrics(value: Any, name: str = "") -> list[tuple[str, str]]:
+    """Return results of metrics as rows of a table.
+
+    >>> flat_metrics({"distance": {"ana": 334.25}})
+    [('distance · ana', '334.2')]
+    """
+    if isinstance(value, Mapping):
+        rows = []
+        for key, part in value.items():
+            rows += flat_metrics(part, f"{name} · {key}" if name else str(key))
+        return rows
+    return [(name, f"{value:.4g}" if isinstance(value, float) else str(value))]
+
+
+def _table(rows: list[tuple[str, str]]) -> str:
+    lines = (
+        f'<tr><th scope="row">{html.escape(name)}</th><td>{html.escape(value)}</td></tr>'
+        for name, value in rows
+    )
+    return f"<table>{''.join(lines)}</table>"
+
+
+def _figures(run: Run) -> list[str]:
+    """Return the pictures of a run, inside the page."""
+    from fleet2d.view.run import draw_run
+    from fleet2d.viewer.pictures import draw_stretch
+
+    steps = run.manifest["steps"]
+    day = min(steps, max(1, DAY // timedelta(microseconds=run.manifest["step_us"])))
+    kinds: tuple[tuple[str, Callable[..., None]], ...] = (
+        ("The run in its home, and who was where by day", partial(draw_run, run)),
+        ("The first day", partial(draw_stretch, run, 0, day, kind="strip")),
+        ("Where time was spent", partial(draw_stretch, run, 0, steps, kind="heat")),
+    )
+    figures = []
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "figure.png"
+        for words, draw in kinds:
+            try:
+                draw(path=target)
+            except (ArtifactError, InputError) as error:
+                figures.append(f"<p>{html.escape(words)}: {html.escape(str(error))}</p>")
+                continue
+            picture = base64.b64encode(target.read_bytes()).decode()
+            image = f'<img alt="{words}" src="data:image/png;base64,{picture}">'
+            figures.append(f"<figure>{image}<figcaption>{words}</figcaption></figure>")
+    return figures
+
+
+def _again(run: Run) -> str:
+    scenario = yaml.safe_dump(run.manifest["scenario"], sort_keys=False, allow_unicode=True)
+    where = run.directory or "RUN_DIR"
+    inputs = "".join(
+        f"<li>{html.escape(record['path'])} (SHA-256 {record['sha256'][:16]}…)</li>"
+        for record in run.manifest["inputs"]
+    )
+    files = f"<p>It read:</p><ul>{inputs}</ul>" if inputs else ""
+    return (
+        f"<pre>fleet2d reproduce {html.escape(str(where))}</pre>"
+        f"<p>compares every table with a new run of this scenario:</p>"
+        f"<pre>{html.escape(scenario)}</pre>{files}"
+    )

@@ -1,0 +1,113 @@
+"""Run the server at a free port of this machine, and open the browser."""
+
+import asyncio
+import socket
+import threading
+import webbrowser
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fleet2d.errors import InputError
+
+try:
+    import starlette  # noqa: F401 - the server needs both
+    import uvicorn
+except ImportError:
+    raise InputError('watching needs a server: pip install "fleet2d[view]"') from None
+
+from fleet2d.viewer.guard import new_token
+from fleet2d.viewer.server import LiveRoutes, Shelf, page_app
+from fleet2d.viewer.shown_run import ShownRun
+
+HOST = "127.0.0.1"
+MOST_RUNS = 4
+
+
+class PageServer:
+    """The server of a page, ready to be started.
+
+    Attributes:
+        address: Where the page is, with its token.
+        listens_at: Host and port.
+    """
+
+    def __init__(
+        self,
+        sources: Sequence[Path | ShownRun],
+        *,
+        port: int = 0,
+        live: LiveRoutes | None = None,
+    ) -> None:
+        """Take a port of this machine.
+
+        Args:
+            sources: Run directories, or runs.
+            port: The port; 0 takes a free one.
+            live: A running simulation.
+
+        Raises:
+            InputError: The port is in use.
+        """
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._socket.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
+        host, self._port = self._socket.getsockname()[:2]
+        self.listens_at: tuple[str, int] = (str(host), int(self._port))
+        token = new_token()
+        self.address = f"http://{HOST}:{self._port}/{token}/"
+        self._shelf = Shelf(sources)
+        app = page_app(self._shelf, token, self._port, live)
+        config = uvicorn.Config(
+            app, log_level="error", lifespan="off", ws="none", timeout_graceful_shutdown=1
+        )
+        self._server = uvicorn.Server(config)
+
+    def run(self) -> None:
+        """Serve until Ctrl-C."""
+        threading.Thread(target=self._shelf.warm, daemon=True, name="fleet2d-warm").start()
+        asyncio.run(self._server.serve(sockets=[self._socket]))
+
+    def close(self) -> None:
+        """Give the port back; for a server that was never run."""
+        self._socket.close()
+
+    def start(self) -> Callable[[], None]:
+        """Serve in a thread; return what ends it."""
+        thread = threading.Thread(target=self.run, daemon=True, name="fleet2d-view")
+        thread.start()
+
+        def stop() -> None:
+            self._server.should_exit = True
+            thread.join(timeout=5)
+
+        return stop
+
+
+def serve(
+    sources: Sequence[Path | ShownRun],
+    *,
+    port: int = 0,
+    live: LiveRoutes | None = None,
+    open_browser: bool = True,
+    announce: Callable[[str], None] = print,
+) -> None:
+    """Serve runs until Ctrl-C.
+
+    Args:
+        sources: Run directories, or runs.
+        port: The port; 0 takes a free one.
+        live: A running simulation.
+        open_browser: Whether to open the page.
+        announce: Is given the page's address.
+
+    Raises:
+        InputError: The port is in use.
+    """
+    server = PageServer(sources, port=port, live=live)
+    announce(server.address)
+    if open_browser:
+        webbrowser.open(server.address)
+    server.run()

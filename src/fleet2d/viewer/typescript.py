@@ -1,0 +1,52 @@
+"""Write the page's side of the contract: ``python -m fleet2d.viewer.typescript > contract.ts``."""
+
+import sys
+import types
+import typing
+from typing import Any, Literal, is_typeddict
+
+from fleet2d.viewer import contract
+
+HEADER = "// Written by `python -m fleet2d.viewer.typescript` from fleet2d.viewer.contract.\n"
+_PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
+
+
+def contract_source() -> str:
+    """Return the TypeScript interfaces of everything that the page is sent."""
+    shapes = [value for value in vars(contract).values() if is_typeddict(value)]
+    return "\n".join([HEADER, *map(_interface, shapes)])
+
+
+def _interface(shape: Any) -> str:
+    said = " ".join((shape.__doc__ or "").split())
+    fields = typing.get_type_hints(shape)
+    lines = [f"  {name}: {_written(kind)};" for name, kind in fields.items()]
+    body = "\n".join(lines)
+    return f"/** {said} */\nexport interface {shape.__name__} {{\n{body}\n}}\n"
+
+
+def _written(kind: Any) -> str:
+    """Return a type as TypeScript writes it."""
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if kind is Any:
+        return "unknown"
+    if kind in _PLAIN:
+        return _PLAIN[kind]
+    if is_typeddict(kind):
+        return str(kind.__name__)
+    if origin is Literal:
+        return " | ".join(f'"{word}"' for word in arguments)
+    if origin in (types.UnionType, typing.Union):
+        return " | ".join(map(_written, arguments))
+    if origin is list:
+        inner = _written(arguments[0])
+        return f"({inner})[]" if "|" in inner else f"{inner}[]"
+    if origin is tuple:
+        return f"[{', '.join(map(_written, arguments))}]"
+    if origin is dict:
+        return f"Record<{_written(arguments[0])}, {_written(arguments[1])}>"
+    raise TypeError(f"the page's contract has no word for {kind}")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(contract_source())

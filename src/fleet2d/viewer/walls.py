@@ -1,0 +1,133 @@
+"""What ended sight at each step of a stored run: doors that were shut, furniture that was moved."""
+
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+from fleet2d.artifacts.reader import Run
+from fleet2d.entities.objects.door import Door
+from fleet2d.errors import ArtifactError, Fleet2DError
+from fleet2d.floorplan.arrangement import moved
+from fleet2d.floorplan.doorways import Doorway
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels.mesh import Mesh
+from fleet2d.viewer.contract import DoorFacts, WallsChange
+
+_MOVED = re.compile(r"(.+) to \((\S+), (\S+)\)")
+MOST_ARRANGEMENTS = 500
+
+
+@dataclass
+class HomeDoors:
+    """The doors of a run, in the order of its scenario."""
+
+    names: list[str] = field(default_factory=list)
+    doorways: list[Doorway] = field(default_factory=list)
+    facts: list[DoorFacts] = field(default_factory=list)
+
+
+def doors_of(run: Run) -> HomeDoors:
+    """Return the doors that a run's scenario hangs in its home."""
+    doors = HomeDoors()
+    for name, settings in run.manifest["scenario"].get("objects", {}).items():
+        if settings.get("type") != "door":
+            continue
+        door = Door(**{key: value for key, value in settings.items() if key != "type"})
+        doorway = door.find(run.plan)
+        doors.names.append(name)
+        doors.doorways.append(doorway)
+        doors.facts.append(
+            DoorFacts(
+                name=name,
+                start=doorway.start,
+                end=doorway.end,
+                open=door.open,
+                locked=door.locked,
+            )
+        )
+    return doors
+
+
+class WallsHistory:
+    """The walls of a run over time, each arrangement of doors and furniture once.
+
+    Attributes:
+        changes: From which step on which walls hold, in order.
+    """
+
+    def __init__(self, run: Run, doors: HomeDoors) -> None:
+        """Go through the events of a run."""
+        self._home = Home(run.plan, doors.doorways)
+        self._doors = doors
+        self._meshes: list[Mesh] = []
+        self._numbers: dict[tuple[object, ...], int] = {}
+        for number, door in enumerate(doors.facts):
+            if not door["open"]:
+                self._home.set_door(number, is_open=False)
+        self.changes = [WallsChange(step=0, walls=self._number())]
+        if doors.names or run.manifest["scenario"].get("changes"):
+            for step, entity, event, detail in _home_events(run):
+                self._follow(step, entity, event, detail)
+
+    def mesh(self, number: int) -> Mesh:
+        """Return what ends sight in an arrangement.
+
+        Raises:
+            ArtifactError: There is no such arrangement.
+        """
+        if not 0 <= number < len(self._meshes):
+            raise ArtifactError(f"the run has no walls of number {number}")
+        return self._meshes[number]
+
+    @property
+    def count(self) -> int:
+        """Number of different arrangements."""
+        return len(self._meshes)
+
+    def _follow(self, step: int, entity: str, event: str, detail: str) -> None:
+        if event in ("opened", "shut") and entity in self._doors.names:
+            self._home.set_door(self._doors.names.index(entity), is_open=event == "opened")
+        elif event == "moved" and (place := _MOVED.fullmatch(detail)):
+            thing = self._home.object(place[1])
+            to = (float(place[2]), float(place[3]))
+            try:
+                self._home.put(moved(thing, self._home.plan.lattice, to, 0.0))
+            except Fleet2DError:
+                return
+        else:
+            return
+        if len(self._meshes) >= MOST_ARRANGEMENTS:
+            return
+        walls = self._number()
+        if walls != self.changes[-1]["walls"]:
+            if self.changes[-1]["step"] == step:
+                self.changes.pop()
+            self.changes.append(WallsChange(step=step, walls=walls))
+
+    def _number(self) -> int:
+        tall = tuple(thing for thing in self._home.objects if thing.blocks == "sight")
+        places = tuple((thing.name, thing.footprint.wkb) for thing in tall)
+        key = (self._home.shut, places)
+        if key not in self._numbers:
+            self._numbers[key] = len(self._meshes)
+            self._meshes.append(self._home.walls)
+        return self._numbers[key]
+
+
+def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
+    """Return step, entity, event and detail of what changed in the home, in order."""
+    if "events" not in run.tables:
+        return []
+    from pyarrow import array, compute
+
+    try:
+        table = run.tables["events"]
+    except ArtifactError:  # the run's notes say that it is damaged
+        return []
+    words = compute.cast(table["event"], "string")
+    rows = table.filter(compute.is_in(words, array(["opened", "shut", "moved"])))
+    columns: list[list[Any]] = [
+        rows["step"].to_pylist(),
+        *(rows[name].cast("string").to_pylist() for name in ("entity", "event", "detail")),
+    ]
+    return list(zip(*columns, strict=True))

@@ -1,0 +1,68 @@
+"""Words on the frames of a film: each is drawn once, and pasted wherever it comes again."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.backends.backend_agg import RendererAgg
+from matplotlib.text import Text
+from numpy.typing import NDArray
+
+EDGE = 2  # pixels around a word that its smoothed rim may reach
+
+
+class Stamp(NamedTuple):
+    """A drawn word: float32 (rows, columns, 4) in 0 to 1, and where its corner lies [pixels]."""
+
+    picture: NDArray[np.float32]
+    left: int
+    top: int
+
+
+class Words:
+    """Pastes texts on pictures of one size; drawing one anew takes a hundred times as long."""
+
+    def __init__(self, width: int, height: int, dpi: float) -> None:
+        """Prepare for pictures of a size [pixels]."""
+        self._renderer: Any = RendererAgg(width, height, dpi)
+        self._height = height
+        self._stamps: dict[tuple[str, object, float], Stamp | None] = {}
+
+    def paste(self, text: Text, pixels: NDArray[np.uint8]) -> None:
+        """Paste a text where it is on a picture.
+
+        Args:
+            text: The text; one that is not visible is left out.
+            pixels: uint8 (rows, columns, 4), changed in place.
+        """
+        if not text.get_visible() or not text.get_text():
+            return
+        x, y = text.get_transform().transform(text.get_position()).tolist()
+        key = (text.get_text(), text.get_color(), float(text.get_fontsize()))
+        if key not in self._stamps:
+            self._stamps[key] = self._drawn(text, x, y)
+        stamp = self._stamps[key]
+        if stamp is None:
+            return
+        rows, columns = stamp.picture.shape[:2]
+        top, left = round(self._height - y) + stamp.top, round(x) + stamp.left
+        low, high = max(0, top), min(pixels.shape[0], top + rows)
+        begin, end = max(0, left), min(pixels.shape[1], left + columns)
+        if low >= high or begin >= end:
+            return
+        part = stamp.picture[low - top : high - top, begin - left : end - left]
+        target = pixels[low:high, begin:end, :3]
+        opacity = part[..., 3:]
+        target[...] = target * (1 - opacity) + 255 * part[..., :3] * opacity + 0.5
+
+    def _drawn(self, text: Text, x: float, y: float) -> Stamp | None:
+        """Draw a text alone, and cut out where it is."""
+        self._renderer.clear()
+        text.draw(self._renderer)
+        box = text.get_window_extent(self._renderer)
+        left, right = max(0, int(box.x0) - EDGE), int(box.x1) + EDGE
+        top, bottom = max(0, int(self._height - box.y1) - EDGE), int(self._height - box.y0) + EDGE
+        cut = np.asarray(self._renderer.buffer_rgba())[top:bottom, left:right]
+        if not cut.any():
+            return None
+        drawn = (cut / 255).astype(np.float32)
+        return Stamp(drawn, left - round(x), top - round(self._height - y))

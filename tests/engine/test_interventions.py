@@ -1,0 +1,214 @@
+"""Interventions: what is done to a run from outside, kept in its manifest and done again."""
+
+import copy
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.scenes import everything, scenario
+
+import fleet2d
+from fleet2d.engine.interventions import read_intervention
+from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
+from fleet2d.events import Event
+
+
+def home(duration: str = "20 min", **more: Any) -> dict[str, Any]:
+    return scenario(
+        duration,
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol", "dwell": "30 s"}},
+        **more,
+    )
+
+
+def simulation(**more: Any) -> fleet2d.Simulation:
+    return fleet2d.Simulation(home(**more))
+
+
+def steer(run: fleet2d.Simulation) -> None:
+    """Do one of each."""
+    run.advance(61)
+    run.put("ana", "kitchen", heading_deg=90)
+    run.advance(100)
+    run.replan("astro")
+    run.advance(3)
+    run.drive("astro")
+    run.advance({"astro": run.plan("astro").go_to("kitchen").stay(timedelta(seconds=40))})
+    run.advance({"astro": run.plan("astro").turn_by(0.5).stay(timedelta(hours=1))})
+
+
+@pytest.mark.parametrize("max_span", [None, 1, 7])
+def test_a_steered_run_is_done_again_from_its_manifest(max_span: int | None) -> None:
+    steered = simulation()
+    steer(steered)
+    stored = steered.run()
+    content = home()
+    content["simulation"]["max_span"] = max_span
+    interventions = stored.manifest["interventions"]
+    again = fleet2d.Simulation(content, interventions=interventions).run()
+    assert stored.digest == again.digest
+    assert stored.digest != fleet2d.run(home()).digest
+    assert ["put", "replan", "drive", "decide", "decide"] == [i["do"] for i in interventions]
+
+
+def test_reproduce_does_interventions_again(tmp_path: Path) -> None:
+    steered = fleet2d.Simulation(home(), out=tmp_path / "run")
+    steer(steered)
+    steered.run()
+    assert fleet2d.reproduce(tmp_path / "run").same
+
+
+def test_a_body_that_is_put_somewhere_is_there_at_once_and_nobody_else_changes() -> None:
+    run, other = simulation(), simulation()
+    for each in (run, other):
+        each.advance(120)
+    run.put("astro", "bedroom")
+    for each in (run, other):
+        each.advance(1)
+    assert run.state["astro"]["room"].startswith("bedroom")
+    assert run.state["ana"] == other.state["ana"]
+
+
+def test_a_body_is_put_at_a_point_with_a_heading() -> None:
+    run = simulation()
+    run.advance(10)
+    x, y = run.home.rooms[0].anchor_xy
+    run.put("ana", (x, y), heading_deg=180)
+    run.advance(1)
+    state = run.state["ana"]
+    assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)  # a step away
+
+
+def test_poses_are_rebuilt_through_a_jump() -> None:
+    content = home(artifacts={"trajectories": "every step"})
+    run = fleet2d.Simulation(content)
+    run.advance(200)
+    run.put("astro", "kitchen")
+    stored = run.run()
+    rows = stored.pandas("trajectories")
+    rows = rows[rows["entity"] == "astro"]
+    path = stored.path("astro", every=timedelta(seconds=1))
+    assert rows["x"].tolist() == path.x.tolist()
+    assert rows["y"].tolist() == path.y.tolist()
+
+
+@pytest.mark.parametrize(
+    ("place", "error"),
+    [("attic", PlacementError), ((-5.0, -5.0), PlacementError)],
+)
+def test_a_place_that_can_not_be_is_refused_and_nothing_is_done(place: Any, error: type) -> None:
+    run = simulation()
+    run.advance(5)
+    with pytest.raises(error):
+        run.put("ana", place)
+    assert [] == run.run().manifest["interventions"]
+
+
+def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
+    run = simulation()
+    for call in (lambda: run.put("anna", "kitchen"), lambda: run.replan("anna")):
+        with pytest.raises(ScenarioError, match="did you mean 'ana'"):
+            call()
+    with pytest.raises(InputError, match="did you mean 'user_seen'"):
+        run.run_until(event="user_sen")
+    with pytest.raises(InputError, match="did you mean 'astro'"):
+        run.run_until(event="user_seen", entity="asto")
+    with pytest.raises(InputError, match="no time of day"):
+        run.run_until("noon")
+
+
+def test_a_driven_body_without_a_plan_is_an_error_and_others_need_none() -> None:
+    run = simulation()
+    run.drive("astro")
+    assert ["astro"] == run.pending()
+    with pytest.raises(InputError, match="astro has to decide now"):
+        run.advance({})
+    with pytest.raises(InputError, match="isn't driven"):
+        run.advance({"astro": run.plan("astro").stay(), "ana": run.plan("ana").stay()})
+
+
+def test_an_outside_mind_takes_every_decision_and_no_other_step() -> None:
+    run = simulation()
+    run.drive("astro")
+    steps = []
+    while run.pending():
+        steps.append(run.step)
+        run.advance({"astro": run.plan("astro").stay(timedelta(seconds=100))})
+    assert list(range(0, 1200, 100)) == steps
+    assert run.done
+
+
+def test_run_until_a_time_of_day_is_the_next_such_time() -> None:
+    run = fleet2d.Simulation(home("3 d"))
+    run.run_until("19:00")
+    assert ("2026-01-05T19:00:00", 12 * 3600) == (run.time.isoformat(), run.step)
+    run.run_until("06:30")
+    assert "2026-01-06T06:30:00" == run.time.isoformat()
+
+
+@pytest.mark.parametrize("max_span", [None, 1, 50])
+def test_run_until_an_event_stops_right_after_the_first_one(max_span: int | None) -> None:
+    content = everything("30 min")
+    content["simulation"]["max_span"] = max_span
+    run = fleet2d.Simulation(content)
+    found = run.run_until(event="user_seen")
+    assert isinstance(found, Event)
+    assert run.step == found.step + 1
+    events = fleet2d.run(everything("30 min")).pandas("events")
+    first = events[events["event"] == "user_seen"].iloc[0]
+    assert (first["step"], first["entity"]) == (found.step, found.entity)
+
+
+def test_waiting_for_an_event_changes_nothing_and_ends_at_its_timeout() -> None:
+    run = simulation()
+    assert run.run_until(event="docks", timeout="5 min") is None
+    assert 300 == run.step
+    assert run.run().digest == fleet2d.run(home()).digest
+
+
+def test_events_are_those_of_the_table_however_a_run_is_cut() -> None:
+    content = everything("30 min")
+    table = fleet2d.run(content).pandas("events")
+    run = fleet2d.Simulation(content)
+    heard: list[Event] = []
+    run.listen(heard.extend)
+    while not run.done:
+        run.advance(97)
+    events = run.events()
+    assert sorted(heard) == sorted(events)
+    assert table["step"].tolist() == [event.step for event in events]
+    assert sorted(zip(table["step"], table["event"], strict=True)) == sorted(
+        (event.step, str(event.event)) for event in events
+    )
+    assert [e for e in events if e.step >= 900] == run.events(since=900)
+
+
+def test_a_change_by_a_script_is_done_again() -> None:
+    door = {"type": "door", "doorway": "bathroom_0"}
+    content = home("30 min", objects={"kitchen_door": door})
+    run = fleet2d.Simulation(content)
+    run.advance(300)
+    run.change(shut="kitchen_door")
+    with pytest.raises(ComponentError, match="no door 'x'"):
+        run.change(shut="x")
+    stored = run.run()
+    interventions = stored.manifest["interventions"]
+    assert stored.digest == fleet2d.Simulation(content, interventions=interventions).run().digest
+    assert 1 == len(interventions)
+
+
+def test_a_branch_keeps_what_was_done_and_what_is_to_be_done() -> None:
+    run = simulation()
+    run.advance(50)
+    run.put("ana", "kitchen")
+    branch = copy.deepcopy(run)
+    first, second = run.run(), branch.run()
+    assert first.digest == second.digest
+    assert first.manifest["interventions"] == second.manifest["interventions"]
+
+
+def test_interventions_are_read_as_they_are_written() -> None:
+    content = {"do": "put", "step": 3, "entity": "ana", "x": 1, "y": 2, "heading": 5}
+    assert content == read_intervention(content).model_dump(mode="json")

@@ -1,0 +1,66 @@
+"""Visits: how people move about a home, counted alike in logs and in simulated lives."""
+
+import statistics
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
+from fleet2d.fit.visits import Visits, count_visits, spread, stays
+from fleet2d.routines.persona import bundled
+
+KINDS = ("away", "bathroom", "hallway", "kitchen", "living_room")
+HOUR = 3600
+
+
+def trace(*pieces: tuple[str, int]) -> Trace:
+    """A day from midnight: kinds of rooms and seconds, the last one until midnight."""
+    rooms = np.full(86_400, KINDS.index(pieces[-1][0]), np.int16)
+    at = 0
+    for kind, length in pieces[:-1]:
+        rooms[at : at + length] = KINDS.index(kind)
+        at += length
+    return Trace(rooms, KINDS)
+
+
+def test_passing_through_a_room_is_no_visit() -> None:
+    day = trace(("kitchen", HOUR), ("hallway", 60), ("bathroom", 5), ("living_room", 0))
+    assert ["kitchen", "living_room"] == [stay.kind for stay in stays(*day)]
+
+
+def test_a_short_way_there_and_back_is_a_short_visit_and_a_return() -> None:
+    day = trace(("living_room", 10 * HOUR), ("bathroom", 100), ("living_room", 0))
+    assert Visits([1], [1], [1], [1], [0]) == count_visits(*day)
+
+
+def test_a_long_visit_is_neither() -> None:
+    day = trace(("living_room", 10 * HOUR), ("kitchen", HOUR), ("living_room", 0))
+    assert Visits([0], [0], [0], [0], [0]) == count_visits(*day)
+
+
+def test_coming_home_is_counted_and_a_night_visit_is_none_of_the_daytime() -> None:
+    day = trace(("living_room", HOUR), ("bathroom", 200), ("away", 9 * HOUR), ("living_room", 0))
+    assert Visits([1], [0], [0], [0], [1]) == count_visits(*day)
+
+
+@pytest.fixture(scope="module")
+def real_homes(shared_data: Path) -> list[Visits]:
+    logs = ("casas_al/events_10_days.txt", "uci_adl_a")
+    return [count_visits(*trace_of_log(shared_data / "activity" / log)) for log in logs]
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_a_persona_moves_about_as_people_of_real_homes_do(
+    name: str, real_homes: list[Visits]
+) -> None:
+    low, high = spread(real_homes)
+    counted = count_visits(*trace_of_persona(name, 14, 4))
+    for field, a, b, values in zip(Visits._fields, low, high, counted, strict=True):
+        assert a <= statistics.mean(values) <= b, field
+
+
+@pytest.mark.parametrize("name", ["retired", "works_from_home"])
+def test_who_is_at_home_goes_to_the_bathroom_in_the_daytime(name: str) -> None:
+    counted = count_visits(*trace_of_persona(name, 14, 4))
+    assert 3 <= statistics.mean(counted.bathroom_daytime) <= 8

@@ -1,0 +1,677 @@
+"""What holds for the whole compiled core: its stub, its docstrings, and the checks of its border."""
+
+import ast
+import importlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tests.homes import home_of
+
+import fleet2d
+from fleet2d import _core
+from fleet2d.engine.cameras import new_memory
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels.lens import Lenses
+from fleet2d.kernels.look import Rule
+from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
+from fleet2d.kernels.perception import ErrorTables
+from fleet2d.kernels.routes import Corners
+from fleet2d.kernels.seen import Reach
+from fleet2d.kernels.stays import Moments, Stretches, Ways
+from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances
+from fleet2d.sight.camera import Camera
+from fleet2d.sight.perception import Perception
+from fleet2d.sight.tables import Scene, error_tables, stack_lenses
+
+PACKAGE = Path(fleet2d.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+PUBLIC = {name: value for name, value in vars(_core).items() if not name.startswith("_")}
+FUNCTIONS = {name for name, value in PUBLIC.items() if type(value).__name__ == "nb_func"}
+CLASSES = {name for name, value in PUBLIC.items() if isinstance(value, type)}
+
+
+# --- What is written about it ------------------------------------------------------------------
+
+
+def test_the_stub_is_what_nanobind_makes_of_the_module() -> None:
+    """Of spaces and line breaks, other versions of nanobind think otherwise."""
+    stubs = pytest.importorskip("nanobind.stubgen", reason="nanobind isn't installed")
+    generator = stubs.StubGen(_core, quiet=True)
+    generator.put(_core)
+    stub = (PACKAGE / "_core.pyi").read_text()
+    assert ast.dump(ast.parse(stub)) == ast.dump(ast.parse(generator.get())), (
+        "the stub is of another core: tools/make_stub"
+    )
+
+
+def test_there_are_functions_classes_and_constants() -> None:
+    assert {"look", "watch", "locate", "visible_region"} <= FUNCTIONS
+    assert {"Mesh", "Routes", "Window", "Timelines", "UserDraw"} <= CLASSES
+    assert all(
+        isinstance(PUBLIC[n], int | float | np.ndarray) for n in {*PUBLIC} - FUNCTIONS - CLASSES
+    )
+
+
+def parts(name: str) -> Iterator[tuple[str, Any]]:
+    """Yield a public name of the core, and if it is a class its own public members."""
+    yield name, PUBLIC[name]
+    if name in CLASSES and type(PUBLIC[name]).__name__ != "EnumType":
+        for member, value in vars(PUBLIC[name]).items():
+            if not member.startswith("_"):
+                yield f"{name}.{member}", value
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS | CLASSES))
+def test_every_name_says_what_it_is(name: str) -> None:
+    for part, value in parts(name):
+        text = (value.__doc__ or "").strip()
+        # A function's begins with its signature; what follows is what it does.
+        described = (
+            text.partition("\n\n")[2] if type(value).__name__ in ("nb_func", "nb_method") else text
+        )
+        assert described[:1].isalnum(), part
+
+
+def imported(path: Path) -> set[str]:
+    """Return the modules that a module imports anywhere in it, in full."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return names
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody(path: Path) -> None:
+    names = imported(path)
+    assert not {name for name in names if name.partition(".")[0] == "numba"}
+    if path.parent != PACKAGE / "kernels":
+        assert "fleet2d._core" not in names
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "kernels").glob("*.py")), ids=lambda p: p.stem)
+def test_a_module_of_kernels_lists_what_it_has_and_all_of_it_is_there(path: Path) -> None:
+    if path.stem == "__init__":
+        return
+    module = importlib.import_module(f"fleet2d.kernels.{path.stem}")
+    assert len(set(module.__all__)) == len(module.__all__)
+    own = {
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and (name in PUBLIC or getattr(value, "__module__", "") == module.__name__)
+    }
+    assert own <= {*module.__all__, *vars(_core)}
+    for name in module.__all__:
+        assert hasattr(module, name)
+
+
+# --- A call of every function ------------------------------------------------------------------
+
+SECOND = 1_000_000
+HOME = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
+MESH = HOME.mesh
+LATTICE = Lattice(0.05, (0.0, 0.0), HOME.columns, HOME.rows)
+CAMERAS = [
+    Camera(range=(0.1, 0.6), angle_deg=108, body_points=4),
+    Camera.model_validate(
+        {
+            "range": [0, 0.4],
+            "offset": [0.05, -0.02],
+            "heading_deg": 40,
+            "period": "2 s",
+            "latency": "3 s",
+            "pan": {"headings_deg": [-60, 0, 60], "dwell": "2 s"},
+        }
+    ),
+]
+ERRS = Perception.model_validate(
+    {
+        "detection": {"distance": [[0, 1], [1, 0.5]], "memory": "5 s"},
+        "identity": {"mistaken": 0.2, "per_track": True},
+        "attributes": {
+            "range_noise": 0.1,
+            "bearing_noise_deg": 3,
+            "posture": {"sit": {"lie": 0.3}},
+        },
+        "false_positives": {
+            "per_hour": 900,
+            "spots": [{"at": [0.3, 0.3], "per_hour": 100, "spread": 0.1}],
+        },
+    }
+)
+USERS = 2
+STEPS = 9
+POINTS = np.array([[100, 100], [300, 900], [-5, 2**29], [500, 300]])
+MASK = np.array([[1, 1, 0, 1], [0, 1, 0, 1], [1, 1, 1, 1]], bool)
+COSTS = np.array([[0, 100, -1, 5], [1000, 0, -1, 0], [0, 0, 0, 20]], np.int32)
+KEY = 2**64 - 3
+
+
+def scene() -> Scene:
+    return Scene([f"u{i}" for i in range(USERS)], [100.0] * USERS, LATTICE, SECOND, "robots.r")
+
+
+def lenses() -> Lenses:
+    return stack_lenses([c.lens(1280, SECOND) for c in CAMERAS], [True, False], scene())
+
+
+def errors() -> ErrorTables:
+    return error_tables([c.lens(1280, SECOND) for c in CAMERAS], [ERRS, None], scene())
+
+
+def window() -> _core.Window:
+    x = np.array([[100, 100, 110, 120, 200, 200, 200, 100, 100]] * 3)
+    x[1:] += [[150], [700]]
+    away = np.zeros(x.shape, np.uint8)
+    away[1, 2] = 1
+    return _core.Window(0, x, x // 2 + 200, x * 7 % 4096, away, (x % 3).astype(np.int8))
+
+
+def poses() -> Any:
+    out = empty_poses(STEPS)
+    for column in out:
+        column[:] = np.arange(STEPS) * 20
+    out.away[:] = 0
+    return out
+
+
+def track() -> Breakpoints:
+    row = np.arange(5) * SECOND
+    return Breakpoints(row, row // 20_000, row // 30_000, row % 4096, np.zeros(5, np.uint8))
+
+
+def watched() -> Watched:
+    patches = np.full((HOME.rows, HOME.columns), -1, np.int16)
+    patches[:6], patches[6:12] = 0, 1
+    return Watched(MESH, lenses(), patches, SECOND, 1, 4)
+
+
+def record() -> Record:
+    def never() -> Any:
+        return np.full((HOME.rows, HOME.columns), NEVER, np.int64)
+
+    bins = (np.zeros((3, 2), np.int64) for _ in range(2))
+    return Record(never(), never(), np.zeros(2, np.int64), never(), *bins)
+
+
+def ways() -> Ways:
+    follow = np.array([[0, 0.6, 0.3, 0.1], [0.5, 0, 0.4, 0.1], [0.7, 0.3, 0, 0]])
+    spread = np.array([0.4, 0.6, 1.0, 1.0])
+    first = np.array([0, 2, 3, 4])
+    return Ways(np.full(3, 0.9), follow, spread, np.array([0.1, 0.0, 0.0]), first, 0.8)
+
+
+def stretches() -> Stretches:
+    shown = np.array([[255, 0, 30, 0], [255, 0, 30, 0], [0, 0, 255, 0]], np.uint8)
+    begin, patch = np.array([0, 1, 1, 2]), np.array([0, 2])
+    return Stretches(np.array([1, 2, 1]), np.zeros(3, np.int64), shown, begin, patch, np.ones(2))
+
+
+def moments() -> Moments:
+    return Moments(np.zeros(3), np.zeros((3, 4)), np.zeros(4), np.zeros(3), np.zeros(3))
+
+
+def region(x: int = 200, y: int = 200) -> tuple[Any, Any]:
+    right, wall = _core.visible_region(MESH, x, y)
+    return right, wall
+
+
+def corners() -> Corners:
+    vertex = np.flatnonzero((MESH.vertices[:, 0] == 500) | (MESH.vertices[:, 0] == 640))
+    place = MESH.vertices[vertex]
+    return Corners(
+        vertex, place + np.array([2, 0]), place + np.array([0, 2]), np.ones(len(vertex), bool)
+    )
+
+
+def timelines() -> _core.Timelines:
+    made = _core.Timelines(2, SECOND)
+    made.follow(0, 0, track(), np.array([5]), np.array([0, 1], np.int8))
+    made.walk(1, 0, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
+    return made
+
+
+Args = Callable[[], tuple[Any, ...]]
+CALLS: dict[str, Args] = {
+    "Mesh": lambda: (MESH.vertices.copy(), MESH.triangles.copy(), MESH.neighbors.copy()),
+    "Mesh.with_neighbors": lambda: (MESH, MESH.neighbors.copy()),
+    "locate": lambda: (MESH, 100, 100),
+    "orient": lambda: (1, 2, 3, 4, 5, 7),
+    "contains_triangle": lambda: (MESH, 0, 100, 100),
+    "strictly_inside": lambda: (MESH, 100, 100),
+    "rasterize_cells": lambda: (MESH, HOME.rows, HOME.columns),
+    "label_triangles": lambda: (MESH.neighbors.copy(),),
+    "half_sine": lambda: (5000,),
+    "sine": lambda: (5000,),
+    "cosine": lambda: (5000,),
+    "heading_of": lambda: (300, -4),
+    "turn_between": lambda: (4000, 100),
+    "random_bits": lambda: (KEY, 4),
+    "random_below": lambda: (KEY, 4, 100),
+    "random_uniform": lambda: (KEY, 4),
+    "random_bell": lambda: (KEY, 4),
+    "near_wedge": lambda: (100, 300, 50, 60, 20),
+    "in_wedge": lambda: (100, 300, 50, 60),
+    "camera_pose": lambda: (lenses(), 1, 100, 100, 5, SECOND),
+    "points_in_view": lambda: (MESH, lenses(), 0, 1, 100, 100, 5, 70, 30),
+    "line_of_sight": lambda: (MESH, 100, 100, 0, 300, 900),
+    "build_fans": lambda: (MESH,),
+    "vertices_seen_from_point": lambda: (MESH, 100, 100),
+    "vertices_seen_from_vertex": lambda: (MESH, 3),
+    "see_each": lambda: (MESH, POINTS.copy(), POINTS[::-1].copy()),
+    "label_frames": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int32), 3),
+    "fill_beside": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int16),),
+    "spread_labels": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.copy()),
+    "label_parts": lambda: (MASK.copy(), True),
+    "count_steps": lambda: (MASK.copy(), MASK.copy()),
+    "trace_rings": lambda: (MASK.copy(),),
+    "squared_distance": lambda: (MASK.copy(),),
+    "walking_distance": lambda: (MASK.copy(), np.array([[0, 0], [2, 3]])),
+    "cost_distance": lambda: (COSTS.copy(), (0, 0), (2, 3)),
+    "step_cost": lambda: (COSTS.copy(), 0, 0, 0, 1),
+    "descend": lambda: (COSTS.copy(), _core.cost_distance(COSTS, (0, 0), (-1, -1)), (2, 3)),
+    "leg_cost": lambda: (COSTS.copy(), 5, 5, 200, 150),
+    "pull_taut": lambda: (
+        MESH,
+        COSTS.copy(),
+        np.array([[10, 10], [60, 60], [60, 150], [200, 150]]),
+    ),
+    "visible_region": lambda: (MESH, 200, 200),
+    "region_contains": lambda: (MESH, 200, 200, *region(), 210, 300),
+    "region_contains_points": lambda: (MESH, 200, 200, *region(), POINTS.copy()),
+    "regions_of_cells": lambda: (
+        MESH,
+        np.array([[1, 1], [2, 5]]),
+        _core.rasterize_cells(MESH, HOME.rows, HOME.columns),
+    ),
+    "region_outline": lambda: (MESH, 200, 200, *region()),
+    "cells_in_view": lambda: (MESH, 200, 200, 5, Reach(0, 90_000, 800), HOME.rows, HOME.columns),
+    "mark_spans": lambda: (np.array([[0, 1, 3], [2, 0, 0]], np.int32), MASK.copy()),
+    "watch": lambda: (watched(), window(), 0, 0, STEPS, no_glances(8, 2), record()),
+    "settle": lambda: (watched(), no_glances(8, 2), record().last),
+    "trace_track": lambda: (track(), 0, SECOND, poses()),
+    "time_route": lambda: (POINTS[:2].copy(), 5, 7, 1000.0, 500.0),
+    "trace_meander": lambda: (
+        MESH,
+        MESH,
+        WalkRule(np.uint64(5), 9000, 40_000, 500),
+        3,
+        (100, 100, 0),
+        poses(),
+    ),
+    "rooms_at": lambda: (
+        np.zeros((3, 4), np.int16),
+        np.array([5, 200, -9]),
+        np.array([5, 2**40, 7]),
+    ),
+    "count_rooms": lambda: (poses(), np.zeros((3, 4), np.int16), np.zeros(2, np.int64)),
+    "sum_moves": lambda: (poses(),),
+    "points_in_sight": lambda: (MESH, 100, 100, POINTS.copy()),
+    "points_in_reach": lambda: (100, 100, 5, Reach(0, 90_000, 800), POINTS.copy()),
+    "questions": lambda: (
+        lenses(),
+        lenses().widest,
+        20,
+        poses(),
+        *(np.arange(2 * STEPS).reshape(2, STEPS) * 9 for _ in "xy"),
+        np.zeros((2, STEPS), np.uint8),
+        0,
+        SECOND,
+    ),
+    "random_share": lambda: (KEY, 4),
+    "random_shares": lambda: (KEY, np.arange(5)),
+    "pick": lambda: (np.array([5, 9, 2**31]), 7),
+    "length": lambda: (300, 40),
+    "distance_bin": lambda: (errors().table, 0, 300, 40),
+    "lasting": lambda: (errors().table, 0, 7),
+    "steady_chance": lambda: (errors().table, 0, 5, 300, 40, 70, 1, 3),
+    "notice_chance": lambda: (2**30, 2**30, 2**52),
+    "turn_and_stretch": lambda: (300, 40, 50, 302, 400),
+    "blurred": lambda: (errors().table, errors().keys, 0, 1, 5, 300, 40),
+    "seeming": lambda: (errors().table, 0, 1, 2**30),
+    "look": lambda: (
+        MESH,
+        lenses(),
+        errors(),
+        Rule(5, SECOND, 0, 60, False, True),
+        window(),
+        0,
+        1,
+        new_memory(2, USERS, 200),
+        np.ones((2, USERS, STEPS), np.uint8),
+    ),
+    "Routes": lambda: (MESH, corners()),
+    "Routes.find": lambda: (_core.Routes(MESH, corners()), 100, 500, 1000, 500),
+    "distance": lambda: (1, 2, 3, 4),
+    "advance": lambda: (np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), 5),
+    "count_sightings": lambda: (
+        np.arange(6),
+        np.array([0, 1, -1, 0, 1, 0]),
+        np.array([0, -1, 2, 1, 1, 1]),
+        3,
+        np.zeros((2, 3, 3), np.int64),
+    ),
+    "resampled": lambda: (KEY, np.arange(12.0).reshape(4, 3), 5),
+    "gather_views": lambda: (
+        np.ones((3, 2, 2, 4), np.int64),
+        np.array([0, 0, 1, 2]),
+        np.full(4, 5),
+        np.array([10, 5, 5]),
+        7,
+    ),
+    "sum_places": lambda: (np.full((2, 6, 3), 0.3), np.zeros((6, 2), bool), 2, np.array([0, 4])),
+    "take_together": lambda: (
+        np.arange(5),
+        np.zeros((5, 3), np.uint8),
+        np.eye(5, 3, dtype=np.int64),
+        4,
+    ),
+    "follow": lambda: (ways(), stretches(), np.full((2, 1, 4), 0.125), np.full(4, -1)),
+    "smooth": lambda: (ways(), stretches(), np.full((1, 4), 0.25), np.ones((1, 4)), moments()),
+    "Window": lambda: (
+        0,
+        *(np.arange(6).reshape(2, 3) for _ in range(3)),
+        np.zeros((2, 3), np.uint8),
+        np.zeros((2, 3), np.int8),
+    ),
+    "Window.dense": lambda: (window(), 1, 2, 7),
+    "Timelines": lambda: (3, SECOND),
+    "Timelines.follow": lambda: (
+        timelines(),
+        0,
+        3,
+        track(),
+        np.array([5, 9]),
+        np.array([0, 1, 2], np.int8),
+    ),
+    "Timelines.walk": lambda: (
+        timelines(),
+        0,
+        3,
+        MESH,
+        MESH,
+        WalkRule(np.uint64(5), 9000, 40_000, 500),
+        (100, 100, 0),
+    ),
+    "Timelines.pose": lambda: (timelines(), 1, 7),
+    "Timelines.poses": lambda: (timelines(), 7),
+    "Timelines.window": lambda: (timelines(), 2, 7),
+    "Timelines.runs": lambda: (timelines(), 1, 2, 7),
+    "Timelines.forget": lambda: (timelines(), 3),
+}
+"""A call of every function, constructor and method of the core that takes anything."""
+
+
+def named(name: str) -> Any:
+    """Return a function, class or method of the core."""
+    found: Any = _core
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def test_every_function_and_method_is_called_here() -> None:
+    callable_ = set(FUNCTIONS)
+    for name in CLASSES:
+        if type(PUBLIC[name]).__name__ != "EnumType":
+            members = vars(PUBLIC[name]).items()
+            callable_ |= {f"{name}.{m}" for m, v in members if m[0] != "_" and callable(v)} | {name}
+    assert callable_ == CALLS.keys()
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_call_that_is_right_is_answered(name: str) -> None:
+    named(name)(*CALLS[name]())
+
+
+# --- Calls that are wrong ----------------------------------------------------------------------
+
+Path_ = tuple[int, ...]
+
+
+def leaves(value: Any, kind: type | tuple[type, ...], at: Path_ = ()) -> Iterator[Path_]:
+    """Yield where in nested tuples values of a kind are."""
+    if isinstance(value, tuple):
+        for i, part in enumerate(value):
+            yield from leaves(part, kind, (*at, i))
+    elif isinstance(value, kind) and not isinstance(value, bool):
+        yield at
+
+
+def leaf(value: Any, at: Path_) -> Any:
+    """Return the value at a place in nested tuples."""
+    for i in at:
+        value = value[i]
+    return value
+
+
+def put(value: Any, at: Path_, new: Any) -> Any:
+    """Return nested tuples with another value at a place."""
+    if not at:
+        return new
+    parts_ = [put(part, at[1:], new) if i == at[0] else part for i, part in enumerate(value)]
+    return type(value)(*parts_) if hasattr(value, "_fields") else tuple(parts_)
+
+
+ARRAYS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), np.ndarray)]
+INTEGERS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), (int, np.integer))]
+
+
+def ids(case: Any) -> str:
+    name, at = case
+    return f"{name}-{'.'.join(map(str, at))}"
+
+
+@pytest.mark.parametrize("case", ARRAYS, ids=ids)
+def test_arrays_of_another_type_are_refused(case: tuple[str, Path_]) -> None:
+    name, at = case
+    array = leaf(CALLS[name](), at)
+    other = np.int32 if array.dtype != np.int32 else np.int64
+    wrong: list[Any] = [
+        array.astype(other),
+        array.astype(np.float32),
+        array.astype(array.dtype.newbyteorder()) if array.itemsize > 1 else object(),
+        array[None],
+        array.ravel() if array.ndim > 1 else array.reshape(-1, 1),
+        array.tolist(),
+        object() if (name, at) == ("look", (8,)) else None,  # there, it may be left out
+        memoryview(array),
+    ]
+    for value in wrong:
+        with pytest.raises(TypeError, match="incompatible function arguments"):
+            named(name)(*put(CALLS[name](), at, value))
+
+
+@pytest.mark.parametrize("case", INTEGERS, ids=ids)
+def test_numbers_that_are_none_or_too_large_are_refused(case: tuple[str, Path_]) -> None:
+    name, at = case
+    for value in ("1", None, 2**64, -(2**63) - 1, 1.5):
+        with pytest.raises(TypeError, match="incompatible function arguments"):
+            named(name)(*put(CALLS[name](), at, value))
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, args in CALLS.items() if any(map(len, args() and [args()]))]
+)
+def test_too_few_and_too_many_arguments_are_refused(name: str) -> None:
+    args = CALLS[name]()
+    for wrong in ((*args, 1, 2, 3), args[: 1 if "." in name else 0]):
+        with pytest.raises(TypeError):
+            named(name)(*wrong)
+
+
+TUPLES = sorted({(name, at[:-1]) for name, at in [*ARRAYS, *INTEGERS] if len(at) > 1})
+
+
+@pytest.mark.parametrize("case", TUPLES, ids=ids)
+def test_named_tuples_of_another_length_are_refused(case: tuple[str, Path_]) -> None:
+    name, at = case
+    value = leaf(CALLS[name](), at)
+    parts_ = tuple(value)
+    longer_and_shorter: list[Any] = [(), parts_[:-1], (*parts_, parts_[0])]
+    if hasattr(value, "_fields") and name != "points_in_reach":
+        longer_and_shorter.append(list(value))
+    for wrong in longer_and_shorter:
+        with pytest.raises(TypeError, match="incompatible function arguments"):
+            named(name)(*put(CALLS[name](), at, wrong))
+
+
+WRITTEN = {
+    "mark_spans": [(1,)],
+    "watch": [*((5, i) for i in range(5)), *((6, i) for i in range(6))],
+    "settle": [*((1, i) for i in range(5)), (2,)],
+    "trace_track": [(3, i) for i in range(4)],
+    "trace_meander": [(5, i) for i in range(4)],
+    "count_rooms": [(2,)],
+    "count_sightings": [(4,)],
+    "look": [(7, i) for i in range(5)],
+    "follow": [(2,), (3,)],
+    "smooth": [(4, i) for i in range(5)],
+}
+"""The arrays that are written to, by function."""
+
+
+@pytest.mark.parametrize(
+    "case", [(n, at) for n, places in WRITTEN.items() for at in places], ids=ids
+)
+def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(case: tuple[str, Path_]) -> None:
+    name, at = case
+    array = leaf(CALLS[name](), at)
+    fixed, apart = array.copy(), np.repeat(array, 2, axis=-1)[..., ::2]
+    fixed.setflags(write=False)
+    assert array.shape == apart.shape
+    for wrong in (fixed, apart) if array.shape[-1] > 1 else (fixed,):
+        with pytest.raises(TypeError, match="incompatible function arguments"):
+            named(name)(*put(CALLS[name](), at, wrong))
+
+
+def answer(name: str, args: tuple[Any, ...]) -> Any:
+    """Return what a call gives, with all that it has written to."""
+    found = named(name)(*args)
+    return [found, *(leaf(args, at) for at in WRITTEN.get(name, ()))]
+
+
+def same(one: Any, other: Any) -> bool:
+    if isinstance(one, tuple | list):
+        return all(same(a, b) for a, b in zip(one, other, strict=True))
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other)
+    return type(one) is type(other) and (
+        one == other or isinstance(one, _core.Mesh | _core.Window | _core.Routes | _core.Timelines)
+    )
+
+
+READ = [(name, at) for name, at in ARRAYS if at not in WRITTEN.get(name, ())]
+
+
+@pytest.mark.parametrize("case", READ, ids=ids)
+def test_arrays_that_are_read_may_lie_in_memory_as_they_like(case: tuple[str, Path_]) -> None:
+    name, at = case
+    expected = answer(name, CALLS[name]())
+    array = leaf(CALLS[name](), at)
+    fixed = array.copy()
+    fixed.setflags(write=False)
+    bytes_ = np.zeros(array.nbytes + 1, np.uint8)
+    bytes_[1:] = array.ravel().view(np.uint8)
+    unaligned = np.frombuffer(bytes_.data, array.dtype, array.size, 1).reshape(array.shape)
+    for other in (
+        fixed,
+        np.asfortranarray(array),
+        np.repeat(array, 2, axis=-1)[..., ::2],
+        np.repeat(array, 3, axis=0)[::3],
+        array[::-1].copy()[::-1],
+        unaligned,
+    ):
+        assert np.array_equal(array, other)
+        assert same(expected, answer(name, put(CALLS[name](), at, other))), other.flags
+
+
+EXTREME = [-(2**63), -(2**62), -(2**31), -2, -1, 0, 1, 2, 3, 1000, 2**31, 2**40, 2**62, 2**63 - 1]
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> tuple[str, tuple[Any, ...]]:
+    """A call with one or two of its arguments damaged: numbers, lengths, or both."""
+    name = draw(st.sampled_from(sorted(CALLS)))
+    args = CALLS[name]()
+    arrays = list(leaves(args, np.ndarray))
+    numbers = [at for at in leaves(args, (int, float, np.integer)) if (name, at) not in COUNTS]
+    for _ in range(draw(st.integers(1, 2))):
+        if not arrays and not numbers:
+            break
+        at = draw(st.sampled_from([*arrays, *numbers]))
+        value = leaf(args, at)
+        if isinstance(value, np.ndarray):
+            args = put(args, at, draw(damaged_array(value.copy())))
+        elif isinstance(value, float):
+            args = put(args, at, draw(st.floats()))
+        else:
+            most = 2**64 if isinstance(value, np.uint64) else 2**63
+            new = draw(st.sampled_from(EXTREME))
+            args = put(args, at, type(value)(max(0, new) if most == 2**64 else new))
+    return name, args
+
+
+@st.composite
+def damaged_array(draw: st.DrawFn, array: Any) -> Any:
+    """An array with some other numbers in it, or of another length."""
+    how = draw(
+        st.sampled_from(["numbers", "all numbers", "shorter", "longer", "empty", "no columns"])
+    )
+    if how == "shorter":
+        return array[: draw(st.integers(0, max(0, len(array) - 1)))]
+    if how == "longer":
+        return np.concatenate([array, array])
+    if how == "empty":
+        return array[:0]
+    if how == "no columns":
+        return array[..., :0]
+    if array.dtype.kind == "f":
+        new: Any = draw(st.sampled_from([0.0, -1.0, np.nan, np.inf, -np.inf, 1e300, 5e-324]))
+    elif array.dtype == bool:
+        new = draw(st.booleans())
+    else:
+        info = np.iinfo(array.dtype)
+        new = min(max(draw(st.sampled_from(EXTREME)), int(info.min)), int(info.max))
+    if how == "all numbers" or not array.size:
+        array[...] = new
+    else:
+        array.ravel()[draw(st.integers(0, array.size - 1))] = new
+    return array
+
+
+COUNTS: set[tuple[str, Path_]] = {
+    ("advance", (2,)),
+    ("resampled", (2,)),
+    ("rasterize_cells", (1,)),
+    ("rasterize_cells", (2,)),
+    ("cells_in_view", (5,)),
+    ("cells_in_view", (6,)),
+    ("label_frames", (1,)),
+    ("sum_places", (2,)),
+    ("Timelines", (0,)),
+    ("Timelines.pose", (2,)),
+    ("Timelines.poses", (1,)),
+    ("Timelines.window", (2,)),
+    ("Timelines.runs", (3,)),
+}
+"""How much there is to do: with large numbers, that takes for ever, or all memory."""
+
+
+@settings(max_examples=1500, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(damaged())
+def test_no_damage_does_more_than_raise_an_error(call: tuple[str, tuple[Any, ...]]) -> None:
+    """A number that would lead outside an array is refused: what isn't refused is worked out."""
+    name, args = call
+    with suppress(TypeError, ValueError, MemoryError):
+        named(name)(*args)

@@ -1,0 +1,139 @@
+"""Interruptions: needs and errands come up in a day, and leave its plan as it is."""
+
+import statistics
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+from tests.routines.days import DAY_S, MONDAY
+
+from fleet2d.routines.interruptions import MOST, uninterrupted
+from fleet2d.routines.life import Life
+from fleet2d.routines.persona import Persona, bundled, bundled_persona
+from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Doing
+
+HOUR = 3600
+IDLE = {"days": {"any_day": {"on": "daily", "wake": "07:00", "sleep": "23:00"}}}
+
+
+def life(persona: Persona, seed: int = 4) -> Life:
+    return Life(persona, seed, "users.ana")
+
+
+def of(needs: Any = None, errands: Any = None, **more: Any) -> Life:
+    return life(Persona.model_validate({**IDLE, "needs": needs, "errands": errands, **more}))
+
+
+def days(lived: Life, count: int = 100) -> list[list[Doing]]:
+    return [list(lived.day(MONDAY + i)) for i in range(count)]
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_a_day_without_its_interruptions_is_the_planned_day(name: str) -> None:
+    lived = life(bundled_persona(name))
+    for ordinal in range(MONDAY, MONDAY + 400):
+        plan = lived.planned(ordinal, lived.template(ordinal))
+        assert plan == uninterrupted(lived.day(ordinal))
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_an_interrupted_day_has_no_gap_and_nothing_that_takes_no_time(name: str) -> None:
+    for day in days(life(bundled_persona(name))):
+        assert all(a.end == b.begin for a, b in pairwise(day))
+        assert all(doing.begin < doing.end for doing in day)
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_every_persona_uses_the_toilet_as_often_as_people_do(name: str) -> None:
+    lived = days(life(bundled_persona(name)), 140)
+    visits = [sum(doing.activity == "toilet" for doing in day) for day in lived]
+    assert 4 <= statistics.mean(visits) <= 10  # Wyman et al. 2020: 2 to 10 by day, 0 to 4 at night
+    assert min(visits) >= 1
+
+
+def test_without_needs_and_errands_a_day_is_its_plan() -> None:
+    lived = of()
+    assert all(day == uninterrupted(day) for day in days(lived, 20))
+    assert {0} == {doing.role for day in days(lived, 20) for doing in day}
+
+
+def test_a_need_comes_up_at_its_rate_while_one_is_awake() -> None:
+    lived = of({"drink": {"every": {"law": "gamma", "mean": "2 h", "std": "40 min"}}})
+    times = [doing.begin for day in days(lived, 300) for doing in day if doing.activity == "drink"]
+    assert 8 == pytest.approx(len(times) / 300, abs=0.5)  # of 16 hours
+    assert all(6 * HOUR <= time <= 24 * HOUR for time in times)
+
+
+def test_a_need_in_the_night_wakes_one_who_sleeps_on_afterwards() -> None:
+    lived = of({"toilet": {"every": "3 h", "asleep": {"law": "gamma", "mean": "4 h"}}})
+    up = 0
+    for day in days(lived):
+        night = [doing for doing in day if doing.begin >= 23 * HOUR + HOUR]
+        up += sum(doing.activity == "toilet" for doing in night)
+        assert SLEEP == day[-1].activity
+        assert {SLEEP, "toilet"} >= {doing.activity for doing in night}
+    assert 1 < up / 100 < 2.5
+
+
+def test_hands_are_washed_right_after_the_toilet_as_often_as_stated() -> None:
+    lived = of({"toilet": {"every": "2 h", "then": {"wash_hands": 0.8}}})
+    after = [b.activity for day in days(lived, 200) for a, b in pairwise(day)
+             if a.activity == "toilet"]  # fmt: skip
+    washed = sum(name == "wash_hands" for name in after) / len(after)
+    assert 0.8 == pytest.approx(washed, abs=0.03)
+
+
+def test_a_need_waits_for_the_end_of_what_is_not_interruptible() -> None:
+    shower = {"at": "12:00", "spread": "0 s", "takes": "20 min"}
+    day = {**IDLE["days"]["any_day"], "do": {"shower": shower}}
+    lived = of({"drink": "20 min"}, days={"any_day": day})
+    for one in days(lived):
+        washes = [doing for doing in one if doing.task == "shower"]
+        assert 1 == len(washes)
+
+
+def test_calls_come_only_at_their_times_of_day() -> None:
+    call = {"every": {"law": "exponential", "mean": "1 h"}, "between": ["10:00", "12:00"]}
+    lived = of({"phone_call": {**call, "patience": "0 s"}})
+    begins = [d.begin for day in days(lived, 200) for d in day if d.activity == "phone_call"]
+    assert 2 == pytest.approx(len(begins) / 200, abs=0.3)
+    assert all(10 * HOUR <= time % DAY_S <= 12 * HOUR + 60 for time in begins)
+
+
+def test_errands_are_done_between_the_activities_that_they_name() -> None:
+    day = {**IDLE["days"]["any_day"], "do": {"shopping": {"at": "10:00"}}}
+    lived = of(None, {"put_away": {"probability": 1, "after": ["shopping"]}}, days={"any_day": day})
+    for one in days(lived):
+        pairs = [(a.activity, b.activity) for a, b in pairwise(one)]
+        assert ("shopping", "put_away") in pairs
+        assert 1 == sum(doing.activity == "put_away" for doing in one)
+
+
+def test_what_was_interrupted_is_gone_on_with() -> None:
+    lived = of({"drink": "1 h"})
+    for day in days(lived, 50):
+        for before, need, after in zip(day, day[1:], day[2:], strict=False):
+            if need.role == INTERRUPTS and after.role == RESUMES:
+                assert before.role == INTERRUPTS or before.activity == after.activity
+
+
+def test_a_day_full_of_needs_has_numbers_for_its_draws() -> None:
+    lived = of({f"need_{i}": {"every": "6 min", "activity": "drink"} for i in range(6)})
+    assert all(len(day) <= MOST + 40 for day in days(lived, 10))
+
+
+@pytest.mark.parametrize(
+    ("persona", "words"),
+    [
+        ({"needs": {"toilett": "3 h"}}, ["needs.toilett", "toilet"]),
+        ({"needs": {"drink": "30 s"}}, ["every", "5 min"]),
+        ({"errands": {"fetch": {"probability": 1, "after": ["cok"]}}}, ["after", "cook"]),
+    ],
+)
+def test_needs_that_are_none_are_refused_in_plain_words(
+    persona: dict[str, Any], words: list[str]
+) -> None:
+    with pytest.raises(ValidationError) as failure:
+        Persona.model_validate({**IDLE, **persona})
+    assert all(word in str(failure.value) for word in words)

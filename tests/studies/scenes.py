@@ -1,0 +1,46 @@
+"""Small studies for the tests: some minutes in the flat of four rooms."""
+
+from pathlib import Path
+from typing import Any
+
+from tests.scenes import scenario
+
+from fleet2d.studies.driver import RunOptions, check_study, run_study
+from fleet2d.studies.execution import Executor, SerialExecutor
+from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.results import Counts
+
+SPEED = "robots.astro.speed"
+
+
+def base(duration: str = "2 min", **sections: Any) -> dict[str, Any]:
+    """A person and a robot who wander about."""
+    robots = {"astro": {"type": "patrol", "camera": {"range": [0, 4]}}}
+    return scenario(
+        duration,
+        users={"ana": {"type": "meander"}},
+        robots=sections.pop("robots", robots),
+        metrics={"room_share": {"period": "1 min"}, "sightings": {}, "distance": {}},
+        **sections,
+    )
+
+
+def small(**keys: Any) -> dict[str, Any]:
+    """A study of two speeds with three seeds, or what the keys say."""
+    return {"base": base(), "axes": {SPEED: [0.3, 0.6]}, "replicates": 3, **keys}
+
+
+def run(
+    study: Any, folder: Path, executor: Executor | None = None, **options: Any
+) -> tuple[Counts, Study]:
+    """Run a study in this process, and open it."""
+    counts = run_study(
+        check_study(study), folder, executor or SerialExecutor(), RunOptions(**options)
+    )
+    return counts, open_study(folder)
+
+
+def digests(study: Study) -> list[str]:
+    """The digests of all variants, in order."""
+    found: list[str] = study.arrow_variants.column("digest").to_pylist()
+    return found

@@ -1,0 +1,105 @@
+"""Studies and maps from Python."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.scenes import OWN
+from tests.studies.scenes import SPEED, base, small
+
+import fleet2d
+from fleet2d.artifacts.reader import Run
+from fleet2d.errors import ComponentError, InputError
+from fleet2d.studies.api import default_location, make_executor, map_runs
+from fleet2d.studies.local import LocalExecutor
+
+SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
+
+
+def digest_of(run: Run) -> str:
+    assert run.digest is not None
+    return run.digest
+
+
+def fail_on_seed_two(run: Run) -> int:
+    if run.manifest["seed"] == 2:
+        raise ValueError("two")
+    return int(run.manifest["seed"])
+
+
+def end_the_process(run: Run) -> None:
+    os._exit(3)
+
+
+def test_a_study_is_run_and_opened(tmp_path: Path) -> None:
+    study = fleet2d.study(small(replicates=1), tmp_path / "study", executor="serial")
+    assert f"<Study {tmp_path / 'study'}: 2 of 2 variants complete>" == repr(study)
+    assert [0.3, 0.6] == study.variants[SPEED].to_list()
+
+
+def test_a_study_of_ones_own_components_runs_in_workers(tmp_path: Path) -> None:
+    own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
+    study = fleet2d.study(small(base=base(algorithms=own), replicates=1), tmp_path / "s", workers=1)
+    assert 2 == study.counts.complete
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_a_map_returns_results_in_the_order_of_the_scenarios(workers: int) -> None:
+    expected = [fleet2d.run(scenario).digest for scenario in SEEDED]
+    assert expected == map_runs(digest_of, SEEDED, workers=workers)
+
+
+def test_a_map_of_nothing_is_empty() -> None:
+    assert [] == map_runs(digest_of, [])
+
+
+def test_a_lambda_can_be_mapped() -> None:
+    pytest.importorskip("cloudpickle")
+    assert [0, 1, 2, 3] == map_runs(lambda run: run.manifest["seed"], SEEDED, workers=2)
+
+
+@pytest.mark.parametrize("executor", ["local", "serial"])
+def test_what_a_function_raises_is_raised_with_its_scenario(executor: str) -> None:
+    with pytest.raises(ValueError, match="two") as caught:
+        map_runs(fail_on_seed_two, SEEDED, workers=2, executor=executor)  # type: ignore[arg-type]
+    assert ["in scenario 2"] == caught.value.__notes__
+
+
+def test_a_function_that_ends_its_process_is_given_up() -> None:
+    with pytest.raises(ComponentError, match=r"exit code 3.*in each of 3 attempts"):
+        map_runs(end_the_process, SEEDED[:1], workers=1)
+
+
+def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import fleet2d\n"
+        "def seed(run):\n    return run.manifest['seed']\n"
+        "print(fleet2d.map_runs(seed, [fleet2d.load_scenario('simulation.duration=1 min', seed=s)"
+        " for s in (3, 5)], workers=1))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=120,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )  # fmt: skip
+    assert ("[3, 5]\n", 0) == (done.stdout, done.returncode), done.stderr
+
+
+def test_a_worker_that_holds_too_much_memory_is_replaced() -> None:
+    executor = LocalExecutor(1, memory_mb=1.0)
+    assert [0, 1, 2, 3] == map_runs(seed_of, SEEDED, executor=executor)
+
+
+def seed_of(run: Run) -> int:
+    return int(run.manifest["seed"])
+
+
+def test_an_unknown_executor_is_refused() -> None:
+    with pytest.raises(InputError, match="give local, ray or serial"):
+        make_executor("cloud")  # type: ignore[arg-type]
+
+
+def test_a_study_is_stored_by_its_name() -> None:
+    assert "studies/which-robot" == default_location("which robot?")

@@ -1,0 +1,131 @@
+"""The commands: what they print, write and return."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+from tests.studies.scenes import SPEED, base, small
+
+from fleet2d import cli
+
+Result = tuple[int, str, str]
+Cli = Callable[..., Result]
+
+
+@pytest.fixture
+def fleet2d(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Cli:
+    """The command line in this process, in a folder with a study: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+    Path("speeds.yaml").write_text(yaml.safe_dump(small(replicates=2)))
+
+    def call(*arguments: str) -> Result:
+        monkeypatch.setattr(sys, "argv", ["fleet2d", *arguments])
+        with pytest.raises(SystemExit) as caught:
+            cli.main()
+        out, err = capsys.readouterr()
+        return int(caught.value.code or 0), out, err
+
+    return call
+
+
+SERIAL = ("--executor", "serial")
+
+
+def test_a_study_is_run_and_stored_by_its_name(fleet2d: Cli) -> None:
+    expected = (0, "4 of 4 variants complete in studies/speeds\n", "")
+    assert expected == fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    assert Path("studies/speeds/variants.parquet").exists()
+
+
+def test_json_is_one_object(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("study", "run", "speeds.yaml", *SERIAL, "--out", "here", "--json")
+    assert (0, {"study": "here", "total": 4, "complete": 4, "failed": 0, "missing": 0}) == (
+        code, json.loads(out),
+    )  # fmt: skip
+    assert (0, out, "") == fleet2d("study", "status", "here", "--json")
+
+
+def test_a_dry_run_prints_axes_variants_and_time_and_writes_nothing(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("study", "run", "speeds.yaml", "--dry-run", "--workers", "2")
+    assert 0 == code
+    assert f"{SPEED}: 0.3, 0.6" in out
+    assert f"variant 3 ({SPEED} = 0.6, seed = 1)" in out
+    assert "4 variants, 1 homes, 8.0 min of simulated time: about" in out
+    assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
+
+
+def test_status_tells_how_far_it_is(fleet2d: Cli) -> None:
+    fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    expected = (0, "speeds: 4 of 4 variants complete, 0 failed, 0 to run\n", "")
+    assert expected == fleet2d("study", "status", "studies/speeds")
+
+
+def test_a_variant_is_run_again_and_compared(fleet2d: Cli) -> None:
+    fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    code, out, _ = fleet2d("study", "rerun", "studies/speeds", "2", "--out", "run")
+    assert 0 == code
+    assert f"variant 2: {SPEED} = 0.6, seed = 0\nstored in run\nreproduced: digest" in out
+    code, _, err = fleet2d("study", "rerun", "studies/speeds", "9")
+    assert 2 == code
+    assert "give a number from 0 to 3" in err
+
+
+def test_a_report_is_written_beside_the_study(fleet2d: Cli) -> None:
+    fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    expected = (0, "studies/speeds/report/report.html\n", "")
+    assert expected == fleet2d("study", "report", "studies/speeds")
+    assert Path("studies/speeds/report/report.html").exists()
+
+
+def test_failures_are_printed_and_end_in_one(fleet2d: Cli) -> None:
+    Path("mine.py").write_text(
+        "from fleet2d import Algorithm\n"
+        "class Fails(Algorithm):\n"
+        "    def update(self, history, state):\n        raise ValueError('no more')\n"
+    )
+    content = small(base=base(), replicates=1)
+    content["base"]["algorithms"] = {"own": {"type": "mine:Fails", "period": "1 min"}}
+    Path("speeds.yaml").write_text(yaml.safe_dump(content))
+    code, out, err = fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    assert 1 == code
+    assert "0 of 2 variants complete" in out
+    assert "variant 0 failed" in err
+    assert "no more" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("run", "sped.yaml"), "there is no file sped.yaml: did you mean 'speeds.yaml'?"),
+        (("status", "nowhere"), "nowhere holds no study"),
+        (("rerun", "nowhere", "1"), "nowhere holds no study"),
+        (("report", "nowhere"), "nowhere holds no study"),
+    ],
+)
+def test_wrong_input_ends_in_two(fleet2d: Cli, arguments: tuple[str, ...], message: str) -> None:
+    code, _, err = fleet2d("study", *arguments)
+    assert (2, True) == (code, message in err)
+
+
+def test_a_search_prints_what_it_found_and_how_it_does_elsewhere(fleet2d: Cli) -> None:
+    content = small(
+        axes={"radius": {"key": "robots.astro.radius", "values": [0.1, 0.12, 0.15]}},
+        replicates=2,
+        tune={
+            "search": {"speed": {"key": SPEED, "low": 0.2, "high": 1.0}},
+            "objectives": {"distance.astro": "maximize"},
+            "trials": 3,
+            "held_out": {"radius": [0.15]},
+        },
+    )
+    Path("speeds.yaml").write_text(yaml.safe_dump(content))
+    code, out, err = fleet2d("tune", "speeds.yaml", *SERIAL)
+    assert (0, "") == (code, err)
+    assert "trials: 3 complete, 0 pruned, 0 fail" in out
+    assert f"  {SPEED}=" in out
+    assert "distance.astro on the homes held out:" in out

@@ -1,0 +1,300 @@
+"""Running studies: what is kept, what is skipped, what is refused, and what is run again."""
+
+import os
+import shutil
+from collections.abc import Generator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.studies.scenes import SPEED, base, digests, run, small
+
+from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
+from fleet2d.studies import catalogue, driver, identity, jobs
+from fleet2d.studies.execution import Event, SerialExecutor
+from fleet2d.studies.jobs import Job
+from fleet2d.studies.local import LocalExecutor
+from fleet2d.studies.schedule import Schedule
+
+ROWS = {"keep": {"tables": ["room_share"]}}
+BROKEN = """from fleet2d import Algorithm
+
+class Fails(Algorithm):
+    at: int = 0
+    def update(self, history, state):
+        if self.at == 2:
+            raise ValueError("no more")
+"""
+
+
+class CountingExecutor(SerialExecutor):
+    """Runs tasks in this process, in the order that is wanted, up to a number of them."""
+
+    def __init__(self, most: int = 1000, *, backwards: bool = False) -> None:
+        self.most, self.backwards = most, backwards
+        self.ran: list[int] = []
+
+    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+        waiting = Schedule([])
+        listed = []
+        while (task := tasks.take("all")) is not None:
+            listed.append(task)
+        for task in sorted(listed, key=lambda t: t.number, reverse=self.backwards):
+            if len(self.ran) == self.most:
+                raise KeyboardInterrupt
+            waiting.put_back(task)
+            self.ran.append(task.number)
+            yield from super().run(job, waiting)
+
+
+class CollectingObserver(driver.SilentObserver):
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study that ran without disturbance."""
+    folder = tmp_path_factory.mktemp("studies") / "whole"
+    run(small(**ROWS), folder)
+    return folder
+
+
+@pytest.fixture
+def copied(whole: Path, tmp_path: Path) -> Path:
+    """The same, to be disturbed."""
+    return shutil.copytree(whole, tmp_path / "copied")
+
+
+def test_a_study_is_one_data_set_and_few_files(whole: Path) -> None:
+    files = sorted(p.relative_to(whole).as_posix() for p in whole.rglob("*") if p.is_file())
+    assert [
+        "lock", "parts/000001.json", "plan.parquet", "results/000001.parquet", "scenarios.parquet",
+        "study.json", "tables/room_share/000001.parquet", "variants.parquet",
+    ] == files  # fmt: skip
+
+
+def test_run_again_it_runs_nothing(copied: Path) -> None:
+    executor = CountingExecutor()
+    counts, _ = run(small(**ROWS), copied, executor)
+    assert (6, []) == (counts.complete, executor.ran)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_it_goes_on_where_it_was_interrupted(whole: Path, tmp_path: Path, backwards: bool) -> None:
+    folder = tmp_path / "study"
+    ran = []
+    for most in (2, 1, 0, 9):
+        executor = CountingExecutor(most, backwards=backwards)
+        with suppress(KeyboardInterrupt):
+            _, study = run(small(**ROWS), folder, executor)
+        ran += executor.ran
+    assert sorted(ran) == list(range(6))  # nothing twice
+    _, undisturbed = run(small(**ROWS), whole)
+    assert digests(undisturbed) == digests(study)
+    assert undisturbed.arrow("room_share").to_table() == study.arrow("room_share").to_table()
+
+
+def test_an_interrupted_study_can_be_read(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        run(small(**ROWS), tmp_path / "study", CountingExecutor(2))
+    study = driver_open(tmp_path / "study")
+    assert ["complete"] * 2 + ["missing"] * 4 == study.variants["status"].to_list()
+    assert 2 == len(study.arrow("room_share").to_table().column("variant").unique())
+
+
+def driver_open(folder: Path) -> Any:
+    from fleet2d.studies.reader import open_study
+
+    return open_study(folder)
+
+
+@pytest.mark.parametrize("file", ["results/000001.parquet", "tables/room_share/000001.parquet"])
+@pytest.mark.parametrize("harm", ["cut", "gone", "changed"])
+def test_what_is_damaged_is_run_again(copied: Path, whole: Path, file: str, harm: str) -> None:
+    path = copied / file
+    if harm == "gone":
+        path.unlink()
+    elif harm == "cut":
+        os.truncate(path, path.stat().st_size // 2)
+    else:
+        path.write_bytes(path.read_bytes()[:-9] + b"\0" * 9)
+    executor, observer = CountingExecutor(), CollectingObserver()
+    counts, study = run(small(**ROWS), copied, executor, observer=observer)
+    assert (6, 6) == (counts.complete, len(executor.ran))
+    assert file in observer.notes[0]
+    assert digests(driver_open(whole)) == digests(study)
+
+
+@pytest.mark.parametrize("file", ["variants.parquet", "lock"])
+def test_what_can_be_made_again_is_made_again(copied: Path, file: str) -> None:
+    (copied / file).unlink()
+    executor = CountingExecutor()
+    run(small(**ROWS), copied, executor)
+    assert ([], True) == (executor.ran, (copied / file).exists())
+
+
+def test_a_crash_between_commit_and_removal_of_the_journal_counts_nothing_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", lambda *_, **__: None)
+        run(small(), tmp_path / "study")
+    assert (tmp_path / "study/journal-000001.bin").exists()
+    executor = CountingExecutor()
+    counts, study = run(small(), tmp_path / "study", executor)
+    assert (6, []) == (counts.complete, executor.ran)
+    assert 6 == len(study.arrow_variants)
+
+
+def test_a_journal_that_grows_large_becomes_a_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
+) -> None:
+    monkeypatch.setattr(driver, "PART_BYTES", 2500)
+    _, study = run(small(**ROWS), tmp_path / "study")
+    assert len(list((tmp_path / "study/parts").iterdir())) > 1
+    assert digests(driver_open(whole)) == digests(study)
+    rows = study.polars("room_share").collect()
+    assert 6 == rows["variant"].n_unique()
+
+
+def test_a_full_disk_ends_it_and_the_same_command_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
+) -> None:
+    write = os.pwrite
+
+    def full(file: int, data: bytes, offset: int) -> int:
+        if offset > 4000:
+            raise OSError(28, "No space left on device")
+        return write(file, data, offset)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "pwrite", full)
+        with pytest.raises(ArtifactError, match="the disk is full"):
+            run(small(**ROWS), tmp_path / "study")
+    executor = CountingExecutor()
+    _, study = run(small(**ROWS), tmp_path / "study", executor)
+    assert 0 < len(executor.ran) < 6
+    assert digests(driver_open(whole)) == digests(study)
+
+
+def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path) -> None:
+    executor, observer = CountingExecutor(), CollectingObserver()
+    more = small(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=4, **ROWS)
+    counts, study = run(more, copied, executor, observer=observer)
+    assert (12, 6) == (counts.complete, len(executor.ran))
+    assert ["6 variants are new in " + str(copied)] == observer.notes
+    assert [0.1] * 4 + [0.3] * 4 + [0.6] * 4 == study.variants[SPEED].to_list()
+    before = driver_open(copied)
+    assert set(digests(before)) == set(digests(study))
+
+
+def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path) -> None:
+    other = small(base=base("3 min"), **ROWS)
+    with pytest.raises(RunDirectoryError, match=r"6 of scenarios.*no longer has.*--changed redo"):
+        run(other, copied)
+    executor = CountingExecutor()
+    counts, study = run(other, copied, executor, changed="redo")
+    assert (6, 6) == (counts.complete, len(executor.ran))
+    assert {180.0} == set(study.variants["simulated_s"])
+
+
+@pytest.mark.parametrize(("changed", "runs"), [("redo", 6), ("keep", 0)])
+def test_results_of_other_code_are_refused_until_told_what_to_do(
+    copied: Path, monkeypatch: pytest.MonkeyPatch, changed: catalogue.Changed, runs: int
+) -> None:
+    monkeypatch.setattr(identity, "code_version", lambda: "another")
+    with pytest.raises(RunDirectoryError, match="6 of the same scenarios, by other code"):
+        run(small(**ROWS), copied)
+    executor = CountingExecutor()
+    counts, _ = run(small(**ROWS), copied, executor, changed=changed)
+    assert (6, runs) == (counts.complete, len(executor.ran))
+
+
+def test_a_folder_with_something_else_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("precious")
+    with pytest.raises(RunDirectoryError, match="holds no study"):
+        run(small(), tmp_path)
+
+
+def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError):
+        run(small(axes={SPEED: [0.3, "quick"]}), tmp_path / "study")
+    axes = {"start": {"key": "users.ana.start", "values": ["attic"]}}
+    with pytest.raises(ScenarioError):
+        run(small(axes=axes), tmp_path / "study")
+    assert [] == list(tmp_path.iterdir())
+
+
+def test_two_processes_can_not_run_the_same_study(tmp_path: Path) -> None:
+    class Nested(SerialExecutor):
+        def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+            with pytest.raises(RunDirectoryError, match="another process is running"):
+                run(small(), tmp_path / "study")
+            yield from super().run(job, tasks)
+
+    assert 6 == run(small(), tmp_path / "study", Nested())[0].complete
+
+
+@pytest.fixture
+def failing(tmp_path: Path) -> dict[str, Any]:
+    """A study of whose variants one fails."""
+    (tmp_path / "broken.py").write_text(BROKEN)
+    own = {"type": f"{tmp_path.as_posix()}/broken:Fails", "period": "1 min"}
+    axes = {"at": {"key": "algorithms.own.at", "values": [1, 2, 3]}}
+    return {"base": base(algorithms={"own": own}), "axes": axes, "replicates": 1}
+
+
+def test_a_variant_that_fails_is_kept_with_its_error_and_does_not_stop_the_rest(
+    failing: dict[str, Any], tmp_path: Path
+) -> None:
+    counts, study = run(failing, tmp_path / "study")
+    assert (2, 1) == (counts.complete, counts.failed)
+    (row,) = study.failures.to_dicts()
+    assert (1, 2) == (row["variant"], row["at"])
+    assert "no more" in row["error"]
+    assert "broken.py" in row["trace"]
+    assert 2 == study.scenario(1)["algorithms"]["own"]["at"]
+
+
+def test_with_fail_fast_the_first_failure_ends_the_study(
+    failing: dict[str, Any], tmp_path: Path
+) -> None:
+    counts, _ = run(failing, tmp_path / "study", fail_fast=True)
+    assert (1, 1, 1) == (counts.complete, counts.failed, counts.missing)
+
+
+def test_what_failed_is_run_again_next_time(failing: dict[str, Any], tmp_path: Path) -> None:
+    run(failing, tmp_path / "study")
+    executor = CountingExecutor()
+    counts, _ = run(failing, tmp_path / "study", executor)
+    assert ([1], 1) == (executor.ran, counts.failed)
+
+
+def test_a_file_that_changes_during_a_study_fails_its_variants(
+    failing: dict[str, Any], tmp_path: Path
+) -> None:
+    class Meddling(SerialExecutor):
+        def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+            with (tmp_path / "broken.py").open("a") as file:
+                file.write("# changed\n")
+            yield from super().run(job, tasks)
+
+    counts, study = run(failing, tmp_path / "study", Meddling())
+    assert 3 == counts.failed
+    assert {jobs.CHANGED} == set(study.failures["error"])
+
+
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_results_are_the_same_with_any_number_of_workers(
+    whole: Path, tmp_path: Path, workers: int
+) -> None:
+    counts, study = run(small(**ROWS), tmp_path / "study", LocalExecutor(workers))
+    assert 6 == counts.complete
+    assert digests(driver_open(whole)) == digests(study)
+    undisturbed = driver_open(whole)
+    assert undisturbed.arrow("room_share").to_table() == study.arrow("room_share").to_table()

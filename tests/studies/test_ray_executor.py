@@ -1,0 +1,59 @@
+"""Ray: the same results on a cluster of several nodes, one of which is killed in the middle."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.studies.scenes import base, digests, run, small
+
+from fleet2d.studies import api
+from fleet2d.studies.driver import SilentObserver
+from fleet2d.studies.record import Record
+
+ray = pytest.importorskip("ray")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore"),  # Ray's own
+]
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    """A cluster of a head without cores and two nodes with one each."""
+    from ray.cluster_utils import Cluster
+
+    found = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    try:
+        found.nodes_to_kill = [found.add_node(num_cpus=1) for _ in range(2)]
+        found.wait_for_nodes()
+        yield found
+    finally:
+        ray.shutdown()
+        found.shutdown()
+
+
+class KillsANode(SilentObserver):
+    """Kills a node of a cluster when three variants are done."""
+
+    def __init__(self, cluster: Any) -> None:
+        self.cluster, self.ended_count = cluster, 0
+
+    def ended(self, record: Record) -> None:
+        self.ended_count += 1
+        if self.ended_count == 3:
+            self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)
+
+
+def test_a_node_that_dies_loses_only_what_it_ran(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = small(base=base("30 min"), replicates=10)
+    monkeypatch.setenv("RAY_ADDRESS", cluster.address)
+    executor = api.make_executor("ray")
+    assert 2 == executor.workers
+    observer = KillsANode(cluster)
+    counts, killed = run(study, tmp_path / "killed", executor, observer=observer)
+    assert (20, 0) == (counts.complete, counts.failed)
+    _, undisturbed = run(study, tmp_path / "undisturbed")
+    assert digests(undisturbed) == digests(killed)
+    assert killed.variants["attempts"].max() >= 2  # what the node ran was run again

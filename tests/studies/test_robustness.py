@@ -1,0 +1,137 @@
+"""Fifty kills at random moments, and what is left each time ends in the same results."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from tests.studies.scenes import SPEED, base, digests, run, small
+
+from fleet2d.studies.directory import StudyDirectory
+from fleet2d.studies.reader import open_study
+from fleet2d.studies.results import count
+
+KILLS = 50
+ROOT = Path(__file__).parents[2]
+LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=12, keep={"tables": ["room_share"]})
+
+
+def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
+    """Run a study in a copy of this process and kill it; return whether it came to its end."""
+    child = os.fork()
+    if not child:
+        try:
+            run(LARGE, folder)
+            os._exit(0)
+        finally:
+            os._exit(1)
+    deadline = time.monotonic() + after_s
+    while time.monotonic() < deadline:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return status == 0
+        time.sleep(0.005)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return False
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:.*fork.*")
+def test_a_study_killed_fifty_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
+    _, undisturbed = run(LARGE, tmp_path / "undisturbed")
+    chance = random.Random(16)
+    folder, kills, before = tmp_path / "killed", 0, 0
+    # As long as anything is left to run, killed while it begins, runs or writes.
+    while kills < KILLS:
+        if run_in_a_child_and_kill(folder, chance.uniform(0.0, 0.35)):
+            break
+        kills += 1
+        if (folder / "study.json").exists():
+            now = count(StudyDirectory(folder)).complete
+            assert now >= before  # nothing that was there is lost
+            before = now
+    _, study = run(LARGE, folder)
+    assert kills > KILLS // 4
+    assert digests(undisturbed) == digests(study)
+    tables = [one.arrow("room_share").to_table() for one in (undisturbed, study)]
+    assert tables[0].sort_by("variant") == tables[1].sort_by("variant")
+    columns = [SPEED, "seed", *undisturbed.metrics]
+    assert undisturbed.variants.select(columns).equals(study.variants.select(columns))
+
+
+def start(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
+    """Begin the command in a process group of its own."""
+    (folder / "study.yaml").write_text(yaml.safe_dump(small(base=base("1 h"), replicates=40)))
+    return subprocess.Popen(
+        [sys.executable, "-m", "fleet2d.cli", "study", "run", "study.yaml", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+def workers_of(process: "subprocess.Popen[bytes]") -> list[int]:
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    return [int(pid) for pid in children.read_text().split()]
+
+
+def is_running(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]") -> None:
+    journal = folder / "studies/study/journal-000001.bin"
+    deadline = time.monotonic() + 120
+    while not (journal.exists() and journal.stat().st_size > 2000):
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
+@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
+    tmp_path: Path, sign: signal.Signals
+) -> None:
+    process = start(tmp_path, "--workers", "2")
+    wait_for_results(tmp_path, process)
+    workers = workers_of(process)
+    assert 2 == len(workers)
+    began = time.monotonic()
+    os.kill(process.pid, sign)
+    _, err = process.communicate(timeout=30)
+    took = time.monotonic() - began
+    code = -9 if sign == signal.SIGKILL else 130
+    assert (code, True) == (process.returncode, took < 1.0)
+    deadline = time.monotonic() + 1.0
+    while any(map(is_running, workers)) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not any(map(is_running, workers))
+    if sign != signal.SIGKILL:
+        assert b"the same command goes on" in err
+    study = open_study(tmp_path / "studies/study")
+    assert 0 < study.counts.complete < 80
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
+def test_a_worker_that_dies_loses_only_what_it_ran_and_that_is_run_again(tmp_path: Path) -> None:
+    process = start(tmp_path, "--workers", "2")
+    for _ in range(3):
+        wait_for_results(tmp_path, process)
+        os.kill(workers_of(process)[0], signal.SIGKILL)
+        time.sleep(0.5)
+    process.communicate(timeout=300)
+    study = open_study(tmp_path / "studies/study")
+    assert (0, 80) == (process.returncode, study.counts.complete)
+    assert study.variants["attempts"].max() in (2, 3)

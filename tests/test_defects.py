@@ -1,0 +1,120 @@
+"""Defects that a check from outside found: each has a test that is named after it."""
+
+from datetime import timedelta
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import events, home_with
+from tests.scenes import path, run, scenario, table
+from typer.testing import CliRunner
+
+import fleet2d
+from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.presence.sighting_share import SightingShare
+from fleet2d.cli import app
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import ArtifactError, ComponentError, InputError
+
+
+def test_room_sampling_logs_no_return_that_did_not_happen() -> None:
+    shares = {"living_room": 1, "away": 3}
+    ana = {"type": "room_sampling", "shares": shares, "dwell": "20 min"}
+    stored = run(scenario("5 d", users={"ana": ana}))
+    rows = table(stored, "events", entity="ana")
+    told = [e for e in rows["event"].tolist() if e in ("left_home", "came_home")]
+    poses = path(stored, "ana")
+    returns = int(((poses.away[:-1] == 1) & (poses.away[1:] == 0)).sum())
+    assert returns == told.count("came_home")
+    assert all(a != b for a, b in pairwise(told))
+
+
+@pytest.mark.parametrize(("step", "good"), [("2 s", False), ("1 s", True), ("2.5 s", True)])
+def test_lost_after_that_is_no_multiple_of_the_step_is_refused(step: str, good: bool) -> None:
+    content = home_with([{"type": "patrol"}], astro={"camera": {"lost_after": "5 s"}})
+    content["simulation"]["step"] = step
+    if good:
+        Simulation(content)
+        return
+    with pytest.raises(InputError, match=r"lost_after is 5 s.*it would act as 6 s"):
+        Simulation(content)
+
+
+def test_lost_after_left_out_goes_with_every_step() -> None:
+    content = home_with([{"type": "patrol"}], astro={"camera": {}})
+    content["simulation"]["step"] = "2 s"
+    Simulation(content)
+
+
+def test_find_keeps_its_distance_from_who_is_already_near() -> None:
+    """It looked round, saw the user 0.7 m off, and stayed there for as long as it stays."""
+    sits = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [1.7, 3.0]}]}]}
+    find = {"type": "find", "user": "ana", "every": "5 min", "distance": "1.2 m", "stay": "4 min"}
+    content = home_with([find], "20 min", sits, astro={"gives_way": {"distance": "50 cm"}})
+    stored = run(content)
+    assert "found" in {name for _, name, _ in events(stored)}
+    found = next(step for step, name, _ in events(stored) if name == "found")
+    robot, ana = path(stored, "astro"), path(stored, "ana")
+    apart = np.hypot(robot.x - ana.x, robot.y - ana.y)[found + 10 : found + 200]
+    assert apart.min() >= 1.19
+
+
+def test_show_of_a_run_does_not_ignore_step(tmp_path: Path) -> None:
+    fleet2d.run(scenario("1 min", users={"ana": {"type": "meander"}}), out=tmp_path / "run")
+    result = CliRunner().invoke(app, ["show", str(tmp_path / "run"), "--step", "3"])
+    assert isinstance(result.exception, InputError)
+    assert "--step goes with --layer" in str(result.exception)
+    assert not (tmp_path / "run" / "picture.png").exists()
+
+
+def test_show_of_a_run_that_is_not_there_speaks_of_runs() -> None:
+    result = CliRunner().invoke(app, ["show", "runs/nothing"])
+    assert isinstance(result.exception, InputError)
+    assert "runs/nothing" in str(result.exception)
+    assert "directory of a run" in str(result.exception)
+    assert "floorplan.path" not in str(result.exception)
+
+
+def test_path_every_wants_a_timedelta() -> None:
+    stored = run(scenario("1 min", users={"ana": {"type": "meander"}}))
+    assert 6 == len(stored.path("ana", every=timedelta(seconds=10)).step)
+    with pytest.raises(ArtifactError, match=r"every is 1: a timedelta is wanted"):
+        stored.path("ana", every=1)  # type: ignore[arg-type]
+
+
+def test_sums_of_a_wrong_width_name_the_line_of_the_user() -> None:
+    class Own(SightingShare):
+        def sums(self, bins: Bins) -> Any:
+            return np.zeros((len(bins.day), self.users + 1, 1))
+
+    own = Own()
+    own.begin(rooms=3, users=2)
+    day = np.array([1], np.int64)
+    bins = Bins(day, day, 60, np.zeros((1, 3)), np.zeros((1, 3, 3), np.int64))
+    with pytest.raises(ComponentError, match=r"Own\.sums returned .*test_defects\.py:\d+, in sums"):
+        own.observe(bins)
+
+
+def test_shutting_a_doorway_without_a_door_says_how_to_hang_one() -> None:
+    content = {**scenario("1 min"), "floorplan": {"type": "bundled"}}
+    content["changes"] = [{"at": "10 s", "shut": "bathroom_0"}]
+    with pytest.raises(InputError, match=r"objects: \{bathroom_0: \{type: door, doorway: bed"):
+        Simulation(content)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(seed: int) -> None:
+    import time
+
+    people = {"ana": "retired", "ben": "works_from_home"}
+    users = {
+        name: {"behaviors": [{"type": "reactions"}, {"type": "routine", "persona": persona}]}
+        for name, persona in people.items()
+    }
+    robot = {"camera": {}, "gives_way": {}, "behaviors": [{"type": "patrol", "dwell": "1 min"}]}
+    content = scenario("6 h", users=users, robots={"astro": robot}, simulation={"seed": seed})
+    began = time.process_time()
+    fleet2d.run(content)
+    assert time.process_time() - began < 5

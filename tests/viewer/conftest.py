@@ -1,0 +1,33 @@
+"""Runs that the tests of the viewer look at."""
+
+from pathlib import Path
+
+import pytest
+
+import fleet2d
+
+SCENARIO = {
+    "extends": "bundled:base",
+    "simulation": {"duration": "9 h", "seed": 11},
+    "floorplan": {"layers": {"dust": {"fill": 0.5}}},
+    "objects": {
+        "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
+        "office_door": {"type": "door", "doorway": "office_0", "open": False},
+    },
+}
+
+
+@pytest.fixture(scope="session")
+def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A stored run of nine hours with doors and a layer."""
+    folder = tmp_path_factory.mktemp("viewer") / "first"
+    fleet2d.run(SCENARIO, out=folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def other_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with another seed."""
+    folder = tmp_path_factory.mktemp("viewer") / "second"
+    fleet2d.run(SCENARIO, out=folder, seed=12)
+    return folder

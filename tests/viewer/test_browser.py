@@ -1,0 +1,335 @@
+"""The page, driven in Chromium: what it shows is what the run's tables say."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d.viewer.export import export_html
+from fleet2d.viewer.live import LiveRun
+from fleet2d.viewer.serve import PageServer
+from fleet2d.viewer.shown_run import ShownRun
+
+from .browser import chromium, page_at
+
+AXE = Path(__file__).parents[2] / "page" / "node_modules" / "axe-core" / "axe.min.js"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def address(run_dir: Path) -> Iterator[str]:
+    server = PageServer([run_dir])
+    stop = server.start()
+    yield server.address
+    stop()
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Iterator[Any]:
+    with page_at(browser, address) as opened:
+        yield opened
+
+
+def moment(page: Any) -> int:
+    """Return the step that the page shows."""
+    return int(page.get_attribute(".lanes", "aria-valuenow"))
+
+
+def until(page: Any, holds: Callable[[], bool]) -> None:
+    """Wait for a condition; the page's policy lets no test run code in it to wait."""
+    for _ in range(100):
+        if holds():
+            return
+        page.wait_for_timeout(100)
+    pytest.fail("the page did not come to it within 10 s")
+
+
+def shows_step(page: Any, step: int) -> None:
+    page.wait_for_selector(f"table.now[data-step='{step}']", timeout=5000)
+
+
+def test_what_is_shown_at_random_moments_is_what_the_tables_say(page: Any, run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    paths = {name: run.path(name, timedelta(seconds=1)) for name in ("ana", "astro")}
+    for step in np.random.default_rng(5).choice(run.manifest["steps"], 12).tolist():
+        page.fill("#goto", f"step {step}")
+        page.press("#goto", "Enter")
+        shows_step(page, step)
+        for name, path in paths.items():
+            row = page.locator(f"tr[data-body={name}]")
+            assert path.x[step] == pytest.approx(float(row.get_attribute("data-x")), abs=1e-9)
+            assert path.y[step] == pytest.approx(float(row.get_attribute("data-y")), abs=1e-9)
+            room = "away" if path.away[step] else run.plan.rooms[path.room[step]].name
+            assert room == row.get_attribute("data-room")
+
+
+def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Path) -> None:
+    table = fleet2d.open_run(run_dir).tables["observations"]
+    step = table["step"].to_pylist()[len(table) // 2]
+    page.fill("#goto", f"step {step}")
+    page.press("#goto", "Enter")
+    shows_step(page, step)
+    page.wait_for_selector("tr[data-body=astro] >> text=sees ana", timeout=5000)
+
+
+def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    rows = [row for row in run.tables["ltp"].to_pylist() if row["step"] == 21_599]
+    page.keyboard.press("End")
+    page.click("#tab-beliefs")
+    page.wait_for_selector("table.bars tr[data-room]")
+    for row in rows:
+        bar = page.locator(f"tr[data-room={row['room']}]")
+        if bar.count():
+            assert row["share"] == pytest.approx(
+                float(bar.get_attribute("data-believed")), abs=1e-9
+            )
+
+
+def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
+    box = page.locator(".lanes").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.25, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] * 0.75, box["y"] + 60, steps=5)
+    page.mouse.up()
+    assert 0.75 * 9 * 3600 == pytest.approx(moment(page), rel=0.01)
+
+
+def test_playing_passes_time_at_the_chosen_speed(page: Any) -> None:
+    page.select_option("select[aria-label=Speed]", "600")
+    page.click("button.play")
+    until(page, lambda: moment(page) > 300)
+    page.click("button.play")
+    stopped = moment(page)
+    page.wait_for_timeout(300)
+    assert stopped == moment(page)
+
+
+def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page: Any) -> None:
+    page.keyboard.press("Home")
+    for key in ("ArrowRight", ".", ".", ","):
+        page.keyboard.press(key)
+    assert 324 + 1 == moment(page)
+    page.keyboard.press("n")
+    assert moment(page) > 325
+    page.keyboard.press("+")
+    page.keyboard.press("+")
+    page.keyboard.press("4")
+    assert "true" == page.get_attribute("#tab-events", "aria-selected")
+    page.keyboard.press("Space")
+    assert "true" == page.get_attribute("button.play", "aria-pressed")
+    page.keyboard.press("Space")
+    page.keyboard.press("End")
+    assert 9 * 3600 - 1 == moment(page)
+    before = page.get_attribute("html", "data-theme")
+    page.keyboard.press("t")
+    assert before != page.get_attribute("html", "data-theme")
+
+
+def test_tab_reaches_every_control_and_focus_can_be_seen(page: Any) -> None:
+    names = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        names.add(page.evaluate("document.activeElement.className + document.activeElement.id"))
+    assert {"play", "goto", "lanes", "panel", "tab-now"} <= names
+
+
+def test_events_are_filtered_searched_and_jumped_to(page: Any, run_dir: Path) -> None:
+    events = fleet2d.open_run(run_dir).tables["events"]
+    activities = [row for row in events.to_pylist() if row["event"] == "activity"]
+    page.click("#tab-events")
+    page.select_option("#panel select", "activity")
+    page.wait_for_selector(f"p[data-count='{len(activities)}']")
+    words = activities[0]["detail"]
+    page.fill("#search", words)
+    count = sum(words in row["detail"] for row in activities)
+    page.wait_for_selector(f"p[data-count='{count}']")
+    page.locator("#panel ol.events button").first.click()
+    assert activities[0]["step"] == moment(page)
+
+
+def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
+    page.fill("#goto", "day 1 05:00")
+    page.press("#goto", "Enter")
+    page.click("#tab-layers")
+    page.uncheck("input[name=ways]")
+    page.keyboard.press("+")
+    until(page, lambda: "panel=layers" in page.url)
+    page.wait_for_timeout(400)
+    with page_at(browser, page.url) as other:
+        assert 5 * 3600 == moment(other)
+        assert "true" == other.get_attribute("#tab-layers", "aria-selected")
+        assert not other.is_checked("input[name=ways]")
+        assert other.url.split("#")[1] == page.url.split("#")[1]
+
+
+def test_layers_and_switches_change_the_plan(page: Any) -> None:
+    page.click("#tab-layers")
+    pictures = set()
+    for name in ("names", "furniture", "sight"):
+        page.click(f"input[name={name}]")
+        page.wait_for_timeout(150)
+        pictures.add(page.locator(".plan canvas").screenshot())
+    page.click("input[name=layer] >> nth=1")
+    page.wait_for_timeout(600)
+    pictures.add(page.locator(".plan canvas").screenshot())
+    assert 4 == len(pictures)
+
+
+def test_click_on_a_body_shows_its_state_and_history(page: Any) -> None:
+    page.click("tr[data-body=astro] button")
+    page.wait_for_selector("[data-inspected=astro]")
+    assert "patrol, hangout" in page.inner_text("[data-inspected=astro]")
+    assert page.locator("[data-inspected=astro] ol.events li").count() > 1
+
+
+def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: Path) -> None:
+    server = PageServer([run_dir, other_dir])
+    stop = server.start()
+    with page_at(browser, server.address) as page:
+        assert 2 == page.locator(".plan canvas").count()
+        page.wait_for_selector(".labels button >> text=rooms differ")
+        page.fill("#goto", "day 1 08:00")
+        page.press("#goto", "Enter")
+        page.wait_for_timeout(300)
+        steps = [table.get_attribute("data-step") for table in page.locator("table.now").all()]
+        assert [str(8 * 3600)] * 2 == steps
+        page.click("#tab-metrics")
+        assert page.locator("table.results tr.differs").count() > 0
+    stop()
+
+
+def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_path: Path) -> None:
+    target = tmp_path / "part.html"
+    run = fleet2d.open_run(run_dir)
+    export_html(run, target, 3600, 3 * 3600)
+    with page_at(browser, target.as_uri(), offline=True) as page:
+        page.keyboard.press("End")
+        shows_step(page, 3 * 3600 - 1)
+        path = run.path("ana", timedelta(seconds=1))
+        shown = float(page.get_attribute("tr[data-body=ana]", "data-x"))
+        assert path.x[3 * 3600 - 1] == pytest.approx(shown, abs=1e-9)
+        page.keyboard.press("Home")
+        shows_step(page, 3600)
+
+
+def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
+    people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
+    run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=4, users=people)
+    server = PageServer([ShownRun(run)])
+    stop = server.start()
+    with page_at(browser, server.address) as page:
+        page.keyboard.press("End")
+        assert 52 == page.locator("table.now tr[data-body]").count()
+        page.click("tr[data-body=u49] button")
+        page.wait_for_selector("[data-inspected=u49]")
+    stop()
+
+
+def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
+    turns = [2 * math.pi * i / 4000 for i in range(4000)]
+    far = [5 + 0.2 * (i * 7919 % 5) / 5 + math.sin(3 * turn) for i, turn in enumerate(turns)]
+    corners = [[8 + r * math.cos(a), 8 + r * math.sin(a)] for r, a in zip(far, turns, strict=True)]
+    plan = tmp_path / "round.json"
+    content = {"format": "fleet2d-floorplan", "version": 1, "free": [{"outline": corners}]}
+    plan.write_text(json.dumps(content))
+    run = fleet2d.run(
+        {
+            "simulation": {"start": "2026-01-05", "duration": "10 min", "seed": 1},
+            "floorplan": {"type": "native", "path": str(plan)},
+            "robots": {"astro": {"camera": {}, "behaviors": [{"type": "patrol"}]}},
+        }
+    )
+    server = PageServer([ShownRun(run)])
+    stop = server.start()
+    with page_at(browser, server.address) as page:
+        page.keyboard.press("End")
+        shows_step(page, 599)
+        pictures = {page.locator(".plan canvas").screenshot()}
+        page.click("#tab-layers")
+        page.click("input[name=sight]")
+        page.wait_for_timeout(300)
+        pictures.add(page.locator(".plan canvas").screenshot())
+        assert 2 == len(pictures)
+    stop()
+
+
+def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text('{"format": 99}')
+    server = PageServer([tmp_path])
+    stop = server.start()
+    with page_at(browser, server.address) as page:
+        assert "later Fleet2D" in page.inner_text(".failure")
+    stop()
+
+
+def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
+    simulation = fleet2d.Simulation(
+        "bundled:base",
+        "simulation.duration=6 h",
+        "objects.bath_door={type: door, doorway: bathroom_0}",
+        seed=4,
+    )
+    live = LiveRun(simulation, paused=True)
+    live.start()
+    server = PageServer([], live=live)
+    stop = server.start()
+    with page_at(browser, f"{server.address}#select=bath_door&panel=inspect") as page:
+        page.wait_for_selector(".live[data-paused=true]")
+        page.click("text=+60")
+        page.wait_for_selector(".live[data-step='60']")
+        page.click("text=Shut bath_door")
+        page.click("text=Step")
+        page.wait_for_selector("text=Open bath_door")
+        page.click("#tab-now")
+        page.click("tr[data-body=ana] button")
+        page.click("text=Put ana")
+        box = page.locator(".plan canvas").bounding_box()
+        page.mouse.click(box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.75)
+        page.click("text=Step")
+        page.wait_for_selector("[data-inspected=ana] >> text=living_room_0")
+        page.select_option("select[aria-label='Speed of the simulation']", "0")
+        page.click("button.play")
+        page.wait_for_selector(".live[data-done=true]", timeout=60_000)
+        assert 6 * 3600 - 1 == moment(page)
+    stop()
+    live.end()
+    assert live.run is not None
+    assert "complete" == live.run.status
+    assert {"change", "put"} == {entry["do"] for entry in live.run.manifest["interventions"]}
+    events = live.run.tables["events"].to_pylist()
+    assert ("bath_door", "shut") in [(row["entity"], row["event"]) for row in events]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("panel", ["now", "inspect", "beliefs", "events", "metrics", "layers"])
+def test_axe_finds_nothing_serious(browser: Any, address: str, scheme: str, panel: str) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not installed: npm ci in page/")
+    with page_at(browser, f"{address}#panel={panel}&select=ana", color_scheme=scheme) as page:
+        page.wait_for_timeout(200)
+        page.evaluate(AXE.read_text(encoding="utf-8"))
+        found = page.evaluate("axe.run()")
+        serious = [
+            f"{entry['id']}: {entry['nodes'][0]['html'][:120]}"
+            for entry in found["violations"]
+            if entry["impact"] in ("serious", "critical")
+        ]
+        assert [] == serious
+
+
+@pytest.mark.parametrize("width", [390, 768])
+def test_narrow_screen_needs_no_sideways_scrolling(browser: Any, address: str, width: int) -> None:
+    with page_at(browser, address, viewport={"width": width, "height": 844}) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,68 @@
+"""One HTML file with everything in it."""
+
+import base64
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.viewer.export import embedded_run, export_html, html_of
+from fleet2d.viewer.shown_run import ShownRun
+
+DATA = re.compile(r'<script type="application/json" id="fleet2d-runs">(.*?)</script>', re.DOTALL)
+
+
+def runs_in(path: Path) -> list[dict[str, Any]]:
+    found = DATA.search(path.read_text(encoding="utf-8"))
+    assert found
+    runs: list[dict[str, Any]] = json.loads(found[1])
+    return runs
+
+
+def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> None:
+    target = tmp_path / "run.html"
+    export_html(fleet2d.open_run(run_dir), target)
+    (held,) = runs_in(target)
+    assert fleet2d.open_run(run_dir).digest == held["facts"]["digest"]
+    assert b"PAR1" == base64.b64decode(held["tables"]["events"])[:4]
+    outside = re.sub(
+        r"<script.*?</script>|<style>.*?</style>", "", target.read_text(), flags=re.DOTALL
+    )
+    assert not re.search(r'(src|href)="(?!data:)', outside)
+    assert "default-src 'none'" in outside
+
+
+def test_part_of_a_run_keeps_poses_within_it_and_drops_the_rest(run_dir: Path) -> None:
+    shown = ShownRun(fleet2d.open_run(run_dir))
+    whole, part = embedded_run(shown, 0, 9 * 3600), embedded_run(shown, 3600, 7200)
+    assert (3600, 7200) == (part["facts"]["first_step"], part["facts"]["end_step"])
+    assert len(part["tables"]["key_frames"]) < len(whole["tables"]["key_frames"]) / 2
+    rows = pq.read_table(io.BytesIO(base64.b64decode(part["tables"]["key_frames"])))
+    for name in ("ana", "astro"):
+        mine = rows.filter(rows["entity"].cast("string").to_numpy(False) == name)[
+            "step"
+        ].to_pylist()
+        assert min(mine) <= 3600
+
+
+def test_text_of_a_run_can_not_end_its_element(run_dir: Path) -> None:
+    held = embedded_run(ShownRun(fleet2d.open_run(run_dir)), 0, 3600)
+    held["facts"]["title"] = "</script><script>alert(1)</script>"
+    assert "<script>alert" not in html_of([held])
+
+
+@pytest.mark.parametrize(("first", "end"), [(5, 5), (-1, 9), (0, 10**9)])
+def test_empty_part_is_refused(run_dir: Path, tmp_path: Path, first: int, end: int) -> None:
+    with pytest.raises(InputError, match="nothing to show"):
+        export_html(fleet2d.open_run(run_dir), tmp_path / "x.html", first, end)
+
+
+def test_file_that_can_not_be_written_is_an_input_error(run_dir: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="can't be written"):
+        export_html(fleet2d.open_run(run_dir), tmp_path / "no" / "x.html")

@@ -1,0 +1,197 @@
+"""A run is the same, watched or not; orders are obeyed or refused with a reason."""
+
+import json
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.viewer.contract import LiveOrder
+from fleet2d.viewer.live import LiveRun, read_order
+from fleet2d.viewer.server import Shelf, page_app
+from fleet2d.viewer.shown_run import ShownRun
+
+PORT = 8765
+OWN = f"http://127.0.0.1:{PORT}"
+DOOR = "objects.bath_door={type: door, doorway: bathroom_0}"
+
+
+def simulation(duration: str = "8 h") -> fleet2d.Simulation:
+    return fleet2d.Simulation("bundled:base", f"simulation.duration={duration}", DOOR, seed=4)
+
+
+def order(action: str, target: str = "", value: float = 0, x: float = 0, y: float = 0) -> LiveOrder:
+    return read_order(
+        json.dumps({"action": action, "target": target, "value": value, "x": x, "y": y}).encode()
+    )
+
+
+@pytest.fixture
+def live() -> Iterator[LiveRun]:
+    watched = LiveRun(simulation(), paused=True)
+    watched.start()
+    yield watched
+    watched.end()
+
+
+def test_watched_run_has_the_digest_of_one_that_nobody_watches() -> None:
+    watched = LiveRun(simulation())
+    frames = watched.frames()
+    watched.start()
+    steps = []
+    for batch in frames:
+        steps += [frame["step"] for frame in batch]
+        if batch and batch[-1]["done"]:
+            break
+    watched.end()
+    assert watched.run is not None
+    assert simulation().run().digest == watched.run.digest
+    assert steps == sorted(steps)
+    assert len(steps) > 8 * 60 * 0.9
+    assert [] == watched.run.notes
+
+
+def test_frames_have_every_event_once() -> None:
+    watched = LiveRun(simulation())
+    frames = watched.frames()
+    next(frames)
+    watched.start()
+    events = []
+    for batch in frames:
+        events += [(e["step"], e["entity"], e["event"]) for f in batch for e in f["events"]]
+        if batch and batch[-1]["done"]:
+            break
+    watched.end()
+    assert watched.run is not None
+    rows = watched.run.tables["events"].to_pylist()
+    assert sorted((r["step"], r["entity"], r["event"]) for r in rows) == sorted(events)
+
+
+def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
+    assert "" == live.ask(order("step", value=1))
+    assert "" == live.ask(order("step", value=60))
+    assert 61 == live.engine.step
+
+
+def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
+    live.ask(order("step", value=600))
+    home = live.engine.simulation.home
+    x, y = home.plan.room("living_room_0").anchor_xy
+    assert "" == live.ask(order("place", "ana", x=x, y=y))
+    live.ask(order("step", value=1))
+    state = live.engine.simulation.state["ana"]
+    assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)
+    live.end()
+    assert live.run is not None
+    assert ["put"] == [entry["do"] for entry in live.run.manifest["interventions"]]
+    path = live.run.path("ana", timedelta(seconds=1))
+    assert len(path.x) == live.run.manifest["steps"]
+
+
+def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
+    live.ask(order("step", value=60))
+    x, y = live.engine.simulation.home.plan.room("kitchen_0").anchor_xy
+    assert "" == live.ask(order("call", "astro", x=x, y=y))
+    live.ask(order("step", value=120))
+    state = live.engine.simulation.state["astro"]
+    assert "kitchen_0" == state["room"]
+    assert "" == live.ask(order("call", "astro", x=x + 0.5, y=y))
+    live.ask(order("step", value=1))
+    live.end()
+    assert live.run is not None
+    done = [entry["do"] for entry in live.run.manifest["interventions"]]
+    assert ["drive", "decide", "decide"] == done
+
+
+def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
+    run_dir = tmp_path / "steered"
+    watched = LiveRun(
+        fleet2d.Simulation("bundled:base", "simulation.duration=3 h", DOOR, seed=4, out=run_dir),
+        paused=True,
+    )
+    watched.start()
+    watched.ask(order("step", value=300))
+    for wish in (order("door", "bath_door", value=0), order("replan", "astro")):
+        assert "" == watched.ask(wish)
+    watched.ask(order("resume"))
+    for batch in watched.frames():
+        if batch and batch[-1]["done"]:
+            break
+    watched.end()
+    assert fleet2d.reproduce(run_dir).same
+    marks = ShownRun(fleet2d.open_run(run_dir)).facts["marks"]
+    assert [(300, "shut bath_door"), (300, "replan astro")] == [
+        (mark["step"], mark["label"]) for mark in marks
+    ]
+
+
+def test_door_is_shut_from_the_next_step_on(live: LiveRun) -> None:
+    before = live.engine.walls()
+    assert "" == live.ask(order("door", "bath_door", value=0))
+    live.ask(order("step", value=2))
+    assert {"bath_door": False} == live.engine.doors()
+    assert before != live.engine.walls()
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (order("place", "zoe"), "nobody named"),
+        (order("replan", "zoe"), "nobody named"),
+        (order("door", "attic_door"), "attic_door"),
+        (order("speed", value=-1), "speed"),
+    ],
+)
+def test_impossible_order_is_refused_with_a_reason(
+    live: LiveRun, wish: LiveOrder, words: str
+) -> None:
+    assert words in live.ask(wish)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"[]",
+        b'{"action": "pause"}',
+        b'{"action": "fly", "target": "", "value": 0, "x": 0, "y": 0}',
+        b'{"action": "place", "target": 3, "value": 0, "x": 0, "y": 0}',
+        b'{"action": "place", "target": "ana", "value": 0, "x": NaN, "y": 0}',
+        b" " * 5000,
+    ],
+)
+def test_what_is_no_order_is_refused(body: bytes) -> None:
+    with pytest.raises(InputError, match="no order"):
+        read_order(body)
+
+
+def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
+    client = TestClient(page_app(Shelf([]), "token", PORT, live), base_url=OWN)
+    body = json.dumps(order("step", value=1))
+    own = {"Origin": OWN, "Content-Type": "application/json"}
+    for wrong in (
+        {"Content-Type": "application/json"},
+        {"Origin": "http://evil.example", "Content-Type": "application/json"},
+        {**own, "Host": "evil.example"},
+        {**own, "Sec-Fetch-Site": "cross-site"},
+    ):
+        assert 403 == client.post("/token/live/order", content=body, headers=wrong).status_code
+    form = {"Origin": OWN, "Content-Type": "text/plain"}
+    assert 415 == client.post("/token/live/order", content=body, headers=form).status_code
+    assert 403 == client.post("/wrong/live/order", content=body, headers=own).status_code
+    assert 0 == live.engine.step
+    assert 200 == client.post("/token/live/order", content=body, headers=own).status_code
+    assert 1 == live.engine.step
+
+
+def test_facts_of_a_run_under_way_name_home_and_bodies(live: LiveRun) -> None:
+    client = TestClient(page_app(Shelf([]), "token", PORT, live), base_url=OWN)
+    facts = client.get("/token/live/facts.json").json()
+    assert ["ana", "astro"] == [body["name"] for body in facts["bodies"]]
+    assert ["bath_door"] == [door["name"] for door in facts["home"]["doors"]]
+    assert client.get("/token/live/walls/0.json").json()["triangles"]
+    assert 422 == client.get("/token/live/walls/99.json").status_code

@@ -1,0 +1,41 @@
+"""Runs and homes show themselves."""
+
+from pathlib import Path
+
+import pytest
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.leaves import leaf
+
+
+def test_run_draws_itself_and_its_moments(run_dir: Path) -> None:
+    from matplotlib.figure import Figure
+
+    run = fleet2d.open_run(run_dir)
+    assert isinstance(run.draw(), Figure)
+    assert isinstance(run.draw(at=20_000), Figure)
+    axes = Figure().add_subplot()
+    assert axes is run.draw(at="day 1 05:00", ax=axes)
+    assert len(axes.patches) > 2
+
+
+def test_run_and_home_show_themselves_in_a_notebook(run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    assert str(run.digest)[:12] in run._repr_html_()
+    assert "<img" in run._repr_html_()
+    picture = fleet2d.Home(run.plan)._repr_png_()
+    assert picture is not None
+    assert picture.startswith(b"\x89PNG")
+
+
+def test_run_is_a_widget(run_dir: Path) -> None:
+    pytest.importorskip("anywidget", reason="anywidget is not installed")
+    widget = fleet2d.open_run(run_dir).view(height=400)
+    assert 400 == widget.height
+    assert "fleet2d-runs" in widget.content
+
+
+def test_leaf_that_is_not_there_is_named() -> None:
+    with pytest.raises(InputError, match=r"fleet2d\.viewer\.nothing"):
+        leaf("viewer.nothing")

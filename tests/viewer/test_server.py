@@ -1,0 +1,157 @@
+"""What the page is sent, of whole, damaged and unfinished runs."""
+
+import json
+import shutil
+from datetime import timedelta
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from starlette.testclient import TestClient
+
+import fleet2d
+from fleet2d.viewer.server import Shelf, page_app
+from fleet2d.viewer.shown_run import ShownRun
+
+PORT = 8765
+BASE = f"http://127.0.0.1:{PORT}"
+
+
+def client_of(*sources: Path | ShownRun) -> TestClient:
+    return TestClient(page_app(Shelf(sources), "token", PORT), base_url=f"{BASE}/token/")
+
+
+@pytest.fixture
+def copy(run_dir: Path, tmp_path: Path) -> Path:
+    target = tmp_path / "copy"
+    shutil.copytree(run_dir, target)
+    return target
+
+
+def test_page_and_its_parts_are_served(run_dir: Path) -> None:
+    client = client_of(run_dir)
+    assert '<div id="page">' in client.get("").text
+    assert client.get("page.js").headers["content-type"].startswith("text/javascript")
+    assert client.get("page.css").headers["content-type"].startswith("text/css")
+
+
+def test_session_names_all_runs(run_dir: Path, other_dir: Path) -> None:
+    session = client_of(run_dir, other_dir).get("session.json").json()
+    assert ["first", "second"] == session["runs"]
+    assert not session["live"]
+
+
+def test_facts_are_those_of_the_run(run_dir: Path) -> None:
+    facts = client_of(run_dir).get("run/0/facts.json").json()
+    run = fleet2d.open_run(run_dir)
+    assert run.digest == facts["digest"]
+    assert run.manifest["steps"] == facts["steps"] == facts["end_step"]
+    assert [room.name for room in run.plan.rooms] == [
+        room["name"] for room in facts["home"]["rooms"]
+    ]
+    assert ["bath_door", "office_door"] == [door["name"] for door in facts["home"]["doors"]]
+    roles = {table["name"]: table["role"] for table in facts["tables"]}
+    assert ("algorithm", "layer", "log", "metric") == (
+        roles["ltp"], roles["layer.dust"], roles["events"], roles["room_share"],
+    )  # fmt: skip
+
+
+def test_part_of_a_table_is_served_by_range(run_dir: Path) -> None:
+    answer = client_of(run_dir).get("run/0/tables/events.parquet", headers={"Range": "bytes=0-3"})
+    assert 206 == answer.status_code
+    assert b"PAR1" == answer.content
+
+
+def test_walls_change_when_a_door_moves(run_dir: Path) -> None:
+    shown = ShownRun(fleet2d.open_run(run_dir))
+    changes = shown.facts["walls"]
+    assert len(changes) > 3
+    assert 0 == changes[0]["step"]
+    assert [c["step"] for c in changes] == sorted({c["step"] for c in changes})
+    assert shown.arrangements <= 4
+    walls = [sum(n < 0 for n in shown.walls(i)["neighbors"]) for i in range(shown.arrangements)]
+    assert len(set(walls)) > 1
+
+
+def test_sightings_cover_the_observations(run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    lane = ShownRun(run).sightings[0]
+    steps = run.tables["observations"]["step"].to_pylist()
+    inside = [
+        any(a <= s <= b for a, b in zip(lane["first"], lane["last"], strict=True)) for s in steps
+    ]
+    assert all(inside)
+    assert not any(lane["false"])
+
+
+def test_false_sightings_are_marked() -> None:
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=6 h",
+        "robots.astro.camera.perception={false_positives: {per_hour: 30}}",
+        seed=3,
+    )
+    lanes = ShownRun(run).sightings
+    assert any(any(lane["false"]) for lane in lanes)
+
+
+def test_run_in_memory_is_served_like_a_stored_one() -> None:
+    run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=3)
+    client = client_of(ShownRun(run))
+    assert "base" == client.get("run/0/facts.json").json()["title"]
+    assert b"PAR1" == client.get("run/0/tables/key_frames.parquet").content[:4]
+
+
+def test_random_walks_are_sent_as_positions(tmp_path: Path) -> None:
+    run = fleet2d.run(
+        {
+            "simulation": {"duration": "1 h", "start": "2026-01-05", "seed": 1},
+            "floorplan": {"type": "bundled"},
+            "users": {"ana": {"type": "meander"}},
+        }
+    )
+    shown = ShownRun(run)
+    assert 1.0 == shown.facts["walks_every_s"]
+    poses = pq.read_table(shown.table_path("poses"))
+    assert run.path("ana", timedelta(seconds=1)).x.tolist() == poses["x"].to_pylist()
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "words"),
+    [
+        ("manifest.json", b"{", "damaged"),
+        ("manifest.json", b'{"format": 99}', "later Fleet2D"),
+        ("floorplan.json", None, "missing"),
+        ("floorplan.json", b"[]", "floorplan.json"),
+    ],
+)
+def test_damaged_run_is_refused_with_a_message(
+    copy: Path, file: str, content: bytes | None, words: str
+) -> None:
+    path = copy / file
+    if content is None:
+        path.unlink()
+    else:
+        path.write_bytes(content)
+    answer = client_of(copy).get("run/0/facts.json")
+    assert 422 == answer.status_code
+    assert words in answer.json()["message"]
+
+
+def test_damaged_table_is_noted_and_the_rest_shown(copy: Path) -> None:
+    (copy / "events.parquet").write_bytes(b"PAR1")
+    answer = client_of(copy).get("run/0/facts.json")
+    assert 200 == answer.status_code
+    assert any("events" in note for note in answer.json()["notes"])
+
+
+def test_unfinished_run_is_shown_as_far_as_it_goes(copy: Path) -> None:
+    manifest = json.loads((copy / "manifest.json").read_text())
+    manifest |= {"status": "running", "digest": None, "tables": {}}
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "observations.parquet").rename(copy / "observations.parquet.partial")
+    facts = client_of(copy).get("run/0/facts.json").json()
+    assert "running" == facts["status"]
+    assert "observations" not in [table["name"] for table in facts["tables"]]
+    assert any("cut off" in note for note in facts["notes"])
+    assert [] != next(t for t in facts["tables"] if t["name"] == "events")["columns"]

@@ -1,0 +1,69 @@
+"""Write what the page's unit tests compare with: a run, and what Python says of it at some steps.
+
+`python tools/page_fixture.py` writes ``page/test/run.json``. The run and the expectations belong
+together, so the file only needs to be written again when the page reads something new.
+"""
+
+import json
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fleet2d
+from fleet2d.floorplan.home import Home
+from fleet2d.sight.region import VisibleRegion
+from fleet2d.viewer.export import embedded_run
+from fleet2d.viewer.shown_run import ShownRun
+
+TARGET = Path(__file__).parents[1] / "page" / "test" / "run.json"
+SCENARIO: dict[str, Any] = {
+    "extends": "bundled:base",
+    "simulation": {"duration": {"days": 1}, "seed": 11},
+    "floorplan": {"layers": {"explored": {}}},
+    "objects": {
+        "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
+        "office_door": {"type": "door", "doorway": "office_0", "open": False},
+    },
+}
+STEPS = 200
+
+
+class _Walled:
+    """A home as sight meets it."""
+
+    def __init__(self, home: Home) -> None:
+        self.mesh, self.lattice = home.walls, home.plan.lattice
+
+
+def main() -> None:
+    """Write the file."""
+    shown = ShownRun(fleet2d.run(SCENARIO))
+    run = shown.run
+    draw = np.random.default_rng(0)
+    steps = np.sort(draw.choice(run.manifest["steps"], STEPS, replace=False))
+    every = timedelta(microseconds=run.manifest["step_us"])
+    poses = {}
+    for name in (*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]):
+        path = run.path(name, every)
+        poses[name] = {
+            "x": path.x[steps].tolist(),
+            "y": path.y[steps].tolist(),
+            "heading": path.heading[steps].tolist(),
+            "away": path.away[steps].tolist(),
+            "room": path.room[steps].tolist(),
+        }
+    walled = _Walled(Home(run.plan))
+    at = run.path("astro", every)
+    regions = [
+        {"x": x, "y": y, "area": VisibleRegion(walled, x, y).area_m2}
+        for x, y in zip(at.x[steps[:40]].tolist(), at.y[steps[:40]].tolist(), strict=True)
+    ]
+    expected = {"steps": steps.tolist(), "poses": poses, "regions": regions}
+    content = {"run": embedded_run(shown, 0, run.manifest["steps"]), "expected": expected}
+    TARGET.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
