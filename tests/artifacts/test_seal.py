@@ -60,7 +60,9 @@ def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
     rng = random.Random(5)
     files = sorted(path for path in run.rglob("*") if path.is_file())
     contents = {path: path.read_bytes() for path in files}
-    assert {"manifest.json", "floorplan.json", "events.parquet", "ltp.npz"} <= {p.name for p in files}
+    assert {"manifest.json", "floorplan.json", "events.parquet", "ltp.npz"} <= {
+        p.name for p in files
+    }
     for _ in range(CHANGES):
         path = rng.choice(files)
         content = bytearray(contents[path])
@@ -180,7 +182,9 @@ def test_the_seal_covers_a_run_of_plain_tables(tmp_path: Path) -> None:
         (lambda m: m.update(digest="abc"), ["digest", "'abc'"]),
     ],
 )  # fmt: skip
-def test_an_edited_manifest_is_refused_with_the_field(run: Path, change: Any, words: list[str]) -> None:
+def test_an_edited_manifest_is_refused_with_the_field(
+    run: Path, change: Any, words: list[str]
+) -> None:
     edited(run, change)
     with pytest.raises(RunDirectoryError) as caught:
         open_run(run)
@@ -213,13 +217,36 @@ def test_a_pipe_is_no_manifest(tmp_path: Path) -> None:
         open_run(tmp_path)
 
 
-ODD = [None, True, -1, 0, 1.5, 10**30, "", "x", "../x", "/dev/zero", [], ["x"], {}, {"type": "x"}, [[]], "\0"]
+ODD = [
+    None,
+    True,
+    -1,
+    0,
+    1.5,
+    10**30,
+    "",
+    "x",
+    "../x",
+    "/dev/zero",
+    [],
+    ["x"],
+    {},
+    {"type": "x"},
+    [[]],
+    "\0",
+]
 
 
 def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """All keys of a nested content."""
     found = [where]
-    entries = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    entries = (
+        content.items()
+        if isinstance(content, dict)
+        else enumerate(content)
+        if isinstance(content, list)
+        else ()
+    )
     for key, value in entries:
         found += places(value, (*where, key))
     return found
