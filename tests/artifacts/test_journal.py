@@ -183,7 +183,9 @@ def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     processes = [
-        subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment)
+        subprocess.Popen(
+            [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment
+        )
         for _ in range(5)
     ]
     said = sorted(process.communicate(timeout=60)[0].strip() for process in processes)

@@ -238,9 +238,10 @@ def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path: Path, number: int
     assert "interrupted" == stored.status
     assert [] == stored.verify()
     day, clock = last.split()[2:4]
-    assert f"{day} {clock.rstrip(';')}" in str(
-        stored.tables["events"]["time"][-1].as_py()
-    ) or stored.manifest["steps"]
+    assert (
+        f"{day} {clock.rstrip(';')}" in str(stored.tables["events"]["time"][-1].as_py())
+        or stored.manifest["steps"]
+    )
 
 
 # Faults
@@ -305,7 +306,7 @@ class Disk:
 
     @staticmethod
     def path(handle: int) -> Path:
-        return Path(os.readlink(f"/proc/self/fd/{handle}"))
+        return Path(f"/proc/self/fd/{handle}").readlink()
 
     def operation(self) -> bool:
         self.count += 1

@@ -1,0 +1,283 @@
+"""A change to any file of a run is noticed and named; manifests of every version are read."""
+
+import json
+import os
+import random
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.artifacts.manifest import FORMAT, Manifest
+from fleet2d.artifacts.reader import open_run
+from fleet2d.artifacts.seal import verify_run
+from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+
+from .tables import rows_of_every_kind, stored
+
+FIXTURES = Path(__file__).parents[1] / "fixtures" / "runs"
+"""A run of each version of the format, which every later version must read."""
+
+CHANGES = int(os.environ.get("FLEET2D_CHANGES", "100"))
+"""Random changes to bytes that are tried; 10,000 before a release."""
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(FIXTURES / f"v{FORMAT}", tmp_path / "run"))
+
+
+def edited(directory: Path, change: Any) -> None:
+    """Change the content of a manifest, and write it as it is always written."""
+    path = directory / "manifest.json"
+    content = json.loads(path.read_text())
+    change(content)
+    path.write_text(json.dumps(content, indent=2, sort_keys=True) + "\n")
+
+
+def test_there_is_a_run_of_each_format() -> None:
+    assert [f"v{n}" for n in range(1, FORMAT + 1)] == sorted(p.name for p in FIXTURES.iterdir())
+
+
+@pytest.mark.parametrize("version", range(1, FORMAT + 1))
+def test_runs_of_every_format_are_read(version: int) -> None:
+    stored_run = open_run(FIXTURES / f"v{version}")
+    assert version == stored_run.manifest["format"]
+    assert [] == stored_run.verify()
+    assert [] == stored_run.notes
+    assert 0 < stored_run.arrow("events").num_rows
+    assert 0 < stored_run.metrics["distance"]["ana"]
+    assert "kitchen" in {room.type for room in stored_run.plan.rooms}
+    found = verify_run(FIXTURES / f"v{version}")
+    assert found.same
+    assert [] == found.foreign
+    assert (version == 1) == (found.digest is None)
+    assert (version == 1) == bool(found.notes)
+
+
+def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
+    rng = random.Random(5)
+    files = sorted(path for path in run.rglob("*") if path.is_file())
+    contents = {path: path.read_bytes() for path in files}
+    assert {"manifest.json", "floorplan.json", "events.parquet", "ltp.npz"} <= {
+        p.name for p in files
+    }
+    for _ in range(CHANGES):
+        path = rng.choice(files)
+        content = bytearray(contents[path])
+        at, size = rng.randrange(len(content)), rng.choice([1, 1, 1, 2, 16])
+        how = rng.choice(["flip", "cut", "insert"])
+        if how == "flip":
+            content[at] ^= 1 << rng.randrange(8)
+        elif how == "cut":
+            del content[at : at + size]
+        else:
+            content[at:at] = rng.choice([b" " * size, rng.randbytes(size)])
+        if bytes(content) == contents[path]:
+            continue
+        path.write_bytes(content)
+        try:
+            found = verify_run(run)
+        except RunDirectoryError as error:
+            assert path.name == "manifest.json"
+            assert "damaged" in str(error) or "later Fleet2D" in str(error)
+        except ArtifactError as error:
+            assert path.name == "manifest.json"
+            assert "no digest" in str(error)
+        else:
+            name = path.relative_to(run).as_posix()
+            named = [each for each in found.differing if each.startswith(name)]
+            assert named or not found.same, (name, how, at)
+            assert named, (name, found)
+        path.write_bytes(contents[path])
+    assert verify_run(run).same
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (lambda m: m["metrics"]["distance"].update(ana=1.0), "metrics.distance"),
+        (lambda m: m["notes"].append("all is well"), "notes"),
+        (lambda m: m.update(start="2026-01-06T07:00:00"), "start"),
+        (lambda m: m["scenario"]["users"].clear(), "scenario.users"),
+        (lambda m: m["tables"]["events"].update(rows=3), "tables.events"),
+        (lambda m: m["wall_s"].update(setup=0.0), "wall_s.setup"),
+        (lambda m: m["metrics"].update(mine={}), "metrics.mine"),
+        (lambda m: m["versions"].pop("numpy"), "versions.numpy"),
+        (lambda m: m["seal"].update(digest="0" * 64), "seal"),
+    ],
+)
+def test_a_changed_field_is_named(run: Path, change: Any, field: str) -> None:
+    edited(run, change)
+    assert [f"manifest.json: {field}"] == list(verify_run(run).differing)
+
+
+def test_a_table_may_not_hide_from_the_seal(run: Path) -> None:
+    edited(run, lambda m: m["seal"]["files"].pop("events.parquet"))
+    found = verify_run(run).differing
+    assert "manifest.json: seal" in found
+    assert "events.parquet" in found
+
+
+def test_missing_and_foreign_files_are_named(run: Path) -> None:
+    (run / "events.parquet").unlink()
+    (run / "more.parquet").write_text("?")
+    (run / "learned" / "more.npz").write_text("?")
+    (run / "picture.png").write_text("a picture is no harm")
+    (run / "ltp.parquet").unlink(missing_ok=True)
+    (run / "ltp.parquet").symlink_to(FIXTURES / f"v{FORMAT}" / "ltp.parquet")
+    found = verify_run(run)
+    assert "is missing" == found.differing["events.parquet"]
+    assert ["learned/more.npz", "more.parquet"] == found.foreign
+    assert any("more.parquet" in note for note in open_run(run).notes)
+    assert "more" not in open_run(run).tables
+
+
+def test_a_run_without_a_seal_says_what_was_not_compared(tmp_path: Path) -> None:
+    directory = shutil.copytree(FIXTURES / "v1", tmp_path / "run")
+    (note,) = verify_run(directory).notes
+    assert "no seal" in note
+    path = directory / "events.parquet"
+    path.write_bytes(path.read_bytes()[:-9])
+    assert ["events.parquet"] == list(verify_run(directory).differing)
+
+
+def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path: Path) -> None:
+    Manifest().write(tmp_path)
+    with pytest.raises(ArtifactError, match="no digest"):
+        verify_run(tmp_path)
+    with pytest.raises(RunDirectoryError, match="no directory"):
+        verify_run(tmp_path / "nothing")
+
+
+def test_the_seal_covers_a_run_of_plain_tables(tmp_path: Path) -> None:
+    stored(rows_of_every_kind(50), directory=tmp_path / "run")
+    found = verify_run(tmp_path / "run")
+    assert found.same
+    assert 64 == len(found.digest or "")
+
+
+# Manifests
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda m: m.update(steps="many"), ["steps", "'many'"]),
+        (lambda m: m.update(steps=-1), ["steps", "-1"]),
+        (lambda m: m.update(steps=True), ["steps", "True"]),
+        (lambda m: m.update(status="fine"), ["status", "'complete'", "'fine'"]),
+        (lambda m: m.update(start="yesterday"), ["start", "'yesterday'"]),
+        (lambda m: m.update(stats="complete"), ["stats", "did you mean 'status'?"]),
+        (lambda m: m.pop("scenario"), ["lacks scenario"]),
+        (lambda m: m["tables"]["events"].update(rows=2.5), ["tables.events.rows", "2.5"]),
+        (lambda m: m["tables"].update({"../../etc/x": {"rows": 0}}), ["tables.../../etc/x"]),
+        (lambda m: m["tables"]["events"]["columns"][0].update(kind="blob"), ["tables.events.columns.0.kind", "'blob'"]),
+        (lambda m: m["inputs"].append("/dev/zero"), ["inputs.0", "/dev/zero"]),
+        (lambda m: m["entities"].update(users="ana"), ["entities.users", "'ana'"]),
+        (lambda m: m["seal"]["files"].update({"../x": {"bytes": 1, "sha256": "0" * 64}}), ["seal.files.../x"]),
+        (lambda m: m.update(notes=[["x" * 10_000]]), ["notes.0", "…"]),
+        (lambda m: m.update(metrics=[]), ["metrics", "[]"]),
+        (lambda m: m.update(digest="abc"), ["digest", "'abc'"]),
+    ],
+)  # fmt: skip
+def test_an_edited_manifest_is_refused_with_the_field(
+    run: Path, change: Any, words: list[str]
+) -> None:
+    edited(run, change)
+    with pytest.raises(RunDirectoryError) as caught:
+        open_run(run)
+    for word in words:
+        assert word in str(caught.value)
+    assert len(str(caught.value)) < 1000
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ('{"format": 2, "format": 2}', "'format' is there twice"),
+        ('{"format": 2, "steps": NaN}', "NaN is no number"),
+        ('{"format": 2, "steps": 1e999}', "1e999 is too large"),
+        ("[" * 100_000, "nested too deeply"),
+        ('{"format": true}', "does not say its format"),
+        ('{"format": ' + "9" * 5000 + "}", "damaged"),
+    ],
+)
+def test_a_strange_text_is_refused(tmp_path: Path, text: str, word: str) -> None:
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(RunDirectoryError, match=word):
+        open_run(tmp_path)
+
+
+def test_a_pipe_is_no_manifest(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "manifest.json")
+    with pytest.raises(RunDirectoryError, match="is no file"):
+        open_run(tmp_path)
+
+
+ODD = [
+    None,
+    True,
+    -1,
+    0,
+    1.5,
+    10**30,
+    "",
+    "x",
+    "../x",
+    "/dev/zero",
+    [],
+    ["x"],
+    {},
+    {"type": "x"},
+    [[]],
+    "\0",
+]
+
+
+def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """All keys of a nested content."""
+    found = [where]
+    entries = (
+        content.items()
+        if isinstance(content, dict)
+        else enumerate(content)
+        if isinstance(content, list)
+        else ()
+    )
+    for key, value in entries:
+        found += places(value, (*where, key))
+    return found
+
+
+def test_no_edited_manifest_gives_a_traceback(run: Path) -> None:
+    """Opened, verified, read and drawn from: every failure is an error of Fleet2D."""
+    path, rng = run / "manifest.json", random.Random(11)
+    content = json.loads(path.read_text())
+    everywhere = places(content)[1:]
+    for _ in range(CHANGES):
+        changed = json.loads(json.dumps(content))
+        *above, key = rng.choice(everywhere)
+        here = changed
+        for step in above:
+            here = here[step]
+        if rng.random() < 0.2:
+            del here[key]
+        else:
+            here[key] = rng.choice(ODD)
+        path.write_text(json.dumps(changed, indent=2, sort_keys=True) + "\n")
+        for use in (verify_run, use_run):
+            try:
+                use(run)
+            except Fleet2DError as error:
+                assert len(str(error)) < 2000, error
+
+
+def use_run(directory: Path) -> None:
+    found = open_run(directory)
+    _ = found.plan, found.metrics, found.digest, repr(found)
+    for name in found.tables:
+        _ = found.tables[name]
+    found.verify()
