@@ -1,0 +1,231 @@
+"""Every bound on time and memory, measured: what it is now beside must, aim and the last release.
+
+    python benchmarks/bounds.py [NAMES…] [--page docs/speed.md]
+
+The bounds are in `bounds.toml`. Each is measured in a process of its own. Times are of the
+processor, least of several, so that other work on the machine counts little. `--page` writes the
+table to a page of the docs. The exit code is 1 if a must isn't kept.
+"""
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+DATA = Path(os.environ.get("FLEET2D_SHARED_DATA", HERE.parent.parent / "shared" / "data"))
+PAGE = """# How fast
+
+Made by `python benchmarks/bounds.py --page docs/speed.md` from
+[bounds.toml](../benchmarks/bounds.toml): every bound that the project set itself, and what was
+measured on {machine}. Seconds are of the processor, least of several; a dash was not
+measured this time, or needs a machine of its own (a fresh container).
+
+| | measured | must | aim | last release |
+| --- | --- | --- | --- | --- |
+{rows}
+"""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound: what is measured, and what it must be and should be."""
+
+    name: str
+    what: str
+    unit: str
+    must: float
+    aim: float
+    last: float | None = None
+    most: bool = False
+    code: str | None = None
+
+    def verdict(self, figure: float | None) -> str:
+        """Say how a figure does."""
+        if figure is None:
+            return ""
+        kept, reached = (
+            figure >= bound if self.most else figure <= bound for bound in (self.must, self.aim)
+        )
+        return "aim" if reached else "must" if kept else "MISSED"
+
+    def row(self, figure: float | None) -> tuple[str, ...]:
+        """Return measured, must, aim and last, to be shown."""
+        numbers = (figure, self.must, self.aim, self.last)
+        return tuple("–" if n is None else f"{n:.3g} {self.unit}" for n in numbers)
+
+
+def bounds() -> list[Bound]:
+    """Return the bounds, in the order of the file."""
+    with (HERE / "bounds.toml").open("rb") as file:
+        return [Bound(**bound) for bound in tomllib.load(file)["bound"]]
+
+
+# --- What the code of a bound may use ----------------------------------------------------------
+
+
+def least(do: Callable[[], object], times: int, *, imported: bool = False) -> float:
+    """Return the processor time of a call [s], least of several.
+
+    With `imported` a scenario is read first, so that loading modules isn't counted.
+    """
+    if imported:
+        from fleet2d.scenario.model import load_scenario
+
+        load_scenario(None)
+    found = []
+    for _ in range(times):
+        began = time.process_time()
+        do()
+        found.append(time.process_time() - began)
+    return min(found)
+
+
+def run(*overrides: str, **settings: Any) -> object:
+    """Run the base scenario."""
+    import fleet2d
+
+    return fleet2d.run(None, *overrides, **settings)
+
+
+def robots(count: int) -> list[str]:
+    """Return overrides that add robots like the first, up to a number."""
+    return _copies("robots", "astro", count)
+
+
+def users(count: int) -> list[str]:
+    """Return overrides that add users like the first, up to a number."""
+    import fleet2d
+
+    first = next(iter(fleet2d.Simulation(None, "simulation.duration=1 h").scenario.users))
+    return _copies("users", first, count)
+
+
+def _copies(bucket: str, name: str, count: int) -> list[str]:
+    import fleet2d
+
+    content = fleet2d.Simulation(None, "simulation.duration=1 h").scenario.resolved()
+    one = json.dumps(content[bucket][name])
+    return [f"{bucket}.{name}_{i}={one}" for i in range(1, count)]
+
+
+def folder() -> str:
+    """Return the name of a directory for a run."""
+    return str(Path(tempfile.mkdtemp()) / "run")
+
+
+def python(code: str) -> float:
+    """Return the processor time of a Python process [s]."""
+    return _process(["-c", code])
+
+
+def command(*arguments: str) -> float:
+    """Return the processor time of a command of Fleet2D [s]."""
+    return _process(["-m", "fleet2d.cli", *arguments])
+
+
+def _process(arguments: Sequence[str]) -> float:
+    def spent() -> float:
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return usage.ru_utime + usage.ru_stime
+
+    began = spent()
+    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    return spent() - began
+
+
+def peak_gb() -> float:
+    """Return the most memory that this process had [GB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+
+def regions_of(name: str) -> float | None:
+    """Return how long the regions of all free cells of a plan take [s]; None without the file."""
+    import numpy as np
+
+    import fleet2d
+    from fleet2d.kernels.mesh import rasterize_cells
+    from fleet2d.kernels.region import regions_of_cells
+
+    found = sorted((DATA / "houseexpo").glob(f"{name}*.json"))
+    if not found:
+        return None
+    plan = fleet2d.load_floorplan(found[0])
+    triangles = rasterize_cells(plan.mesh, plan.lattice.rows, plan.lattice.columns)
+    cells = np.argwhere(triangles >= 0)
+    return least(lambda: regions_of_cells(plan.mesh, cells, triangles), 5)
+
+
+# --- Measuring ---------------------------------------------------------------------------------
+
+
+def measure(bound: Bound) -> float | None:
+    """Return the figure of a bound, measured in a process of its own; None if it can't be here."""
+    if bound.code is None:
+        return None
+    done = subprocess.run(
+        [sys.executable, __file__, "--code", bound.code], check=True, capture_output=True, text=True
+    )
+    figure: float | None = json.loads(done.stdout.splitlines()[-1])
+    return figure
+
+
+def run_code(code: str) -> None:
+    """Run the code of a bound, and print the figure that it sets."""
+    import fleet2d
+
+    names = {**globals(), "fleet2d": fleet2d}
+    exec(code, names)
+    print(json.dumps(names["figure"]))
+
+
+def machine() -> str:
+    """Name the processor and the number of cores."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    model = next((line.partition(":")[2].strip() for line in lines if "model name" in line), "")
+    return f"{os.cpu_count()} cores{f' of {model}' if model else ''}"
+
+
+def main() -> int:
+    """Measure, print the table, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", nargs="*", help="which bounds; left out: all")
+    parser.add_argument("--page", type=Path, help="write the table to this page, too")
+    parser.add_argument("--code", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.code is not None:
+        run_code(options.code)
+        return 0
+    known = bounds()
+    unknown = set(options.names) - {bound.name for bound in known}
+    if unknown:
+        parser.error(
+            f"no bound {sorted(unknown)[0]!r}; there are: {', '.join(b.name for b in known)}"
+        )
+    print(f"{'':<20}{'measured':>12}{'must':>12}{'aim':>12}{'last':>12}")
+    rows, missed = [], False
+    for bound in known:
+        asked = not options.names or bound.name in options.names
+        figure = measure(bound) if asked else None
+        if asked:
+            cells = "".join(f"{cell:>12}" for cell in bound.row(figure))
+            print(f"{bound.name:<20}{cells}  {bound.verdict(figure)}", flush=True)
+        missed = missed or bound.verdict(figure) == "MISSED"
+        rows.append(f"| {' | '.join((bound.what, *bound.row(figure)))} |")
+    if options.page:
+        options.page.write_text(PAGE.format(machine=machine(), rows="\n".join(rows)))
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""The table of bounds: whole, and the page that is made of it says the same."""
+
+import ast
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def bounds() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("bounds", ROOT / "benchmarks" / "bounds.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["bounds"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_bound_has_a_name_a_must_and_an_aim_that_is_harder(bounds: ModuleType) -> None:
+    known = bounds.bounds()
+
+    assert len({bound.name for bound in known}) == len(known) > 10
+    for bound in known:
+        assert bound.aim >= bound.must if bound.most else bound.aim <= bound.must
+        assert bound.code is None or "figure =" in bound.code
+        ast.parse(bound.code or "")
+
+
+def test_verdict_says_what_is_kept(bounds: ModuleType) -> None:
+    less, more = bounds.Bound("a", "", "s", 2, 1), bounds.Bound("b", "", "%", 75, 90, most=True)
+
+    assert ["", "aim", "must", "MISSED"] == [less.verdict(x) for x in (None, 1, 2, 2.1)]
+    assert ["aim", "must", "MISSED"] == [more.verdict(x) for x in (90, 80, 70)]
+    assert ("–", "2 s", "1 s", "–") == less.row(None)
+
+
+def test_page_has_every_bound(bounds: ModuleType) -> None:
+    page = (ROOT / "docs" / "speed.md").read_text(encoding="utf-8")
+
+    for bound in bounds.bounds():
+        _, *rest = bound.row(None)
+        assert f"| {bound.what} |" in page
+        assert f" | {' | '.join(rest)} |" in page
+
+
+def test_code_of_a_bound_sets_its_figure(
+    bounds: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bounds.run_code("figure = 1 + 2 * least(lambda: None, 1) > 0")
+
+    assert capsys.readouterr().out == "true\n"
