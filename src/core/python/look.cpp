@@ -2,6 +2,7 @@
 
 #include <nanobind/stl/optional.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 
@@ -31,7 +32,14 @@ namespace {
 enum class SightingColumn : i64 {};
 
 constexpr i64 FARTHEST = 1 << 29;  // squares of distances stay inside 64 bits
-constexpr i64 LAST_STEP = i64{1} << 61;
+constexpr i64 LAST_STEP = i64{1} << 61;  // and the last microsecond
+
+void check_rule(const Rule& rule, const Window& window) {
+    require(rule.step_us > 0 && window.end <= LAST_STEP / rule.step_us,
+            "step_us must be above 0, and the last step at most at 2**61 us");
+    require(0 <= rule.start_us && rule.start_us <= LAST_STEP, "start_us must be in 0 to 2**61");
+    require(0 <= rule.patience && rule.patience <= LAST_STEP, "patience must be in 0 to 2**61");
+}
 
 void check_window(const Window& window, Onlooker onlooker, i64 users) {
     require(0 <= onlooker.body && onlooker.body < window.bodies(), "there is no such body");
@@ -51,6 +59,7 @@ Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
 void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
     require(memory.noticed.size() == users + 1 && memory.seen.size() == users + 1,
             "noticed and seen must have one length, that of the users and one more");
+    require(all_in_range<i64>(memory.noticed, -1, LAST_STEP), "noticed must hold steps, or -1");
     require(all_in_range<i64>(memory.seen, 0, 2), "seen must be 0 or 1");
     require(memory.about.shape == std::array{cameras, users, ABOUT}, "about must be (cameras, users, ABOUT)");
     require(memory.backlog.size() == cameras && memory.backlog.shape[2] == SIGHTING,
@@ -66,7 +75,8 @@ void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables&
             require(NOBODY <= identity && identity < users, "about must hold numbers of users, or NOBODY");
         }
         const i64 begin = memory.waiting(c, 0), length = memory.waiting(c, 1);
-        require(0 <= begin && begin <= rows && 0 <= length && length <= rows, "waiting must lie in the backlog");
+        require(0 <= begin && begin < std::max(rows, i64{1}) && 0 <= length && length <= rows,
+                "waiting must lie in the backlog");
         for (i64 i = 0; i < length; ++i) {
             const i64 identity = memory.backlog(c, (begin + i) % rows, offsetof(Sighting, identity) / sizeof(i64));
             require(NOBODY <= identity && identity < users, "backlog must hold numbers of users, or NOBODY");
@@ -107,6 +117,7 @@ is. X to POSTURE are as perceived.)")
             require(all_in_range(lenses.latency, 0, LAST_STEP), "latency must be 0 or more");
             check_errors(errors, lenses.errs, users);
             check_window(window, {body, first_other}, users);
+            check_rule(rule, window);
             check_memory(memory, lenses, errors, cameras, users);
             const View<const u8, 3> given = shown.value_or(View<const u8, 3>());
             if (shown) {

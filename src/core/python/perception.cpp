@@ -120,7 +120,7 @@ Args:
     m.def(
         "turn_and_stretch",
         [](i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
-            require(distance > 0, "distance must be above 0");
+            require(0 < distance && distance < (i64{1} << 40), "distance must be in 1 to 2**40 - 1");
             const Offset offset = turn_and_stretch(dx, dy, turn, distance, wanted);
             return std::tuple(offset.dx, offset.dy);
         },

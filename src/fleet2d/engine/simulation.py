@@ -40,7 +40,7 @@ from fleet2d.errors import ArtifactError, InputError
 from fleet2d.scenario.model import Scenario, load_scenario
 
 # So many steps are simulated without taking over Ctrl-C.
-SHORT = 1000
+SHORT = 100
 
 
 class Simulation(Steering):
