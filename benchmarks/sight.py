@@ -241,25 +241,10 @@ def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:
 
 
 def compiled_lines() -> Callable[..., int]:
-    """Return a loop over pairs as the engine's: it locates the eye, then follows the line."""
-    from fleet2d.kernels._jit import kernel
+    """Return what counts the pairs in sight: it locates each eye, then follows the line."""
+    from fleet2d.kernels.chambers import see_each
 
-    from fleet2d.kernels.mesh import locate
-    from fleet2d.kernels.sight import walk_line_of_sight
-
-    @kernel
-    def count(mesh: Any, eyes: Any, points: Any) -> int:
-        vertices, triangles, neighbors = mesh.vertices, mesh.triangles, mesh.neighbors
-        seen = 0
-        for i in range(eyes.shape[0]):
-            x, y = eyes[i, 0], eyes[i, 1]
-            at = locate(mesh, x, y)
-            seen += walk_line_of_sight(
-                vertices, triangles, neighbors, x, y, at, points[i, 0], points[i, 1]
-            )
-        return seen
-
-    return count
+    return lambda mesh, eyes, points: int(see_each(mesh, eyes, points).sum())
 
 
 # --- Peers -------------------------------------------------------------------------------------

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from fleet2d.kernels._jit import kernel
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
@@ -27,75 +26,58 @@ from fleet2d.floorplan.gates import Gates
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh, locate
+from fleet2d.kernels.chambers import see_each
+from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import region_contains_points, visible_region
 from fleet2d.kernels.seen import Reach, cells_in_view, mark_spans
-from fleet2d.kernels.sight import line_of_sight
 
 I64 = NDArray[np.int64]
 Turn = Callable[[Any], Any]
 
 FILES = ("houseexpo/*.json", "ros_maps/*/map.yaml", "valetudo/*.json")
+# Points that are tried against all walls at once: bounds the memory.
+AT_ONCE = 256
 ALL_ROUND = Reach(0, 1 << 40, 4096)
 RESULTS = ("line of sight", "the line back", "visible region", "cells in view")
 
 
-@kernel
 def seen_past_every_wall(walls: I64, doors: I64, x: int, y: int, points: I64) -> NDArray[np.bool_]:
     """Return which points are visible by the strict rule: every wall and every door is tried."""
-    found = np.zeros(points.shape[0], np.bool_)
-    if not inside(walls, x, y):
-        return found
-    for i in range(points.shape[0]):
-        px, py = points[i, 0], points[i, 1]
-        found[i] = (
-            inside(walls, px, py)
-            and not touches_any(walls, x, y, px, py)
-            and not touches_any(doors, x, y, px, py)
-        )
-    return found
+    eye = np.array([[x, y]])
+    if not inside(walls, eye)[0]:
+        return np.zeros(len(points), np.bool_)
+    solid = np.concatenate([walls, doors])
+    parts = [points[i : i + AT_ONCE] for i in range(0, len(points), AT_ONCE)]
+    return np.concatenate([inside(walls, p) & ~touches_any(solid, x, y, p) for p in parts])
 
 
-@kernel
-def inside(walls: I64, x: int, y: int) -> bool:
-    """Return whether a ray to the right crosses an odd number of walls."""
-    odd = False
-    for w in range(walls.shape[0]):
-        ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-        if (ay > y) != (by > y):
-            turn = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
-            odd = odd != (turn > 0 if by > ay else turn < 0)
-    return odd
+def inside(walls: I64, points: I64) -> NDArray[np.bool_]:
+    """Return for which points a ray to the right crosses an odd number of walls."""
+    ax, ay, bx, by = walls.T
+    x, y = points.T[:, :, None]
+    turn = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    crossed = ((ay > y) != (by > y)) & np.where(by > ay, turn > 0, turn < 0)
+    return np.asarray(crossed.sum(axis=1) % 2 == 1)
 
 
-@kernel
-def touches_any(walls: I64, qx: int, qy: int, px: int, py: int) -> bool:
-    """Return whether the closed segment from q to p touches a wall."""
+def touches_any(walls: I64, qx: int, qy: int, points: I64) -> NDArray[np.bool_]:
+    """Return for which points the closed segment from q to the point touches a wall."""
+    ax, ay, bx, by = walls.T
+    px, py = points.T[:, :, None]
     dx, dy = px - qx, py - qy
-    for w in range(walls.shape[0]):
-        ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-        if max(min(qx, px), min(ax, bx)) > min(max(qx, px), max(ax, bx)):
-            continue
-        if max(min(qy, py), min(ay, by)) > min(max(qy, py), max(ay, by)):
-            continue
-        side_a = np.sign(dx * (ay - qy) - dy * (ax - qx))
-        side_b = np.sign(dx * (by - qy) - dy * (bx - qx))
-        side_q = np.sign((bx - ax) * (qy - ay) - (by - ay) * (qx - ax))
-        side_p = np.sign((bx - ax) * (py - ay) - (by - ay) * (px - ax))
-        if side_a * side_b <= 0 and side_q * side_p <= 0:
-            return True
-    return False
-
-
-@kernel
-def seen_back(mesh: Mesh, x: int, y: int, points: I64) -> NDArray[np.bool_]:
-    """Return which points see (x, y)."""
-    found = np.zeros(points.shape[0], np.bool_)
-    for i in range(points.shape[0]):
-        px, py = points[i, 0], points[i, 1]
-        found[i] = line_of_sight(mesh, px, py, locate(mesh, px, py), x, y)
-    return found
+    apart = np.maximum(np.minimum(qx, px), np.minimum(ax, bx)) > np.minimum(
+        np.maximum(qx, px), np.maximum(ax, bx)
+    )
+    apart |= np.maximum(np.minimum(qy, py), np.minimum(ay, by)) > np.minimum(
+        np.maximum(qy, py), np.maximum(ay, by)
+    )
+    side_a = np.sign(dx * (ay - qy) - dy * (ax - qx))
+    side_b = np.sign(dx * (by - qy) - dy * (bx - qx))
+    side_q = np.sign((bx - ax) * (qy - ay) - (by - ay) * (qx - ax))
+    side_p = np.sign((bx - ax) * (py - ay) - (by - ay) * (px - ax))
+    touches = ~apart & (side_a * side_b <= 0) & (side_q * side_p <= 0)
+    return np.asarray(touches.any(axis=1))
 
 
 def turns(size: int) -> Iterator[Turn]:
@@ -157,7 +139,7 @@ def compare(mesh: Mesh, walls: I64, doors: I64, eye: I64, points: I64) -> tuple[
     is_cell &= (column < columns) & (row < rows)
     wrong = [
         (points_in_sight(mesh, x, y, points) != expected).sum(),
-        (seen_back(mesh, x, y, points) != expected).sum(),
+        (see_each(mesh, points, np.broadcast_to(eye, points.shape).copy()) != expected).sum(),
         (in_region != expected).sum(),
         (mask[row[is_cell], column[is_cell]] != expected[is_cell]).sum(),
     ]

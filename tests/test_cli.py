@@ -401,7 +401,7 @@ def test_ctrl_c_during_set_up_exits_130(
         raise KeyboardInterrupt
 
     scenario_file = written(small())
-    monkeypatch.setattr("fleet2d.engine.world.Home", interrupt)
+    monkeypatch.setattr("fleet2d.engine.setup.Home", interrupt)
     code, out, err = fleet2d(command, scenario_file)
     assert (130, "") == (code, out)
     assert "Traceback" not in err

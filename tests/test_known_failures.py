@@ -307,7 +307,9 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         "rooms": ["kitchen"], "waypoints": [[1, 3], [7, 1]], "dwell": "25 s", "order": "random",
         "look_around": False, "when": "23:00-23:30", "cooldown": "2 min",
     },
-    (Meander, "users.ben.behaviors.0"): {"turn_std_deg": 25, "when": "23:00-23:30"},
+    (Meander, "users.ben.behaviors.0"): {
+        "turn_std_deg": 25, "at_walls": "stay", "when": "23:00-23:30",
+    },
     (SimulationSettings, "simulation"): {
         "start": "2026-01-05T07:00:30", "duration": "14 min", "step": "2 s", "seed": 5,
     },
@@ -324,6 +326,7 @@ ELSEWHERE = {
     (User, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/test_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
+    (ArtifactSettings, "checkpoint"): "tests/engine/test_resume: a file, no table",
     (ArtifactSettings, "learned"): "tests/algorithms/test_learned: a file, no table",
     (Schedule, "cooldown"): "tests/entities/test_arbitration: there is one behavior here",
     (Meander, "cooldown"): "tests/entities/test_arbitration: a walk is never over",

@@ -13,7 +13,7 @@ import yaml
 from tests.scenes import OWN, flat_path, fleet2d_process, scenario, write_flat
 
 from fleet2d import cli
-from fleet2d.artifacts import arrow
+from fleet2d.artifacts import arrow, store
 from fleet2d.artifacts.reader import open_run
 
 Result = tuple[int, str, str]
@@ -303,14 +303,14 @@ def test_a_disk_full_from_the_start_fails_with_exit_1_and_leaves_nothing(
     fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario_file = written(small())
-    write_text = Path.write_text
+    write = store.write_atomically
 
-    def full(path: Path, *args: Any, **kwargs: Any) -> int:
+    def full(path: Path, content: bytes) -> None:
         if path.name == "floorplan.json":
             no_space()
-        return write_text(path, *args, **kwargs)
+        write(path, content)
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(store, "write_atomically", full)
     result = fleet2d("run", scenario_file, "--out", "deep/run")
     check(result, 1, ["error:", "disk is full", "--out"], {"home.yaml"})
 

@@ -121,7 +121,7 @@ private:
         if (dx * dx + dy * dy > lenses_.widest(camera, user)) return 0;
         const i64 half_angle = lenses_.half_angle[camera];
         if (!near_wedge(eye.heading, half_angle, dx, dy, lenses_.reach(camera, user))) return 0;
-        if (eye.x != located_.x || eye.y != located_.y || triangle_ == UNKNOWN) {
+        if (eye.x != located_.x || eye.y != located_.y || triangle_ == OUTSIDE) {
             located_ = eye;
             triangle_ = locate(walls_, eye.x, eye.y);
         }
@@ -135,8 +135,8 @@ private:
     const Onlooker onlooker_;
     const View<const u8, 3> shown_;
     std::vector<Interval> found_;
-    Pose located_{};              // the camera that was located last
-    i64 triangle_ = UNKNOWN - 1;  // that holds it
+    Pose located_{};          // the camera that was located last
+    i64 triangle_ = OUTSIDE;  // that holds it
 };
 
 // Visits the steps at which something may be noticed, become known, or be lost.

@@ -384,25 +384,6 @@ def test_crash_never_leaves_a_file_that_looks_whole(tmp_path: Path) -> None:
     assert {"running", "complete"} == seen
 
 
-def test_deepcopy_in_memory_branches() -> None:
-    store = opened(None, EVERY_KIND, flush_rows=64)
-    rows = rows_of_every_kind(300)
-    store.append("every_kind", **part(rows, 0, 100))
-    twin = deepcopy(store)
-
-    store.append("every_kind", **part(rows, 100, 300))
-    twin.append("every_kind", **part(rows, 100, 150))
-
-    assert stored(rows).close_tables() == store.close()
-    assert stored(part(rows, 0, 150)).close_tables() == twin.close()
-    assert 150 == twin.arrow("every_kind").num_rows
-
-
-def test_deepcopy_of_a_directory_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ArtifactError, match="branch a simulation that stores in memory"):
-        deepcopy(RunStore(tmp_path / "run", [POSES]))
-
-
 def test_arrow_mid_run_shows_all_rows_and_keeps_the_digest() -> None:
     store = opened(None, EVERY_KIND)
     rows = rows_of_every_kind(300)

@@ -223,7 +223,7 @@ def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
     )  # fmt: skip
     calibrate_perception(path, tmp_path / "a.yaml", tmp_path / "fit.svg")
     assert (tmp_path / "fit.svg").read_text().startswith("<?xml")
-    with pytest.raises(InputError, match=r"as \.png or \.svg, not as '\.tex'"):
+    with pytest.raises(InputError, match=r"as \.png, \.svg or \.pdf, not as '\.tex'"):
         calibrate_perception(path, tmp_path / "b.yaml", tmp_path / "fit.tex")
     assert not (tmp_path / "b.yaml").exists()
 

@@ -88,6 +88,7 @@ def test_steps_of_any_length_and_copies_give_the_same() -> None:
     import copy
 
     content = polite("meander", [{"type": "find", "every": "2 min", "deadline": "1 min"}, "patrol"])
+    content["robots"]["astro"]["camera"] = {"lost_after": "6 s"}  # a multiple of each step
     for step in ("250 ms", "2 s"):
         content["simulation"]["step"] = step
         assert_same_for_every_max_span(content, 61, 1)

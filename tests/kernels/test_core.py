@@ -385,6 +385,13 @@ CALLS: dict[str, Args] = {
         np.zeros((2, 3), np.int8),
     ),
     "Window.dense": lambda: (window(), 1, 2, 7),
+    "Legs": lambda: (),
+    "Legs.mark": lambda: (_core.Legs(), 5, 100, 100, 7, 0),
+    "Legs.add": lambda: (_core.Legs(), np.arange(10).reshape(2, 5)),
+    "Legs.turn": lambda: (_core.Legs(), 5, 100, 100, 7, 0, 300, 500.0),
+    "Legs.walk": lambda: (_core.Legs(), 5, 7, POINTS[:2].copy(), 1000.0, 500.0),
+    "Legs.rows": lambda: (_core.Legs(),),
+    "Legs.track": lambda: (_core.Legs(),),
     "Timelines": lambda: (3, SECOND),
     "Timelines.follow": lambda: (
         timelines(),

@@ -726,6 +726,15 @@ def test_look_of_a_robot_that_is_away_sees_nobody() -> None:
     assert [] == looked(ROOM, slow.Eye(0, 100, 4096, SURE, 1), scene, 0).sightings
 
 
+def test_look_from_the_corner_of_the_lattice_is_from_outside() -> None:
+    """The first camera of a look at (0, 0) was taken to be located, in a triangle that there isn't."""
+    home = home_of([shapely.box(64, 64, 1280, 1280)])
+    scene = line_of([(50, 0)])
+    scene.robot[:, :2] = 0
+
+    assert [] == looked(home, slow.Eye(0, 5000, 4096, SURE, 1), scene, 0).sightings
+
+
 def test_look_in_the_step_of_a_stop_still_sees_the_other_users() -> None:
     scene = line_of([(50, 0), (60, 0)], steps=5)
 
@@ -742,3 +751,39 @@ def test_look_without_users_does_all_steps() -> None:
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), empty, 0, (True, True))
 
     assert Seen(6, [], [], [[]], [-1], [0]) == seen
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"step_us": 0}, "step_us"),
+        ({"step_us": -1}, "step_us"),
+        ({"step_us": 2**61}, "before"),
+        ({"start_us": -1}, "start_us"),
+        ({"start_us": 2**61}, "start_us"),
+        ({"pan_us": 2**61}, "pan_us"),
+        ({"first_other": 2**63 - 1}, "fewer others"),
+        ({"body": 2}, "no such body"),
+    ],
+)
+def test_look_refuses_times_and_bodies_that_are_none(
+    change: Mapping[str, int], message: str
+) -> None:
+    """A step of no length divided by 0, a long pan never ended, others were read beyond the window."""
+    scene, eye = line_of([(50, 0)]), slow.Eye(0, 100, 300, SURE, 4, pans=(5, 7), pan_us=STEP_US)
+    lenses, errors, rule = kernel_args([eye], scene)
+    window, body, first_other = scene.window(0)
+    times = {key: value for key, value in change.items() if key in rule._fields}
+    pan_us = np.array([change.get("pan_us", STEP_US)])
+
+    with pytest.raises(ValueError, match=message):
+        look(
+            ROOM.mesh,
+            lenses._replace(pan_us=pan_us),
+            errors,
+            rule._replace(**times),
+            window,
+            change.get("body", body),
+            change.get("first_other", first_other),
+            nothing_known(eye, scene).memory,
+        )

@@ -48,7 +48,7 @@ class Twin:
         )
 
     def walk(self, step: int, walls: Home, space: Home, rule: WalkRule, start: Any) -> None:
-        key, stride, sway, limit = (int(part) for part in rule)
+        key, stride, sway, limit = (int(part) for part in rule[:4])
         steps = slow.walk(walls.walls, space.walls, key, stride, sway, limit, start, step)
         poses = dict(enumerate(islice(steps, HORIZON - step), step))
         self._go_on(step, lambda s: (*poses[s], 0, 0))

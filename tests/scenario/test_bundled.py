@@ -11,7 +11,11 @@ from fleet2d.scenario.document import read_document
 from fleet2d.scenario.model import load_scenario
 from fleet2d.scenario.schema import schema
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.yaml"))
+EXAMPLES = sorted(
+    path
+    for path in (Path(__file__).parents[2] / "examples").rglob("*.yaml")
+    if path.parent.name != "studies"  # another kind of file
+)
 
 
 @pytest.mark.parametrize("file", [*sorted(BUNDLED.glob("*.yaml")), *EXAMPLES], ids=lambda f: f.stem)

@@ -32,22 +32,22 @@ namespace {
 enum class SightingColumn : i64 {};
 
 constexpr i64 FARTHEST = 1 << 29;  // squares of distances stay inside 64 bits
-constexpr i64 LAST_STEP = i64{1} << 61;  // and the last microsecond
-
-void check_rule(const Rule& rule, const Window& window) {
-    require(rule.step_us > 0 && window.end <= LAST_STEP / rule.step_us,
-            "step_us must be above 0, and the last step at most at 2**61 us");
-    require(0 <= rule.start_us && rule.start_us <= LAST_STEP, "start_us must be in 0 to 2**61");
-    require(0 <= rule.patience && rule.patience <= LAST_STEP, "patience must be in 0 to 2**61");
-}
 
 void check_window(const Window& window, Onlooker onlooker, i64 users) {
     require(0 <= onlooker.body && onlooker.body < window.bodies(), "there is no such body");
-    require(0 <= onlooker.first_other && onlooker.first_other + users <= window.bodies(), "there are fewer others");
+    require(0 <= onlooker.first_other && onlooker.first_other <= window.bodies() - users, "there are fewer others");
     require(all_in_range(window.x, -FARTHEST, FARTHEST) && all_in_range(window.y, -FARTHEST, FARTHEST),
             "bodies must be within 2**29 lattice units");
     require(all_in_range(window.posture, 0, POSTURES), "a posture must be 0, 1 or 2");
-    require(0 <= window.first && window.end < LAST_STEP, "steps must be 0 or more");
+    require(0 <= window.first && window.end < LATEST, "steps must be 0 or more");
+}
+
+// All moments of a window, and the ends of pans that begin in it, must be numbers above their beginnings.
+void check_moments(const Rule& rule, const Window& window, const Lenses& lenses) {
+    require(rule.step_us > 0, "step_us must be above 0");
+    require(window.end < LATEST / rule.step_us, "steps must begin before 2**61 us");
+    require(0 <= rule.start_us && rule.start_us < LATEST, "start_us must be in 0 to 2**61 - 1");
+    require(all_in_range(lenses.pan_us, 0, LATEST), "pan_us must be in 0 to 2**61 - 1");
 }
 
 Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
@@ -59,7 +59,7 @@ Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
 void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
     require(memory.noticed.size() == users + 1 && memory.seen.size() == users + 1,
             "noticed and seen must have one length, that of the users and one more");
-    require(all_in_range<i64>(memory.noticed, -1, LAST_STEP), "noticed must hold steps, or -1");
+    require(all_in_range<i64>(memory.noticed, -1, LATEST), "noticed must hold steps, or -1");
     require(all_in_range<i64>(memory.seen, 0, 2), "seen must be 0 or 1");
     require(memory.about.shape == std::array{cameras, users, ABOUT}, "about must be (cameras, users, ABOUT)");
     require(memory.backlog.size() == cameras && memory.backlog.shape[2] == SIGHTING,
@@ -114,10 +114,10 @@ is. X to POSTURE are as perceived.)")
             check_lenses(lenses);
             const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
             require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
-            require(all_in_range(lenses.latency, 0, LAST_STEP), "latency must be 0 or more");
+            require(all_in_range(lenses.latency, 0, LATEST), "latency must be 0 or more");
             check_errors(errors, lenses.errs, users);
             check_window(window, {body, first_other}, users);
-            check_rule(rule, window);
+            check_moments(rule, window, lenses);
             check_memory(memory, lenses, errors, cameras, users);
             const View<const u8, 3> given = shown.value_or(View<const u8, 3>());
             if (shown) {

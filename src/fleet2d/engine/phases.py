@@ -8,6 +8,7 @@ a span is never shows in a result: every draw is addressed by step, and every pl
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fleet2d.algorithms.log import Log
 from fleet2d.blame import blame
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
@@ -119,19 +120,24 @@ def record(state: State, span: Span) -> None:
 
 
 def learn(state: State, span: Span) -> None:
-    """Update the algorithms and metrics that are due."""
-    log, learners = state.log, state.learners
-    if log is None or not span.settles:
+    """Update the algorithms and metrics that are due, and store the layers that are."""
+    if not span.settles:
         return
-    awaited = learners.awaited
-    happened = log.happened(span.end - 1) if awaited else []
-    if learners.next_due() == span.end or any(event.event in awaited for event in happened):
+    if state.log is not None:
+        _update(state, state.log, span.end)
+    state.layers.keep(span.end)
+
+
+def _update(state: State, log: Log, end: int) -> None:
+    learners, awaited = state.learners, state.learners.awaited
+    happened = log.happened(end - 1) if awaited else []
+    if learners.next_due() == end or any(event.event in awaited for event in happened):
         state.count_looks()
-        learners.update(span.end, log, happened)
+        learners.update(end, log, happened)
         for name, output in learners.fresh.items():
             if isinstance(output, HomeChanges):
                 for change in output.changes:
-                    state.changes.ask(change, span.end, f"algorithms.{name}")
+                    state.changes.ask(change, end, f"algorithms.{name}")
         state.forget(learners.earliest_needed())
 
 

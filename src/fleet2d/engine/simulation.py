@@ -286,7 +286,7 @@ class Simulation(Steering):
         # Where a component failed, asking the metrics could fail again, and lose what is stored.
         results: dict[str, Any] = {}
         state = self._state
-        if status != "failed":
+        with suppress(Exception) if status == "failed" else nullcontext():
             state.settle(self.step)
         if state.log and status != "failed":
             state.count_looks()

@@ -207,7 +207,7 @@ class _Writer(pickle.Pickler):
             if isinstance(obj, type | FunctionType | BuiltinFunctionType):
                 self._check_reference(obj)
             return ("space", obj.key) if kind is Space else None
-        elif kind not in _SHARED:
+        elif kind not in _SHARED and not isinstance(obj, type):
             return None
         self._shared.append(obj)
         return len(self._shared) - 1

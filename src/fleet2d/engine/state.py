@@ -201,7 +201,6 @@ class State:
         if self.log is not None:
             self.log.observe(observations)
             self.log.readings += readings
-        self.layers.keep(end)
         self.settled = end
         if self.log is None:
             self.bodies.forget(end)

@@ -106,6 +106,10 @@ class Space:
         self._part_of_triangle = read_only(rank[part].astype(np.int32))
         self.parts = int(np.count_nonzero(sizes))
 
+    def __deepcopy__(self, memo: dict[int, object]) -> "Space":
+        """Return itself: what it holds never changes."""
+        return self
+
     @cached_property
     def routes(self) -> Routes:
         """The corners of the space and the legs between them, built when first needed."""

@@ -25,7 +25,7 @@ class Life:
         >>> life = Life(bundled_persona("retired"), seed=4, path="users.ana")
         >>> day = life.day(date(2026, 1, 5).toordinal())
         >>> [doing.activity for doing in day[:3]], day[-1].activity
-        (['wash', 'dress', 'breakfast'], 'sleep')
+        (['toilet', 'wash_hands', 'wash'], 'sleep')
     """
 
     def __init__(self, persona: Persona, seed: int, path: str) -> None:
