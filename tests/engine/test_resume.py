@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import pytest
@@ -152,18 +153,18 @@ def test_an_input_that_changed_is_not_gone_on_with(tmp_path: Path) -> None:
         fleet2d.resume(directory)
 
 
-class KeepsAFile(Algorithm):
+class KeepsALock(Algorithm):
     """Keeps what no file can hold."""
 
     def start(self, home: Any) -> None:
-        self.log = sys.stdin
+        self.lock = Lock()
 
     def update(self, history: Any, state: Any) -> None:
         """Do nothing."""
 
 
 def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_path: Path) -> None:
-    own = {"algorithms": {"mine": {"type": f"{__name__}:KeepsAFile"}}}
+    own = {"algorithms": {"mine": {"type": f"{__name__}:KeepsALock"}}}
     found = scenario("1 h", users={"ana": {"type": "meander"}}, artifacts=CHECKPOINTED, **own)
     simulation = fleet2d.Simulation(found, out=tmp_path / "run")
     simulation.run_until(2000)

@@ -13,7 +13,8 @@ using Row = std::tuple<i64, i64, i64, i64, i64>;
 
 Moment checked(i64 time, i64 x, i64 y, i64 heading, i64 away) {
     require(-LATEST <= time && time <= LATEST, "time must be at most 2**61 us");
-    for (const i64 number : {x, y, heading}) require(-MOST < number && number < MOST, "a pose must be within 2**29 of 0");
+    for (const i64 number : {x, y, heading})
+        require(-MOST < number && number < MOST, "a pose must be within 2**29 of 0");
     require(away == 0 || away == 1, "away must be 0 or 1");
     return {time, x, y, heading, away};
 }
@@ -25,9 +26,7 @@ void add_checked(Legs& legs, View<const i64, 2> rows) {
     }
 }
 
-Row plain(const Moment& now) {
-    return {now.time, now.x, now.y, now.heading, now.away};
-}
+Row plain(const Moment& now) { return {now.time, now.x, now.y, now.heading, now.away}; }
 
 }  // namespace
 

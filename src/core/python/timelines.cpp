@@ -174,8 +174,8 @@ private:
     nb::tuple state_of(const Piece& piece) const {
         if (piece.walk) {
             const WalkPiece& walk = *piece.walk;
-            const auto rule = nb::make_tuple(walk.rule.key, walk.rule.stride, walk.rule.sway, walk.rule.turn_limit,
-                                             walk.rule.stays);
+            const auto rule =
+                nb::make_tuple(walk.rule.key, walk.rule.stride, walk.rule.sway, walk.rule.turn_limit, walk.rule.stays);
             return nb::make_tuple(piece.first, mesh_of(walk.walls), mesh_of(walk.space), rule, walk.drawn_from,
                                   array_of(walk.x), array_of(walk.y), array_of(walk.heading));
         }

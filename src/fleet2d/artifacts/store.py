@@ -20,7 +20,7 @@ from fleet2d.artifacts.directory import (
 )
 from fleet2d.artifacts.files import sync_directory, write_atomically
 from fleet2d.artifacts.journal import Commit
-from fleet2d.artifacts.ledger import Ledger, columns_of
+from fleet2d.artifacts.ledger import Ledger, columns_of, remove_leftovers
 from fleet2d.artifacts.lock import LOCK_NAME
 from fleet2d.artifacts.manifest import (
     FILE_NAME,
@@ -319,6 +319,7 @@ class RunStore:
         if self._root is not None and self._is_open:
             names = [name for table in self._tables for name in _file_names(table)]
             self._ledger_of().end()
+            remove_leftovers(self._root)
             for name in (FILE_NAME, f"{FILE_NAME}.partial", *names):
                 with suppress(OSError):
                     (self._root / name).unlink()

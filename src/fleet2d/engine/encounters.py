@@ -208,11 +208,11 @@ class Encounters:
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take over what the steps up to `end` - 1 leave behind."""
-        count = end - self.taken
+        first, self.taken, count = self.taken, end, end - self.taken
         self._last = []
         if not self.pairs or not count:
             return ()
-        block = bodies.block(self.taken, end)
+        block = bodies.block(first, end)
         for pair in self.pairs:
             last = [e for e in self._ahead if e.pair is pair and e.column == count - 1]
             pair.pass_over(block, count, [e.event for e in last])
@@ -220,7 +220,6 @@ class Encounters:
             self._last += [
                 (pair.user_row, pair.user, SightEvent(e.event, e.robot.name, x, y)) for e in last
             ]
-        self.taken = end
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:

@@ -26,6 +26,8 @@ Workers = Annotated[
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 SHOWN = 10
+IDENTITY_START = 6
+"""Characters of an identity that name a variant; fewer digits are its number."""
 
 
 @studying.command()
@@ -195,11 +197,14 @@ def _number_of(study: "Study", variant: str) -> int:
     table = study.arrow_variants.select(["variant", "identity"]).to_pylist()
     if variant.isdigit() and any(row["variant"] == int(variant) for row in table):
         return int(variant)
-    fitting = [row["variant"] for row in table if (row["identity"] or "").startswith(variant)]
+    fitting = []
+    if len(variant) >= IDENTITY_START:
+        fitting = [row["variant"] for row in table if (row["identity"] or "").startswith(variant)]
     if len(fitting) != 1:
         raise InputError(
             f"{study.location} has {len(fitting) or 'no'} variant{'s' * (len(fitting) > 1)}"
-            f" {variant!r}: give a number from 0 to {len(table) - 1}, or the start of an identity"
+            f" {variant!r}: give a number from 0 to {len(table) - 1}, or the first"
+            f" {IDENTITY_START} characters or more of an identity"
         )
     return int(fitting[0])
 
