@@ -1182,6 +1182,10 @@ class Window:
             x, y, heading int64, away uint8 and posture int8, (steps,) each.
         """
 
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None: ...
+
 class Timelines:
     """
     How each body of a run moves, piece after piece.

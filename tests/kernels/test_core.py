@@ -1,7 +1,9 @@
 """What holds for the whole compiled core: its stub, its docstrings, and the checks of its border."""
 
 import ast
+import copy
 import importlib
+import pickle
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -448,7 +450,7 @@ Path_ = tuple[int, ...]
 
 def leaves(value: Any, kind: type | tuple[type, ...], at: Path_ = ()) -> Iterator[Path_]:
     """Yield where in nested tuples values of a kind are."""
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         for i, part in enumerate(value):
             yield from leaves(part, kind, (*at, i))
     elif isinstance(value, kind) and not isinstance(value, bool):
@@ -467,7 +469,7 @@ def put(value: Any, at: Path_, new: Any) -> Any:
     if not at:
         return new
     parts_ = [put(part, at[1:], new) if i == at[0] else part for i, part in enumerate(value)]
-    return type(value)(*parts_) if hasattr(value, "_fields") else tuple(parts_)
+    return type(value)(*parts_) if hasattr(value, "_fields") else type(value)(parts_)
 
 
 ARRAYS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), np.ndarray)]
@@ -689,3 +691,110 @@ def test_no_damage_does_more_than_raise_an_error(call: tuple[str, tuple[Any, ...
     name, args = call
     with suppress(TypeError, ValueError, MemoryError):
         named(name)(*args)
+
+
+# --- States ------------------------------------------------------------------------------------
+
+
+def ask(made: Any) -> None:
+    """Ask an object for all that it may be asked."""
+    if isinstance(made, _core.Mesh):
+        for x, y in POINTS.tolist():
+            _core.visible_region(made, x, y)
+        _core.build_fans(made)
+    elif isinstance(made, _core.Routes):
+        made.find(100, 500, 1000, 500)
+    elif isinstance(made, _core.Legs):
+        made.rows()
+        made.track()
+    elif isinstance(made, _core.Window):
+        for body in range(len(made.start) - 1):
+            made.dense(body, made.first, min(made.end, made.first + 99))
+    else:
+        for step in (0, 4, 30):
+            made.poses(step)
+            made.window(step, step + 20)
+        made.forget(10)
+        made.window(10, 40)
+        made.walk(1, 12, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
+        copy.deepcopy(made).window(11, 40)
+
+
+def grown() -> _core.Timelines:
+    """Return timelines with several pieces, some of which are forgotten."""
+    made = timelines()
+    made.window(0, 20)
+    made.forget(6)
+    made.follow(0, 8, track(), np.array([5]), np.array([0, 1], np.int8))
+    made.walk(0, 15, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
+    made.window(6, 30)
+    return made
+
+
+def legs() -> _core.Legs:
+    """Return legs of every kind."""
+    made = _core.Legs()
+    made.mark(5, 100, 100, 7, 0)
+    made.turn(5, 100, 100, 7, 0, 300, 500.0)
+    made.walk(SECOND, 7, POINTS[:2].copy(), 1000.0, 500.0)
+    return made
+
+
+STATES: dict[str, Callable[[], Any]] = {
+    "Legs": legs,
+    "Mesh": lambda: _core.Mesh(MESH.vertices, MESH.triangles, MESH.neighbors),
+    "Routes": lambda: _core.Routes(MESH, corners()),
+    "Window": window,
+    "Timelines": grown,
+}
+
+
+def restored(name: str, state: Any) -> Any:
+    """Return what is read from a state."""
+    made = PUBLIC[name].__new__(PUBLIC[name])
+    made.__setstate__(state)
+    return made
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_what_is_read_from_a_state_has_the_same_state(name: str) -> None:
+    state = STATES[name]().__getstate__()
+    again = restored(name, state)
+    for path in leaves(state, (np.ndarray, int, np.integer)):
+        assert np.array_equal(leaf(state, path), leaf(again.__getstate__(), path)), path
+    with suppress(ValueError):  # what is forgotten
+        ask(again)
+    assert pickle.dumps(STATES[name]()) == pickle.dumps(pickle.loads(pickle.dumps(STATES[name]())))
+
+
+def test_every_class_that_can_be_written_is_read_here() -> None:
+    assert {n for n in CLASSES if "__setstate__" in vars(PUBLIC[n])} == STATES.keys()
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_a_state_of_something_else_is_refused(name: str) -> None:
+    others = [STATES[n]().__getstate__() for n in STATES if n != name]
+    state = STATES[name]().__getstate__()
+    wrong: list[Any] = [(), (1,), None, 3, "state", (None,) * len(state)]
+    if isinstance(state, tuple):
+        wrong += [state[:-1], (*state, 1)]
+    for other in [*others, *wrong]:
+        with pytest.raises((TypeError, ValueError)):
+            restored(name, other)
+
+
+@settings(
+    max_examples=600, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+@given(st.data(), st.sampled_from(sorted(STATES)))
+def test_a_damaged_state_is_refused_or_can_be_worked_with(data: st.DataObject, name: str) -> None:
+    state = STATES[name]().__getstate__()
+    for _ in range(data.draw(st.integers(1, 2))):
+        at = data.draw(st.sampled_from(list(leaves(state, (np.ndarray, int, np.integer)))))
+        value = leaf(state, at)
+        if isinstance(value, np.ndarray):
+            state = put(state, at, data.draw(damaged_array(value.copy())))
+        else:
+            state = put(state, at, data.draw(st.sampled_from(EXTREME)))
+    with suppress(TypeError, ValueError, MemoryError):
+        ask(restored(name, state))

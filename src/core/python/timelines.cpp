@@ -265,6 +265,32 @@ OwnedWindow window_of_poses(i64 first, View<const i64, 2> x, View<const i64, 2> 
     return window;
 }
 
+using WindowState = std::tuple<i64, i64, View<const i64>, View<const i64>, View<const i64>, View<const i64>,
+                               View<const i64>, View<const u8>, View<const i8>>;
+
+// The window that `__getstate__` was called of.
+OwnedWindow window_of_state(const WindowState& state) {
+    const auto& [first, end, start, step, x, y, heading, away, posture] = state;
+    constexpr const char* message = "this is no state of a window";
+    const i64 runs = step.size(), bodies = start.size() - 1;
+    require(-LATEST < first && first <= end && end < LATEST, message);
+    require(x.size() == runs && y.size() == runs && heading.size() == runs && away.size() == runs &&
+                posture.size() == runs,
+            message);
+    require(bodies >= 0 && start[0] == 0 && start[bodies] == runs, message);
+    for (i64 body = 0; body < bodies; ++body) {
+        require(start[body] <= start[body + 1] && (start[body] == start[body + 1]) == (first == end), message);
+    }
+    for (i64 body = 0; body < bodies; ++body) {
+        for (i64 run = start[body]; run < start[body + 1]; ++run) {
+            const bool follows = run == start[body] ? step[run] == first : step[run] > step[run - 1];
+            require(follows && step[run] < end, message);
+        }
+    }
+    return {first,     end,       copied(start),   copied(step), copied(x),
+            copied(y), copied(heading), copied(away), copied(posture)};
+}
+
 template <auto Member>
 auto column() {
     return [](nb::handle self) { return border::borrowed(nb::cast<const OwnedWindow&>(self).view().*Member, self); };
@@ -316,7 +342,19 @@ Args:
             R"(Return the poses of a body at each of the steps from `first` to `end` - 1.
 
 Returns:
-    x, y, heading int64, away uint8 and posture int8, (steps,) each.)");
+    x, y, heading int64, away uint8 and posture int8, (steps,) each.)")
+        .def(
+            "__getstate__",
+            [](const OwnedWindow& self) {
+                return std::tuple(self.first, self.end, array_of(self.start), array_of(self.step), array_of(self.x),
+                                  array_of(self.y), array_of(self.heading), array_of(self.away),
+                                  array_of(self.posture));
+            },
+            nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
+        .def(
+            "__setstate__",
+            [](OwnedWindow& self, const WindowState& state) { new (&self) OwnedWindow(window_of_state(state)); },
+            nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
 
     nb::class_<OwnedTimelines>(m, "Timelines", R"(How each body of a run moves, piece after piece.
 

@@ -193,6 +193,7 @@ class Simulation(Steering):
         Raises:
             ArtifactError: The run is stored in a directory, or a component keeps what can't be
                 written, such as an open file.
+            InputError: The run is finished, or broke off: there is nothing to go on with.
 
         Example:
             >>> import io
@@ -209,6 +210,7 @@ class Simulation(Steering):
                 f"the simulation stores in {self.directory}: set artifacts.checkpoint, and go on"
                 " by `fleet2d resume`"
             )
+        self._check_goes_on()
         write_snapshot(path, self._state, self._constants, self._header())
 
     @classmethod
@@ -327,10 +329,7 @@ class Simulation(Steering):
         on_progress: Callable[[Self], None] | None = None,
         spans: int | None = None,
     ) -> None:
-        if self._run is not None:
-            raise InputError("the run is finished: set up a new Simulation to go on")
-        if self._broken:
-            raise InputError("the run broke off in the middle of a span and can't go on")
+        self._check_goes_on()
         began, stored = time.perf_counter(), self._state.recorder.wall_s
         self._began = began
         self._set_pace()
@@ -350,6 +349,12 @@ class Simulation(Steering):
         if self._stopping:
             self._stopping = False
             raise KeyboardInterrupt
+
+    def _check_goes_on(self) -> None:
+        if self._run is not None:
+            raise InputError("the run is finished: set up a new Simulation to go on")
+        if self._broken:
+            raise InputError("the run broke off in the middle of a span and can't go on")
 
     def _spans(
         self, end: int, on_progress: Callable[[Self], None] | None, spans: int | None

@@ -174,7 +174,11 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
         raise ArtifactError(f"{path} is no saved simulation")
     if hashlib.sha256(first + body).hexdigest().encode() != digest:
         raise ArtifactError(f"{path} is damaged: its content is not what was written")
-    header: dict[str, Any] = json.loads(first)
+    try:
+        header: dict[str, Any] = json.loads(first)
+        _ = [header[key] for key in ("fleet2d", "scenario", "seed", "wall_s")]
+    except (ValueError, TypeError, KeyError):
+        raise ArtifactError(f"{path} is no saved simulation") from None
     if header["fleet2d"] != __version__:
         raise ArtifactError(
             f"{path} was written by Fleet2D {header['fleet2d']}, and this is {__version__}: only"

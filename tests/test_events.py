@@ -1,0 +1,180 @@
+"""Events of a run: each is made once, handed to all, and kept for a while."""
+
+import copy
+import pickle
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import everything, run, scenario, table
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.events import CHANGES, HOME, SIGHTS, Event, EventKind, EventStream, Listener
+
+
+class Sink:
+    """Keeps what it is handed."""
+
+    def __init__(self) -> None:
+        self.taken: list[list[Event]] = []
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        self.taken.append(list(events))
+
+
+def event(step: int, kind: str = "found", entity: str = "ana") -> Event:
+    return Event(step, entity, kind, "")
+
+
+class Short(EventStream):
+    """Keeps five events."""
+
+    KEPT = 5
+
+
+def test_every_sink_is_handed_each_event_once_in_the_order_it_became_known() -> None:
+    sinks = [Sink(), Sink()]
+    stream = EventStream(sinks)
+    stream.emit([event(7), event(3)])
+    stream.emit([])
+    stream.emit([event(5)])
+    for sink in sinks:
+        assert [[event(7), event(3)], [event(5)]] == sink.taken
+
+
+def test_events_since_a_step_are_in_order_of_step_and_of_kind() -> None:
+    stream = EventStream()
+    seen, shut, found = event(4, "user_seen"), event(4, "shut", HOME), event(4)
+    stream.emit([event(9), seen, shut])
+    stream.emit([found, event(2)])
+    assert [event(2), found, seen, shut, event(9)] == stream.since(0)
+    assert [event(9)] == stream.since(5)
+    assert [] == stream.since(10)
+
+
+def test_events_of_one_step_and_kind_stay_in_the_order_they_became_known() -> None:
+    stream = EventStream()
+    emitted = [event(4, "found", name) for name in ("zoe", "ana", "ben")]
+    stream.emit(emitted)
+    assert emitted == stream.since(4)
+
+
+def test_events_that_are_no_longer_kept_are_asked_for_in_vain() -> None:
+    stream = Short()
+    stream.emit([event(step) for step in range(5)])
+    assert list(range(5)) == [e.step for e in stream.since(0)]
+    stream.emit([event(5), event(6)])
+    assert [2, 3, 4, 5, 6] == [e.step for e in stream.since(2)]
+    with pytest.raises(InputError, match=r"from step 2 on are kept, not from step 1: ask more"):
+        stream.since(1)
+
+
+def test_what_became_known_late_is_missed_up_to_its_step() -> None:
+    stream = Short()
+    stream.emit([event(90), event(1), event(2)])
+    stream.emit([event(3), event(4), event(5)])
+    with pytest.raises(InputError, match="from step 91 on"):
+        stream.since(90)
+    assert [] == stream.since(91)
+
+
+def test_more_events_at_once_than_are_kept_leave_the_last() -> None:
+    stream, sink = Short(), Sink()
+    stream.sinks.append(sink)
+    stream.emit([event(step) for step in range(12)])
+    assert 12 == len(sink.taken[0])
+    assert list(range(7, 12)) == [e.step for e in stream.since(7)]
+    with pytest.raises(InputError, match="from step 7 on"):
+        stream.since(6)
+
+
+def test_a_function_listens_and_stays_behind_when_a_stream_is_copied() -> None:
+    heard: list[Event] = []
+    sink = Sink()
+    stream = EventStream([sink, Listener(heard.extend)])
+    stream.emit([event(1)])
+    for copied in (copy.deepcopy(stream), pickle.loads(pickle.dumps(stream))):
+        copied.emit([event(2)])
+        assert [event(1), event(2)] == copied.since(0)
+        assert [[event(1)], [event(2)]] == copied.sinks[0].taken
+    assert [event(1)] == heard == stream.since(0)
+    assert 1 == len(sink.taken)
+
+
+def test_plans_come_before_cameras_and_the_home_comes_last() -> None:
+    rank = {kind: event(0, kind).rank for kind in EventKind}
+    assert {0} == {rank[kind] for kind in EventKind if kind not in SIGHTS | CHANGES}
+    assert {1} == {rank[kind] for kind in SIGHTS}
+    assert {2} == {rank[kind] for kind in CHANGES}
+    assert 0 == event(0, "of a behavior's own").rank
+
+
+def test_a_kind_is_its_text() -> None:
+    assert "user_seen" == EventKind.USER_SEEN == str(EventKind.USER_SEEN)
+    assert Event(1, "a", EventKind.SHUT, "") == Event(1, "a", "shut", "")
+    assert all(kind.value == kind.name.lower() for kind in EventKind)
+
+
+# --- In runs -----------------------------------------------------------------------------------
+
+
+def listened(content: dict[str, Any], **settings: Any) -> tuple[list[Event], Any]:
+    """Return what a sink of its own hears of a whole run, and the run."""
+    simulation, sink = fleet2d.Simulation(content, **settings), Sink()
+    simulation._state.events.sinks.append(sink)
+    stored = simulation.run()
+    return [event for events in sink.taken for event in events], stored
+
+
+def rows(stored: Any) -> list[tuple[Any, ...]]:
+    """Return the table of events as events."""
+    columns = table(stored, "events")
+    detail = [
+        user if isinstance(user, str) else text
+        for user, text in zip(columns["user"], columns["detail"], strict=True)
+    ]
+    keys = (columns["step"].tolist(), columns["entity"], columns["event"], detail)
+    return list(zip(*keys, strict=True))
+
+
+@pytest.mark.parametrize("span", [None, 1, 61])
+def test_a_sink_hears_just_the_rows_of_the_table(span: int | None) -> None:
+    heard, stored = listened(everything("20 min"), max_span=span)
+    assert len(heard) > 50
+    assert sorted(map(tuple, heard)) == sorted(rows(stored))
+
+
+def test_the_table_is_in_order_of_step_entity_and_rank() -> None:
+    content = everything(
+        "1 h", objects={"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
+    )
+    content["changes"] = [{"at": "10 min", "shut": "door"}, {"at": "20 min", "open": "door"}]
+    stored = run(content)
+    order = ["ana", "ben", "astro", "bolt", "curio", "drift", "ego", "door"]
+    keys = [(step, order.index(who), event(0, kind).rank) for step, who, kind, _ in rows(stored)]
+    assert keys == sorted(keys)
+    assert {"shut", "opened"} <= {kind for _, _, kind, _ in rows(stored)}
+
+
+def test_every_kind_of_the_table_is_known_or_a_behavior_s_own() -> None:
+    kinds = set(table(run(everything("1 h")), "events")["event"])
+    assert {"reacts", "obeys", "user_seen"} <= kinds
+    assert kinds - {*EventKind} == {"obeys"}
+
+
+def test_events_since_a_step_are_the_rows_of_the_table_from_then_on() -> None:
+    simulation = fleet2d.Simulation(everything("20 min"))
+    simulation.advance(700)
+    state = simulation._state
+    state.settle(simulation.step)
+    known = [tuple(e) for e in state.events.since(300)]
+    expected = [row for row in rows(run(everything("20 min"))) if 300 <= row[0] < 700]
+    assert sorted(expected) == sorted(known)
+    assert np.all(np.diff([step for step, *_ in known]) >= 0)
+
+
+def test_who_is_away_and_who_has_no_camera_is_heard_of_too() -> None:
+    heard, _ = listened(scenario("10 min", users={"ana": {"type": "meander"}}))
+    assert [] == heard
