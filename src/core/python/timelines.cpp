@@ -274,9 +274,9 @@ OwnedWindow window_of_state(const WindowState& state) {
     constexpr const char* message = "this is no state of a window";
     const i64 runs = step.size(), bodies = start.size() - 1;
     require(-LATEST < first && first <= end && end < LATEST, message);
-    require(x.size() == runs && y.size() == runs && heading.size() == runs && away.size() == runs &&
-                posture.size() == runs,
-            message);
+    require(
+        x.size() == runs && y.size() == runs && heading.size() == runs && away.size() == runs && posture.size() == runs,
+        message);
     require(bodies >= 0 && start[0] == 0 && start[bodies] == runs, message);
     for (i64 body = 0; body < bodies; ++body) {
         require(start[body] <= start[body + 1] && (start[body] == start[body + 1]) == (first == end), message);
@@ -287,8 +287,8 @@ OwnedWindow window_of_state(const WindowState& state) {
             require(follows && step[run] < end, message);
         }
     }
-    return {first,     end,       copied(start),   copied(step), copied(x),
-            copied(y), copied(heading), copied(away), copied(posture)};
+    return {first,           end,          copied(start),  copied(step), copied(x), copied(y),
+            copied(heading), copied(away), copied(posture)};
 }
 
 template <auto Member>
