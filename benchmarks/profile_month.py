@@ -16,13 +16,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fleet2d.engine.loop import Loop
-
 import fleet2d
-from fleet2d.engine import loop
+from fleet2d.engine import phases, simulation
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.clearance import Clearance
+from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
+from fleet2d.engine.seen import SeenArea
+from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.actor import Actor
 from fleet2d.metrics.metric import Metric
@@ -62,15 +66,21 @@ def learns(_: Learners, learner: Any, *__: Any) -> str:
 PARTS: tuple[tuple[Any, str, str | Callable[..., str]], ...] = (
     (Simulation, "__init__", "set up: plan, walls, routes, places"),
     (Simulation, "finish", "write and close"),
-    (Loop, "span", "loop"),
-    (Loop, "_move", "everybody follows a plan"),
-    (loop, "look_together", "robots look for users"),
+    (Simulation, "_spans", "loop"),
+    *((Bodies, name, "everybody follows a plan") for name in ("follow", "window", "runs", "block")),
+    *((Cameras, name, "robots look for users") for name in ("limit", "take")),
+    *((SeenArea, name, "what of the home was in view") for name in ("take", "take_bins")),
     (LayerBook, "expose", "what of the rooms was in view"),
+    *(
+        (watcher, name, "encounters, giving way, sensors")
+        for watcher in (Clearance, Encounters, Sensors)
+        for name in ("limit", "take")
+    ),
     (Actor, "decide", decides),
     (Learners, "update", "algorithms and metrics: call, check"),
     (Learners, "_update", learns),
     (Learners, "_store", "algorithms and metrics: store"),
-    (Recorder, "span", "record: events, key frames, samples"),
+    (Recorder, "take", "record: events, key frames, samples"),
     (Recorder, "drain", "write and close"),
 )
 
@@ -92,11 +102,15 @@ def main() -> None:
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        once(arguments.scenario, folder)  # loads libraries and kernels
+        once(arguments.scenario, folder)  # loads libraries
         plain = [once(arguments.scenario, folder) for _ in range(arguments.runs)]
         for owner, method, part in PARTS:
             named = part if callable(part) else functools.partial(lambda p, *_: p, part)
             setattr(owner, method, timed(named, getattr(owner, method)))
+        simulation.PHASES = tuple(
+            timed(functools.partial(lambda p, *_: p, f"phase: {phase.__name__}"), phase)
+            for phase in phases.PHASES
+        )
         found = []
         for _ in range(arguments.runs):
             spent.clear()

@@ -2,7 +2,7 @@
 
     python benchmarks/sight_month.py [--json FILE]
 
-Times are the best of several runs in this process that take turns, compiling left out.
+Times are the best of several runs in this process that take turns, the first of each left out.
 """
 
 import argparse
@@ -85,23 +85,22 @@ def algorithms() -> tuple[Any, Any]:
 
 def in_the_loop() -> float:
     """Return what it takes to decide whether a user is in view, over the month [ns]."""
-    from fleet2d.engine.buckets import Eye
-
+    from fleet2d.engine.cameras import Cameras
     from fleet2d.engine.simulation import Simulation
 
-    class Timed(Eye):
+    class Timed(Cameras):
         seconds, steps = 0.0, 0
 
-        def look(self, block: Any, first: int, count: int) -> int:
+        def _look(self, bodies: Any, end: int, **stop: bool) -> Any:
             began = time.perf_counter()
-            done = super().look(block, first, count)
+            found = super()._look(bodies, end, **stop)
             Timed.seconds += time.perf_counter() - began
-            Timed.steps += done * len(self.others)
-            return done
+            Timed.steps += (found.end - self.taken) * len(self.others)
+            return found
 
     simulation = Simulation(SCENARIO)
-    for eye in simulation._world.eyes:
-        eye.__class__ = Timed
+    for cameras in simulation._state.cameras:
+        cameras.__class__ = Timed
     simulation.run()
     return Timed.seconds / Timed.steps * 1e9
 

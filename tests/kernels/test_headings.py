@@ -172,3 +172,11 @@ def test_turn_between_leads_from_start_to_end(start: int, end: int) -> None:
 
     assert -HALF_TURN <= turn < HALF_TURN
     assert (start + turn - end) % TURN == 0
+
+
+def test_vectors_whose_products_would_leave_64_bits_are_refused() -> None:
+    """That to (-2**63, -2**63) was turned for ever."""
+    for dx, dy in ((-(2**63), -(2**63)), (2**31 + 1, 0), (0, -(2**31) - 1)):
+        with pytest.raises(ValueError, match=r"within 2\*\*31"):
+            heading_of(dx, dy)
+    assert [512, 3584] == [heading_of(2**31, 2**31), heading_of(2**31, -(2**31))]

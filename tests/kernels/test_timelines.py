@@ -26,6 +26,7 @@ Pose = tuple[int, int, int, int, int]
 
 STEP_US = 1000
 HORIZON = 60
+POSE_TYPES = (np.int64, np.int64, np.int64, np.uint8, np.int8)
 ROOM = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
 INSIDE = home_of([shapely.box(100, 100, 1180, 860).difference(shapely.box(400, 200, 740, 800))])
 
@@ -227,8 +228,7 @@ def test_a_window_of_given_poses_joins_equal_ones(
     rows = st.lists(pose, min_size=steps, max_size=steps)
     poses = data.draw(st.lists(rows, min_size=bodies, max_size=bodies))
     columns = np.array(poses, np.int64).reshape(bodies, steps, 5).transpose(2, 0, 1)
-    types = (np.int64, np.int64, np.int64, np.uint8, np.int8)
-    given_poses = (column.astype(t) for column, t in zip(columns, types, strict=True))
+    given_poses = (column.astype(t) for column, t in zip(columns, POSE_TYPES, strict=True))
     window = Window(first, *given_poses)
 
     check_window(window, poses, first, first + steps)
@@ -394,6 +394,55 @@ def test_what_is_forgotten_is_refused(walks: bool) -> None:
             timelines.pose(0, step)
         with pytest.raises(ValueError, match="forgotten"):
             timelines.window(step, 15)
+
+
+@pytest.mark.parametrize("bodies", [0, 1, 3])
+@pytest.mark.parametrize("steps", [0, 1, 9])
+def test_a_window_that_was_written_is_read_as_it_was(bodies: int, steps: int) -> None:
+    rng = np.random.default_rng(steps)
+    columns = (rng.integers(0, 2, (bodies, steps)).astype(t) for t in POSE_TYPES)
+    window = Window(7, *columns)
+    for again in (copy.deepcopy(window), pickle.loads(pickle.dumps(window))):
+        assert (7, 7 + steps) == (again.first, again.end)
+        for body in range(bodies):
+            assert runs_of(window, body) == runs_of(again, body)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"end": 6}, "no state of a window"),
+        ({"first": 8}, "no state of a window"),
+        ({"start": [0, 2, 3]}, "no state of a window"),
+        ({"start": [0, 3, 2]}, "no state of a window"),
+        ({"start": [0, 9, 4]}, "no state of a window"),
+        ({"start": [1, 2, 4]}, "no state of a window"),
+        ({"start": [0, 0, 4]}, "no state of a window"),
+        ({"start": []}, "no state of a window"),
+        ({"step": [7, 8, 7, 11]}, "no state of a window"),
+        ({"step": [7, 7, 7, 8]}, "no state of a window"),
+        ({"step": [8, 9, 7, 8]}, "no state of a window"),
+        ({"x": [0, 1, 2]}, "no state of a window"),
+    ],
+)
+def test_states_that_no_window_has_are_refused(changes: dict[str, Any], message: str) -> None:
+    state = {
+        "first": 7, "end": 11, "start": [0, 2, 4], "step": [7, 8, 7, 8],
+        **{name: [0, 1, 2, 3] for name in ("x", "y", "heading", "away", "posture")},
+    }  # fmt: skip
+    types = [int, int, np.int64, np.int64, *POSE_TYPES]
+
+    def read(parts: dict[str, Any]) -> Window:
+        made = Window.__new__(Window)
+        values = (
+            v if t is int else np.array(v, t) for v, t in zip(parts.values(), types, strict=True)
+        )
+        made.__setstate__(tuple(values))
+        return made
+
+    assert [(7, (2, 2, 2, 2, 2)), (8, (3, 3, 3, 3, 3))] == runs_of(read(state), 1)
+    with pytest.raises(ValueError, match=message):
+        read({**state, **changes})
 
 
 def test_states_that_no_timelines_have_are_refused() -> None:

@@ -16,8 +16,14 @@ void bind_headings(nb::module_& m) {
     m.def("half_sine", &half_sine, "half"_a, "Return UNIT * sine of `half` / 8192 of a turn.");
     m.def("sine", &sine, "heading"_a, "Return UNIT * sine of a heading (any integer).");
     m.def("cosine", &cosine, "heading"_a, "Return UNIT * cosine of a heading (any integer).");
-    m.def("heading_of", &heading_of, "dx"_a, "dy"_a,
-          "Return the heading nearest to the vector (dx, dy) [lattice units]; 0 for a null vector.");
+    m.def(
+        "heading_of",
+        [](i64 dx, i64 dy) {
+            constexpr i64 most = i64{1} << 31;  // a product with UNIT, and a sum of two, fit in 64 bits
+            require(-most <= dx && dx <= most && -most <= dy && dy <= most, "dx and dy must be within 2**31");
+            return heading_of(dx, dy);
+        },
+        "dx"_a, "dy"_a, "Return the heading nearest to the vector (dx, dy) [lattice units]; 0 for a null vector.");
     m.def("turn_between", &turn_between, "start"_a, "end"_a,
           "Return the shorter signed turn from `start` to `end`, in [-2048, 2047].");
 }

@@ -12,6 +12,12 @@ View<const i64> table_of(View<const i64, 2> tables, i64 camera) {
     return tables[camera];
 }
 
+// Squares of distances stay inside 64 bits.
+void check_offset(i64 dx, i64 dy) {
+    constexpr i64 most = i64{1} << 30;
+    require(-most <= dx && dx <= most && -most <= dy && dy <= most, "dx and dy must be within 2**30 lattice units");
+}
+
 }  // namespace
 
 void bind_perception(nb::module_& m) {
@@ -81,10 +87,17 @@ void bind_perception(nb::module_& m) {
 Example:
     >>> pick(np.array([ONE // 2, ONE]), ONE // 2)
     1)");
-    m.def("length", &length, "dx"_a, "dy"_a, "Return how long (dx, dy) is [lattice units], rounded down.");
+    m.def(
+        "length",
+        [](i64 dx, i64 dy) {
+            check_offset(dx, dy);
+            return length(dx, dy);
+        },
+        "dx"_a, "dy"_a, "Return how long (dx, dy) is [lattice units], rounded down.");
     m.def(
         "distance_bin",
         [](View<const i64, 2> table, i64 camera, i64 dx, i64 dy) {
+            check_offset(dx, dy);
             return distance_bin(table_of(table, camera), dx, dy);
         },
         "table"_a, "camera"_a, "dx"_a, "dy"_a, "Return the bin of the parts by distance that (dx, dy) belongs to.");
@@ -101,6 +114,7 @@ Example:
         [](View<const i64, 2> table, i64 camera, i64 heading, i64 dx, i64 dy, i64 faces, i64 posture, i64 shown) {
             require(0 <= posture && posture < POSTURES, "there is no such posture");
             require(0 <= shown && shown < MOST_SHOWN, "shown must be below MOST_SHOWN");
+            check_offset(dx, dy);
             return steady_chance(table_of(table, camera), heading, dx, dy, faces, posture, shown);
         },
         "table"_a, "camera"_a, "heading"_a, "dx"_a, "dy"_a, "faces"_a, "posture"_a, "shown"_a,
@@ -120,6 +134,7 @@ Args:
     m.def(
         "turn_and_stretch",
         [](i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
+            check_offset(dx, dy);
             require(0 < distance && distance < (i64{1} << 40), "distance must be in 1 to 2**40 - 1");
             const Offset offset = turn_and_stretch(dx, dy, turn, distance, wanted);
             return std::tuple(offset.dx, offset.dy);
@@ -131,6 +146,7 @@ Args:
         [](View<const i64, 2> table, View<const u64, 3> keys, i64 camera, i64 user, i64 now, i64 dx, i64 dy) {
             require(0 <= camera && camera < keys.size(), "there is no such camera");
             require(0 <= user && user < keys.shape[1] && keys.shape[2] == USER_DRAWS, "there is no such user");
+            check_offset(dx, dy);
             const Offset offset = blurred(table_of(table, camera), keys[camera][user], now, dx, dy);
             return std::tuple(offset.dx, offset.dy);
         },
