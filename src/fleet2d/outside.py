@@ -72,7 +72,7 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
     try:
         module = _import_module(folder, module_name)
     except Exception as error:  # whatever the user's module does while it is imported
-        missing = _public(error.name or "") if isinstance(error, ModuleNotFoundError) else ""
+        missing = public_name(error.name or "") if isinstance(error, ModuleNotFoundError) else ""
         if missing and f"{module_name}.".startswith(f"{missing}."):
             raise ScenarioError(
                 f"can't import {name!r}: no module named {missing!r} in {folder} or installed"
@@ -87,7 +87,7 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
     return found
 
 
-def _public(text: str) -> str:
+def public_name(text: str) -> str:
     """Write the modules in a text as users know them, without the package for their folder."""
     return re.sub(rf"\b{_PREFIX}[0-9a-f]+\.", "", text)
 
@@ -104,7 +104,7 @@ def _modules(folder: Path, name: str) -> list[str]:
 def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
     """Say that a class isn't in its module, and which are."""
     file = getattr(module, "__file__", None)
-    shown = _shown(file, folder) if file else f"the module {_public(module.__name__)}"
+    shown = _shown(file, folder) if file else f"the module {public_name(module.__name__)}"
     names = [
         name
         for name, value in vars(module).items()
@@ -116,7 +116,7 @@ def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
 
 def _failure(error: Exception, folder: Path) -> str:
     """Say where in the user's files an import failed, and how."""
-    what = f"{type(error).__name__}: {_public(str(error))}"
+    what = f"{type(error).__name__}: {public_name(str(error))}"
     if isinstance(error, SyntaxError) and error.filename:
         return (
             f"{_shown(error.filename, folder)}:{error.lineno}: {type(error).__name__}: {error.msg}"

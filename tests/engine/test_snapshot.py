@@ -243,6 +243,50 @@ def test_another_process_goes_on_from_a_file(scene: str, tmp_path: Path) -> None
     assert undisturbed(scene)[0]["run"] == done.stdout.strip()
 
 
+OWN = """
+from fleet2d import Algorithm
+
+
+class Steps:
+    def __init__(self):
+        self.count = 0
+
+
+class Looks(Algorithm):
+    def start(self, home):
+        self.steps = Steps()
+
+    def update(self, history, state):
+        self.steps.count += len(history)
+        return {"steps": self.steps.count}
+"""
+
+SAVE = """
+import json, sys, fleet2d
+if sys.argv[2] == "imported before":
+    import looks
+simulation = fleet2d.Simulation(json.loads(sys.argv[3]))
+simulation.advance(300)
+simulation.save(sys.argv[1])
+print(simulation.run().digest)
+"""
+
+
+@pytest.mark.parametrize("module", ["imported before", "from the folder"])
+def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_other(
+    module: str, tmp_path: Path
+) -> None:
+    """The state spoke of looks.Looks, the other process of its own name for the folder's looks."""
+    (tmp_path / "looks.py").write_text(OWN)
+    path = tmp_path / "run.fleet2d"
+    content = json.dumps(scenario(algorithms={"looks": {"type": "looks:Looks"}}))
+    whole = process("-c", SAVE, str(path), module, content, cwd=tmp_path)
+    assert 0 == whole.returncode, whole.stderr
+    done = process("-c", LOAD, str(path), cwd=tmp_path)
+    assert 0 == done.returncode, done.stderr
+    assert whole.stdout == done.stdout
+
+
 def test_a_file_of_the_same_state_is_the_same_in_any_process(tmp_path: Path) -> None:
     """But for the time that it took until then."""
     one, other = (open_snapshot(saved(tmp_path / name)) for name in "ab")

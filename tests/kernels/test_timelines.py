@@ -3,8 +3,10 @@
 import copy
 import gc
 import pickle
+import sys
 from bisect import bisect_right
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from typing import Any
 
@@ -287,6 +289,24 @@ def test_a_walk_is_drawn_once_and_the_same_in_any_order() -> None:
     assert len(set(ways[0])) > 20
 
 
+def test_threads_may_ask_for_the_same_walk_at_once() -> None:
+    """It is drawn on as it is asked for: two threads that did that at once crashed."""
+    walker = WalkRule(np.uint64(5), 9000, 40_000, 500)
+
+    def ask(timelines: Timelines) -> list[int]:
+        return [len(timelines.window(s, s + 3000).step) for s in range(0, 60_000, 977)]
+
+    def walking() -> Timelines:
+        timelines = Timelines(1, STEP_US)
+        timelines.walk(0, 0, ROOM.mesh, INSIDE.mesh, walker, (221, 333, 77))
+        return timelines
+
+    expected = ask(walking())
+    for _ in range(10):
+        with ThreadPoolExecutor(4) as pool:
+            assert [expected] * 4 == list(pool.map(ask, [walking()] * 4))
+
+
 def test_timelines_keep_the_meshes_of_walks_alive() -> None:
     timelines = Timelines(1, STEP_US)
     mesh = home_of([shapely.box(0, 0, 1280, 960)]).mesh
@@ -298,6 +318,29 @@ def test_timelines_keep_the_meshes_of_walks_alive() -> None:
     gc.collect()
     assert expected == again.pose(0, 40)
     assert 200 == len(dense(again.window(0, 200), 0, 0, 200))
+
+
+def test_meshes_are_let_go_with_the_walks_that_needed_them() -> None:
+    """Doors that open and shut make many of them in a month."""
+    timelines, rule_ = resting(2), WalkRule(np.uint64(5), 9000, 40_000, 500)
+    meshes = [home_of([shapely.box(0, 0, 1280, 900 + 2 * i)]).mesh for i in range(4)]
+
+    def kept() -> list[int]:
+        return [sys.getrefcount(mesh) for mesh in meshes]
+
+    free = kept()
+    timelines.walk(0, 0, meshes[0], meshes[1], rule_, (221, 333, 77))
+    timelines.walk(1, 5, meshes[0], meshes[0], rule_, (221, 333, 77))
+    timelines.walk(0, 10, meshes[2], meshes[3], rule_, (221, 333, 77))
+    timelines.pose(0, 30)
+    for before, used in ((9, [1, 1, 1, 1]), (10, [1, 0, 1, 1]), (50, [1, 0, 1, 1])):
+        timelines.forget(before)
+        assert used == [now - then for now, then in zip(kept(), free, strict=True)]
+    expected = timelines.window(50, 90)
+    again = pickle.loads(pickle.dumps(timelines)).window(50, 90)
+    assert runs_of(expected, 0) == runs_of(again, 0)
+    del timelines
+    assert free == kept()
 
 
 def test_a_copy_goes_its_own_way() -> None:

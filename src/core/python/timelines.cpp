@@ -100,7 +100,10 @@ public:
         return window_of(body, body + 1, first, end);
     }
 
-    void forget(i64 before) { timelines_.forget(before); }
+    void forget(i64 before) {
+        timelines_.forget(before);
+        std::erase_if(meshes_, [this](const nb::object& mesh) { return !is_walked(nb::cast<Mesh>(mesh)); });
+    }
 
     nb::tuple state() const {
         nb::list bodies;
@@ -158,12 +161,23 @@ private:
         }
         return timelines_.window(first_body, end_body, first, end);
     }
-    // Keep a mesh for as long as there are timelines; most walks share theirs.
+    // Keep a mesh for as long as a body walks in it; most walks share theirs.
     void keep(nb::object mesh) {
         for (const nb::object& kept : meshes_) {
             if (kept.is(mesh)) return;
         }
         meshes_.push_back(std::move(mesh));
+    }
+    bool is_walked(const Mesh& mesh) const {
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            for (const Piece& piece : timelines_.pieces(body)) {
+                if (piece.walk && (piece.walk->walls.vertices.data == mesh.vertices.data ||
+                                   piece.walk->space.vertices.data == mesh.vertices.data)) {
+                    return true;
+                }
+            }
+        }
+        return false;
     }
     nb::object mesh_of(const Mesh& mesh) const {
         for (const nb::object& kept : meshes_) {
@@ -380,9 +394,10 @@ Args:
         .def("pose", &OwnedTimelines::pose, "body"_a, "step"_a, "Return x, y, heading and away of a body at a step.")
         .def("poses", &OwnedTimelines::poses, "step"_a,
              "Return x, y, heading and away of all bodies at a step, (bodies,) each.")
-        .def("window", &OwnedTimelines::window, "first"_a, "end"_a, Unlocked(),
+        // Not unlocked: random walks are drawn on as they are asked for.
+        .def("window", &OwnedTimelines::window, "first"_a, "end"_a,
              "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")
-        .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a, Unlocked(),
+        .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a,
              "Return the runs of equal pose of one body in the steps from `first` to `end` - 1.")
         .def("forget", &OwnedTimelines::forget, "before"_a, "Drop what is only needed for steps earlier than `before`.")
         .def("__getstate__", &OwnedTimelines::state, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))

@@ -26,7 +26,7 @@ from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.outside import is_scenario_module
+from fleet2d.outside import is_scenario_module, public_name
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
 
@@ -196,7 +196,7 @@ class _Writer(pickle.Pickler):
         self._shared = shared
         if shared is None:
             self.dispatch_table = arrays.REDUCERS
-        self._packages = frozenset() if shared is not None else _packages_of(constants)
+        self._packages = {} if shared is not None else _packages_of(constants)
 
     def persistent_id(self, obj: Any) -> object:
         name = self._names.get(id(obj))
@@ -231,7 +231,7 @@ class _Reader(pickle.Unpickler):
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
         super().__init__(file)
         self._constants, self._shared = constants, shared
-        self._packages = frozenset() if shared is not None else _packages_of(constants)
+        self._packages = {} if shared is not None else _packages_of(constants)
 
     def state(self) -> State:
         """Return the state."""
@@ -252,6 +252,9 @@ class _Reader(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         if self._shared is not None:
             return super().find_class(module, name)
+        if not is_scenario_module(module):  # maybe one here, or one of a folder elsewhere
+            top, dot, rest = public_name(module).partition(".")
+            module = self._packages.get(top, top) + dot + rest
         if not may_refer(module, name, self._packages):
             raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
         found = super().find_class(module, name)
@@ -283,10 +286,21 @@ def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
     return top == "fleet2d" or top in packages or is_scenario_module(module)
 
 
-def _packages_of(constants: Constants) -> frozenset[str]:
-    """Return the packages outside Fleet2D that a scenario's components come from."""
+def _packages_of(constants: Constants) -> dict[str, str]:
+    """Return the packages outside Fleet2D that a scenario's components come from.
+
+    Returns:
+        The name of each as users know it, and what it is called in this process: a module that
+        was imported here may be imported from the scenario's folder elsewhere.
+    """
     scenario = constants.get("scenario")
     if not isinstance(scenario, Scenario):
-        return frozenset()
-    names = (type(component).__module__ for component in components_of(scenario))
-    return frozenset(name.partition(".")[0] for name in names) - {"fleet2d"}
+        return {}
+    packages = {}
+    for component in components_of(scenario):
+        module = type(component).__module__
+        public = public_name(module)
+        package = public.partition(".")[0]
+        packages[package] = module.removesuffix(public) + package
+    packages.pop("fleet2d", None)
+    return packages
