@@ -1,0 +1,96 @@
+"""Claims about rates: decided no more often wrongly than is said, against exact sums and by trying."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fleet2d.errors import InputError
+from fleet2d.testing.rate import RateTest, rate_test
+
+DECISIONS = 10_000
+CLAIMS = [(100, 0.95), (30, 0.9), (60, 0.5), (40, 1.0), (300, 0.98)]
+
+
+def decisions(test: RateTest, rate: float, seed: int) -> NDArray[np.bool_]:
+    """10,000 decisions about lives that hold with a rate: True where the claim is accepted."""
+    draws = np.random.Generator(np.random.Philox(seed)).random((DECISIONS, test.seeds)) >= rate
+    failures = np.cumsum(draws, axis=1)
+    accepted = failures <= test.accept[1:]
+    refused = failures >= test.refuse[1:]
+    first = np.argmax(accepted | refused, axis=1)
+    assert (accepted | refused).any(axis=1).all()  # each is decided at the last seed
+    return accepted[np.arange(DECISIONS), first]
+
+
+@pytest.mark.parametrize(("seeds", "holds"), CLAIMS)
+def test_ten_thousand_decisions_err_no_oftener_than_said(seeds: int, holds: float) -> None:
+    test = rate_test(seeds, holds)
+    noise = 4 * np.sqrt(0.05 * 0.95 / DECISIONS)
+    refusals_of_truth = 1 - decisions(test, holds, 1).mean()
+    acceptances_of_untruth = decisions(test, test.told_from, 2).mean()
+    assert refusals_of_truth <= test.error + noise
+    assert acceptances_of_untruth <= test.error + noise
+    assert decisions(test, test.told_from - 0.02, 3).mean() < acceptances_of_untruth + noise
+
+
+@pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
+@pytest.mark.parametrize(("seeds", "holds"), CLAIMS)
+def test_exact_error_rates_are_as_said(seeds: int, holds: float, error: float) -> None:
+    test = rate_test(seeds, holds, error)
+    assert 1 - test.acceptance(holds) <= error + 1e-12
+    assert test.acceptance(test.told_from) <= error + 1e-12
+    assert test.told_from < test.holds
+
+
+@pytest.mark.parametrize("rate", [0.95, 0.6])
+def test_acceptance_is_the_sum_over_all_outcomes(rate: float) -> None:
+    """The slow twin: every outcome of ten seeds, one after the other."""
+    test = rate_test(10, 0.9, 0.2)
+    accepted, looked = 0.0, 0.0
+    for outcome in product((True, False), repeat=10):
+        chance = float(np.prod([rate if held else 1 - rate for held in outcome]))
+        for number in range(1, 11):
+            verdict = test.decide(number, outcome[:number].count(False))
+            if verdict is not None:
+                accepted += chance * verdict
+                looked += chance * number
+                break
+    assert accepted == pytest.approx(test.acceptance(rate), abs=1e-12)
+    assert looked == pytest.approx(test.mean_seeds(rate), abs=1e-9)
+
+
+def test_it_stops_early_where_it_is_clear() -> None:
+    test = rate_test(100, 0.95)
+    assert test.mean_seeds(0.5) < 15
+    assert test.mean_seeds(1.0) < 60
+    assert test.decide(20, 12) is False
+
+
+def test_more_seeds_tell_nearer_rates() -> None:
+    rates = [rate_test(seeds, 0.95).told_from for seeds in (20, 50, 100, 300)]
+    assert sorted(rates) == rates
+
+
+def test_a_claim_of_every_seed_ends_with_the_first_failure() -> None:
+    test = rate_test(100)
+    assert test.decide(3, 1) is False
+    assert test.decide(99, 0) is None
+    assert test.decide(100, 0) is True
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"seeds": 0}, "1 to 10,000"),
+        ({"seeds": 10, "holds": 1.5}, "up to 1"),
+        ({"seeds": 10, "holds": 0}, "above 0"),
+        ({"seeds": 10, "error": 0.7}, "below 0.5"),
+        ({"seeds": 3, "holds": 0.5}, "take 5 seeds or more"),
+        ({"seeds": 1, "holds": 0.9}, "take 2 seeds or more"),
+    ],
+)
+def test_wrong_numbers_are_refused(settings: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        rate_test(**settings)  # type: ignore[arg-type]
