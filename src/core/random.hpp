@@ -42,4 +42,34 @@ constexpr i64 random_bell(u64 key, u64 counter) {
     return static_cast<i64>((lanes * four_lanes) >> 48) - BELL_MEAN;
 }
 
+// The draws of one stream at one step, one after the other.
+struct StepDraws {
+    u64 key;
+    u64 count = 0;
+
+    StepDraws(u64 stream, u64 step) : key(random_bits(stream, step)) {}
+
+    i64 below(u64 bound) { return random_below(key, count++, bound); }
+    f64 uniform() { return random_uniform(key, count++); }
+};
+
+// Small draws, several from each draw of a stream.
+struct Bits {
+    static constexpr u64 MOST = 30;
+    u64 bits = 0;
+    u64 left = 0;
+
+    // An integer in [0, 2**count), count <= MOST.
+    i64 take(StepDraws& draws, u64 count) {
+        if (left < count) {
+            bits = static_cast<u64>(draws.below(u64{1} << MOST));
+            left = MOST;
+        }
+        const auto value = static_cast<i64>(bits & ((u64{1} << count) - 1));
+        bits >>= count;
+        left -= count;
+        return value;
+    }
+};
+
 }  // namespace fleet2d

@@ -159,6 +159,37 @@ def random_bell(key: int | numpy.uint64, counter: int | numpy.integer[Any]) -> i
     deviations, and exact on every machine, which a logarithm or a cosine is not.
     """
 
+class StepDraws:
+    """
+    The draws of one stream at one step, one after the other.
+
+    Args:
+        key: Of the stream.
+        step: 0 to 2**64 - 1.
+    """
+
+    def __init__(self, key: int | numpy.uint64, step: int | numpy.integer[Any]) -> None: ...
+
+    def below(self, bound: int | numpy.integer[Any]) -> int:
+        """Return an integer from 0 to bound - 1; `bound` is below 2**31."""
+
+    def uniform(self) -> float:
+        """Return a float64 in [0, 1)."""
+
+    def __getstate__(self) -> tuple[int, int]: ...
+
+    def __setstate__(self, state: tuple[int, int], /) -> None: ...
+
+class Bits:
+    """Small draws, several from each draw of a stream."""
+
+    def __init__(self, draws: StepDraws) -> None: ...
+
+    def take(self, count: int) -> int:
+        """
+        Return a number from 0 to 2**count - 1, all equally likely; `count` is 30 at most.
+        """
+
 def near_wedge(heading: int, half_angle: int, dx: int, dy: int, reach: int) -> bool:
     """
     Return whether anything within `reach` of (dx, dy) may lie in a wedge; exact at reach 0.

@@ -17,9 +17,8 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import PurePath
-from typing import Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -38,6 +37,9 @@ from fleet2d.component_class import ComponentClass
 from fleet2d.errors import ScenarioError
 from fleet2d.outside import BrokenModule, import_class, written_path
 from fleet2d.problems import did_you_mean, problem, problem_at, rewritten, shown, unknown_key
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 PACKAGES = {
     "floorplan": "fleet2d.floorplan",
@@ -185,7 +187,9 @@ def lookup(kind: str, name: str) -> type[Component]:
     _import_builtins(kind, name)
     if (found := _registered(kind, name)) is not None:
         return found
-    for entry in entry_points(group=f"fleet2d.{kind}", name=name):
+    for entry in _plugins(kind):
+        if entry.name != name:
+            continue
         cls = _checked(kind, name, import_class(entry.value, is_plugin=True))
         cls.type_name = name
         return cls
@@ -205,9 +209,15 @@ def lookup(kind: str, name: str) -> type[Component]:
 def components(kind: str) -> dict[str, type[Component]]:
     """Return every component of a kind, registered or from an entry point, by name, sorted."""
     _import_builtins(kind)
-    plugins = {e.name: e for e in entry_points(group=f"fleet2d.{kind}")}
-    found = {name: lookup(kind, name) for name in plugins} | _REGISTRY.get(kind, {})
+    found = {e.name: lookup(kind, e.name) for e in _plugins(kind)} | _REGISTRY.get(kind, {})
     return dict(sorted(found.items()))
+
+
+def _plugins(kind: str) -> "Iterable[EntryPoint]":
+    """Return what installed packages declare of a kind."""
+    from importlib.metadata import entry_points  # slow to import, and seldom needed
+
+    return entry_points(group=f"fleet2d.{kind}")
 
 
 def aliases(kind: str, name: str) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fleet2d.kernels.random import random_below, random_bits, random_uniform
+from fleet2d.kernels.random import StepDraws
 
 T = TypeVar("T")
 
@@ -27,7 +27,7 @@ def stream_key(seed: int, path: str, purpose: str) -> np.uint64:
     return np.uint64(int.from_bytes(hashlib.blake2b(text, digest_size=8).digest(), "little"))
 
 
-class Draws:
+class Draws(StepDraws):
     """Random draws of one component, for one purpose, at one step.
 
     Example:
@@ -38,23 +38,7 @@ class Draws:
         ['office', 'hall', 'kitchen']
     """
 
-    def __init__(self, key: np.uint64, step: int) -> None:
-        self._key = np.uint64(random_bits(key, step))
-        self._count = 0
-
-    def _next(self) -> int:
-        self._count += 1
-        return self._count - 1
-
-    def below(self, bound: int) -> int:
-        """Return an integer from 0 to bound - 1; `bound` is below 2**31."""
-        if not 0 < bound < 2**31:
-            raise ValueError(f"bound is {bound}: it must be from 1 to 2**31 - 1")
-        return int(random_below(self._key, self._next(), bound))
-
-    def uniform(self) -> float:
-        """Return a float64 in [0, 1)."""
-        return float(random_uniform(self._key, self._next()))
+    __slots__ = ()
 
     def choice(self, items: Sequence[T]) -> T:
         """Return one of `items`, all equally likely."""

@@ -43,6 +43,15 @@ def test_to_lattice_rounds_half_to_even() -> None:
     assert [[0, 2], [2, 4]] == lattice.to_lattice(halves).tolist()
 
 
+@pytest.mark.parametrize("cell", [0.01, 0.05, 0.3, 1.0])
+def test_one_point_is_taken_as_all_are(cell: float) -> None:
+    lattice = Lattice.around((-3.0, 2.0, 9.0, 7.0), cell)
+    for x, y in np.random.default_rng(1).uniform(-3, 9, (500, 2)).tolist():
+        point = lattice.point_at((x, y))
+        assert lattice.to_lattice((x, y)).tolist() == list(point)
+        assert lattice.to_metres(point).tolist() == list(lattice.xy_of(*point))
+
+
 def test_to_walls_gives_even_points_only() -> None:
     lattice = Lattice(0.05, (-0.1, -0.1), 100, 100)
     points = np.random.default_rng(1).uniform(0, 4, (500, 2))

@@ -394,6 +394,11 @@ CALLS: dict[str, Args] = {
     "Legs.walk": lambda: (_core.Legs(), 5, 7, POINTS[:2].copy(), 1000.0, 500.0),
     "Legs.rows": lambda: (_core.Legs(),),
     "Legs.track": lambda: (_core.Legs(),),
+    "StepDraws": lambda: (KEY, 4),
+    "StepDraws.below": lambda: (_core.StepDraws(KEY, 4), 100),
+    "StepDraws.uniform": lambda: (_core.StepDraws(KEY, 4),),
+    "Bits": lambda: (_core.StepDraws(KEY, 4),),
+    "Bits.take": lambda: (_core.Bits(_core.StepDraws(KEY, 4)), 8),
     "Timelines": lambda: (3, SECOND),
     "Timelines.follow": lambda: (
         timelines(),
@@ -707,6 +712,8 @@ def ask(made: Any) -> None:
     elif isinstance(made, _core.Legs):
         made.rows()
         made.track()
+    elif isinstance(made, _core.StepDraws):
+        made.below(10)
     elif isinstance(made, _core.Window):
         for body in range(len(made.start) - 1):
             made.dense(body, made.first, min(made.end, made.first + 99))
@@ -745,6 +752,7 @@ STATES: dict[str, Callable[[], Any]] = {
     "Mesh": lambda: _core.Mesh(MESH.vertices, MESH.triangles, MESH.neighbors),
     "Routes": lambda: _core.Routes(MESH, corners()),
     "Window": window,
+    "StepDraws": lambda: _core.StepDraws(KEY, 4),
     "Timelines": grown,
 }
 

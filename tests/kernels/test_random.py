@@ -1,3 +1,7 @@
+import copy
+import pickle
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +12,8 @@ from tests.strategies import quick
 from fleet2d.kernels.random import (
     BELL_MEAN,
     BELL_STD,
+    Bits,
+    StepDraws,
     random_bell,
     random_below,
     random_bits,
@@ -124,3 +130,55 @@ def test_random_bell_draws_spread_as_its_distribution_says() -> None:
 
     assert abs(drawn.mean()) < 3 * BELL_STD / 100
     assert abs(drawn.std() / BELL_STD - 1) < 3 / 200**0.5 / 10
+
+
+@quick
+@given(keys, counters, st.lists(st.integers(1, 2**31 - 1)))
+def test_draws_of_a_step_are_those_of_the_twin(key: int, step: int, bounds: list[int]) -> None:
+    draws = StepDraws(np.uint64(key), step)
+    own_key = slow.random_bits(key, step)
+
+    expected = [slow.random_below(own_key, i, bound) for i, bound in enumerate(bounds)]
+    assert expected == [draws.below(bound) for bound in bounds]
+    assert (slow.random_bits(own_key, len(bounds)) >> 11) / 2**53 == draws.uniform()
+
+
+@quick
+@given(keys, st.lists(st.integers(0, 30)))
+def test_bits_are_taken_from_draws_of_30_from_the_lowest_on(key: int, counts: list[int]) -> None:
+    bits, draws = Bits(StepDraws(np.uint64(key), 5)), StepDraws(np.uint64(key), 5)
+
+    left = value = 0
+    for count in counts:
+        if left < count:
+            value, left = draws.below(1 << 30), 30
+        assert value % 2**count == bits.take(count)
+        value, left = value >> count, left - count
+
+
+def test_bits_and_others_share_the_draws_of_a_step() -> None:
+    draws, all_of_them = StepDraws(np.uint64(3), 5), StepDraws(np.uint64(3), 5)
+    bits = Bits(draws)
+
+    values = [bits.take(30), draws.below(1 << 30), bits.take(30)]
+
+    assert [all_of_them.below(1 << 30) for _ in range(3)] == values
+
+
+@pytest.mark.parametrize("bound", [0, -1, 2**31, 2**62])
+def test_a_bound_out_of_range_is_refused(bound: int) -> None:
+    with pytest.raises(ValueError, match=f"bound is {bound}: it must be from 1 to"):
+        StepDraws(np.uint64(3), 5).below(bound)
+
+
+def test_more_than_30_bits_are_refused() -> None:
+    with pytest.raises(ValueError, match="count must be 0 to 30"):
+        Bits(StepDraws(np.uint64(3), 5)).take(31)
+
+
+@pytest.mark.parametrize("way", [copy.copy, lambda draws: pickle.loads(pickle.dumps(draws))])
+def test_a_copy_of_draws_goes_on_by_itself(way: Callable[[StepDraws], StepDraws]) -> None:
+    draws = StepDraws(np.uint64(3), 5)
+    draws.below(7)
+    twin = way(draws)
+    assert [draws.below(10**9) for _ in range(3)] == [twin.below(10**9) for _ in range(3)]

@@ -212,7 +212,7 @@ class Actor:
         if not thing.uses:
             raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")
         use = thing.uses[place % len(thing.uses)]
-        x, y = lattice.to_lattice((use.x, use.y)).tolist()
+        x, y = lattice.point_at((use.x, use.y))
         heading = round(use.heading / (2 * np.pi) * TURN) % TURN
         approach = home.approach(use, self.space, self.part)
         found = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
@@ -284,7 +284,7 @@ class Actor:
                     row, column = cells[draws.below(len(cells))].tolist()
                     return self.home.plan.lattice.cell_centre(row, column)
             raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
-        x, y = self.home.plan.lattice.to_lattice(where).tolist()
+        x, y = self.home.plan.lattice.point_at(where)  # type: ignore[arg-type]
         if self.space.part_at(x, y) < 0:
             near = self.space.nearest(x, y)
             there = None if near is None else self._shown(near)
@@ -296,7 +296,7 @@ class Actor:
 
     def middle(self, room: Room) -> tuple[int, int]:
         """Return the point of a room that it can reach, nearest to the room's deepest inside."""
-        x, y = self.home.plan.lattice.to_lattice(room.anchor_xy).tolist()
+        x, y = self.home.plan.lattice.point_at(room.anchor_xy)
         found = self.space.nearest(x, y, self.part, room.index)
         if found is None:
             raise PlacementError(f"{self.path}: {room.name} can't be reached from where it starts")
@@ -309,7 +309,7 @@ class Actor:
             PlacementError: Its body can't stand there, or can't get there; says what is near.
         """
         lattice = self.home.plan.lattice
-        x, y = lattice.to_lattice(xy).tolist()
+        x, y = lattice.point_at(xy)
         part = self.space.part_at(x, y)
         if part == self.part:
             return x, y
@@ -328,7 +328,7 @@ class Actor:
         """Return a free lattice point in metres, with as few decimals as leave it free."""
         lattice = self.home.plan.lattice
         short: list[float] = lattice.to_metres(point).round(2).tolist()
-        if self.space.part_at(*lattice.to_lattice(short).tolist()) == self.part:
+        if self.space.part_at(*lattice.point_at(short)) == self.part:
             return short
         exact: list[float] = lattice.to_metres(point).round(4).tolist()
         return exact
@@ -452,7 +452,7 @@ class Actor:
         if away:
             x, y = self.way_out
         elif is_point(place):
-            x, y = self.home.plan.lattice.to_lattice(place).tolist()
+            x, y = self.home.plan.lattice.point_at(place)  # type: ignore[arg-type]
             self.part = max(self.space.part_at(x, y), 0)
             x, y = self.point(place)  # type: ignore[arg-type]
         else:

@@ -78,8 +78,7 @@ class Situation:
     def xy(self) -> tuple[float, float]:
         """Where the body is [m]."""
         state = self.actor.state
-        x, y = self.home.plan.lattice.to_metres([state.x, state.y]).tolist()
-        return x, y
+        return self.home.plan.lattice.xy_of(state.x, state.y)
 
     @property
     def room(self) -> "Room | None":
@@ -97,7 +96,7 @@ class Situation:
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
         actor, lattice = self.actor, self.home.plan.lattice
-        at_x, at_y = lattice.to_lattice((x, y)).tolist()
+        at_x, at_y = lattice.point_at((x, y))
         found = (at_x, at_y)
         if actor.space.part_at(at_x, at_y) != actor.part:
             found = actor.space.nearest(at_x, at_y, actor.part) or (actor.state.x, actor.state.y)

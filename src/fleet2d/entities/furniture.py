@@ -76,7 +76,7 @@ def _gets_to(actor: "Actor", thing: "PlacedObject") -> bool:
         return False
     x, y = actor.place_at(thing, 0).approach
     use = thing.uses[0]
-    at = actor.home.plan.lattice.to_lattice(use.approach or (use.x, use.y)).tolist()
+    at = actor.home.plan.lattice.point_at(use.approach or (use.x, use.y))
     # From nearby if that is too tight, but not from another room behind a wall.
     far = actor.home.plan.lattice.units_per_m
     return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= far * far)

@@ -305,7 +305,7 @@ def main_part(plan: FloorPlan, space: Space) -> int | None:
     """
     if plan.entrance is None:
         return 0
-    x, y = plan.lattice.to_lattice(plan.entrance).tolist()
+    x, y = plan.lattice.point_at(plan.entrance)
     part = space.part_at(x, y)
     return part if part >= 0 else None
 

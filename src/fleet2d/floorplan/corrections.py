@@ -127,7 +127,7 @@ def _found(
 ) -> int:
     """Return the number of the region that holds a place."""
     x, y = correction.at or (0.0, 0.0)
-    row, column = plan.lattice.cell_of(*plan.lattice.to_lattice((x, y)).tolist())
+    row, column = plan.lattice.cell_of(*plan.lattice.point_at((x, y)))
     if 0 <= row < plan.lattice.rows and 0 <= column < plan.lattice.columns:
         index = int(beside_rooms(painted.astype(np.int16))[row, column])
         if index >= 0:

@@ -119,6 +119,7 @@ class CostedSpace(Space):
         self.route = lru_cache(ROUTES_KEPT)(self._find_route)
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
+        self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
         # Where a body fits, cells that share a side are never of two parts.
         part = label_parts((base.part_of_cell >= 0) & (self.cost >= 0), diagonal=False)
         sizes = np.bincount(part[part >= 0])

@@ -190,13 +190,17 @@ class Home:
             PlacementError: The space has no such part.
         """
         at = (use.x, use.y) if use.approach is None else use.approach
-        x, y = self.plan.lattice.to_lattice(at).tolist()
+        x, y = self.plan.lattice.point_at(at)
         if space.part_at(x, y) == part:
             return x, y
         near = space.nearest(x, y, part)
         if near is None:
             raise PlacementError(f"a body of radius {space.radius:g} m fits nowhere here")
         return near
+
+    def room_of(self, thing: PlacedObject) -> Room | None:
+        """Return the room that holds the middle of an object, as the plan has it."""
+        return self._shapes.room_of(thing)
 
     def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
         """Return where one steps from to a place on an object [lattice], if it is such a place."""
@@ -207,9 +211,7 @@ class Home:
             self._places = (
                 self.version,
                 {
-                    tuple(lattice.to_lattice((use.x, use.y)).tolist()): tuple(
-                        lattice.to_lattice(use.approach).tolist()
-                    )
+                    lattice.point_at((use.x, use.y)): lattice.point_at(use.approach)
                     for thing in self.objects
                     for use in thing.uses
                     if use.approach is not None
@@ -238,7 +240,7 @@ class Home:
             rooms += sorted(self.rooms, key=lambda room: -room.cells)
             reachable = (room for room in rooms if len(space.cells(room.index, part)))
             at = next(reachable, self.rooms[0]).anchor_xy
-        x, y = self.plan.lattice.to_lattice(at).tolist()
+        x, y = self.plan.lattice.point_at(at)
         return x, y
 
 
@@ -249,6 +251,7 @@ class _Shapes:
         self.plan = plan
         self.kept = Kept(VALUES_KEPT)
         self.door_lines = door_lines
+        self._room_of: dict[str, tuple[PlacedObject, Room | None]] = {}
         self.walls = lru_cache(ARRANGEMENTS_KEPT)(self._find_walls)
         self._gates = lru_cache(ARRANGEMENTS_KEPT)(self._find_gates)
         self.space_of = lru_cache(ARRANGEMENTS_KEPT)(self._find_space)
@@ -256,6 +259,14 @@ class _Shapes:
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return itself: branches of a run share it, too."""
         return self
+
+    def room_of(self, thing: PlacedObject) -> Room | None:
+        known = self._room_of.get(thing.name)
+        if known is None or known[0] is not thing:
+            middle = thing.footprint.centroid
+            known = thing, self.plan.room_at(middle.x, middle.y)
+            self._room_of[thing.name] = known
+        return known[1]
 
     def space(
         self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]

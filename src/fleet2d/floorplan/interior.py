@@ -140,7 +140,7 @@ class Interior:
         self.objects.append(thing)
         for use in thing.uses:
             if use.approach is not None:
-                row, column = lattice.cell_of(*lattice.to_lattice(use.approach).tolist())
+                row, column = lattice.cell_of(*lattice.point_at(use.approach))
                 self._approached[row, column] = bool(self.standing[row, column])
 
     @cached_property
@@ -218,7 +218,7 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
             seeds[0] = False
     if plan.entrance is not None:
         xs, ys = plan.lattice.centre_axes()
-        x, y = plan.lattice.to_lattice(plan.entrance).tolist()
+        x, y = plan.lattice.point_at(plan.entrance)
         units = int(DOOR_CLEARANCE * plan.lattice.units_per_m)
         out |= (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 < units * units
     return out

@@ -152,7 +152,7 @@ class Layer:
 
     def _cell(self, x: float, y: float) -> tuple[int, int]:
         lattice = self._plan.lattice
-        row, column = lattice.cell_of(*lattice.to_lattice((x, y)).tolist())
+        row, column = lattice.cell_of(*lattice.point_at((x, y)))
         if not (0 <= row < lattice.rows and 0 <= column < lattice.columns):
             raise ComponentError(f"({x:g}, {y:g}) m is outside the grid of {self._plan.name}")
         return row, column

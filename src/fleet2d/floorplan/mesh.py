@@ -182,7 +182,9 @@ def _meshed(polygons: list[list[Int64]]) -> Mesh | None:
     rings = [ring for rings in polygons for ring in rings]
     wall_starts = np.concatenate(rings)
     wall_ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
-    keys = np.unique(_keys(wall_starts))
+    # Not np.unique, which imports masked arrays.
+    keys = np.sort(_keys(wall_starts))
+    keys = keys[np.diff(keys, prepend=-1) != 0]
     vertices = np.stack([keys // (2 * LIMIT), keys % (2 * LIMIT)], axis=1)
     corners = _triangulated(polygons)
     triangles = np.searchsorted(keys, _keys(corners))

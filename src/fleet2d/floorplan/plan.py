@@ -230,7 +230,7 @@ class FloorPlan:
 
     def room_at(self, x: float, y: float) -> Room | None:
         """Return the room that holds a place [m], or None outside the home and inside a wall."""
-        row, column = self.lattice.cell_of(*self.lattice.to_lattice((x, y)).tolist())
+        row, column = self.lattice.cell_of(*self.lattice.point_at((x, y)))
         if not (0 <= row < self.lattice.rows and 0 <= column < self.lattice.columns):
             return None
         index = int(self.room_of_place[row, column])
@@ -353,7 +353,7 @@ class FloorPlan:
         if self.entrance is None:
             return
         x, y = self.entrance
-        at = self.lattice.to_lattice(self.entrance).tolist()
+        at = self.lattice.point_at(self.entrance)
         if not strictly_inside(self.mesh, *at):
             free_x, free_y = self.nearest_free(x, y)
             raise FloorPlanError(

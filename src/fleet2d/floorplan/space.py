@@ -78,6 +78,7 @@ class Space:
         self.route = lru_cache(ROUTES_KEPT)(self._find_route)
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
+        self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
         self.radius = radius
         self.key: tuple[Any, ...] = ()  # by which a home finds it again
         lattice = plan.lattice
@@ -125,6 +126,12 @@ class Space:
         """Return the part for a body that stands where it can't be: the nearest one."""
         near = self.nearest(x, y)
         return 0 if near is None else self.part_at(*near)
+
+    def _find_part(self, xy: tuple[float, float]) -> int:
+        """Return the part of a place [m], or the nearest one."""
+        x, y = self.plan.lattice.point_at(xy)
+        part = self.part_at(x, y)
+        return self.part_near(x, y) if part < 0 else part
 
     def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
         """Return the cells (n, 2) as (row, column) of a part of the space, in one room if given."""

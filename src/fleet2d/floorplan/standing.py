@@ -141,7 +141,7 @@ def nearest_standing(
         in_the_way: What is not stepped over [m].
     """
     lattice = plan.lattice
-    x, y = lattice.to_lattice((use.x, use.y)).tolist()
+    x, y = lattice.point_at((use.x, use.y))
     if not strictly_inside(plan.mesh, x, y):
         return None
     units = int(reach * lattice.units_per_m) + HALF

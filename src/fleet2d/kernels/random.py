@@ -7,6 +7,8 @@ OOPSLA 2014) addressed by counter instead of by state. Keys come from :mod:`flee
 from fleet2d._core import (
     BELL_MEAN,
     BELL_STD,
+    Bits,
+    StepDraws,
     random_bell,
     random_below,
     random_bits,
@@ -16,6 +18,8 @@ from fleet2d._core import (
 __all__ = [
     "BELL_MEAN",
     "BELL_STD",
+    "Bits",
+    "StepDraws",
     "random_bell",
     "random_below",
     "random_bits",

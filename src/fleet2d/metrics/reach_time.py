@@ -57,8 +57,8 @@ class ReachTime(Metric):
             seconds = self.seconds.setdefault(key, [])
             self.unreached.setdefault(key, 0)
             for i in calls[pair.at_home[calls]].tolist():
-                start = lattice.to_lattice(pair.at_robot.at(i)).tolist()
-                there = lattice.to_lattice(pair.at_user.at(i)).tolist()
+                start = lattice.point_at(pair.at_robot.at(i))
+                there = lattice.point_at(pair.at_user.at(i))
                 part = (
                     space.part_near(*start) if space.part_at(*start) < 0 else space.part_at(*start)
                 )

@@ -143,7 +143,7 @@ class TimeToFind(Metric):
         """Return how far a robot drives straight to a user until it could see the user [m]."""
         plan, space = home.plan, home.space(self.radius)
         lattice = plan.lattice
-        start, there = lattice.to_lattice(robot).tolist(), lattice.to_lattice(user).tolist()
+        start, there = lattice.point_at(robot), lattice.point_at(user)
         part = space.part_at(*start)
         goal = tuple(there) if space.part_at(*there) == part else space.nearest(*there, part)
         route = None if goal is None or part < 0 else space.route(tuple(start), goal)

@@ -7,9 +7,10 @@ or ends at another time. A day's interruptions are a function of its date and it
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from fleet2d.kernels.random import Bits
 from fleet2d.routines.activity import seconds
 from fleet2d.routines.busy import Busy
-from fleet2d.routines.laws import Bits, Law
+from fleet2d.routines.laws import Law
 from fleet2d.routines.planner import DAY_S, FINISHES, INTERRUPTS, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
 

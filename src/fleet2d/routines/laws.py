@@ -15,7 +15,6 @@ from typing import NamedTuple
 from fleet2d.streams import Draws
 
 KNOTS = 128
-DRAWN_BITS = 30
 _BITS = 24
 _ONE = 1 << _BITS
 _LN2 = 0.6931471805599453
@@ -163,23 +162,6 @@ def uniform(low_s: int, high_s: int) -> Law:
 def empirical(quantiles: Sequence[int]) -> Law:
     """Return the law of measured quantiles at evenly spaced probabilities from 0 to 1 [s]."""
     return Law(tuple(quantiles), quantiles[0], quantiles[-1])
-
-
-class Bits:
-    """Small draws, several from each draw of a stream."""
-
-    def __init__(self, draws: Draws) -> None:
-        self._draws = draws
-        self._left = self._bits = 0
-
-    def take(self, count: int) -> int:
-        """Return a number from 0 to 2**count - 1, all equally likely; `count` is 30 at most."""
-        if self._left < count:
-            self._bits, self._left = self._draws.below(1 << DRAWN_BITS), DRAWN_BITS
-        value = self._bits & ((1 << count) - 1)
-        self._bits >>= count
-        self._left -= count
-        return value
 
 
 def weighted(draws: Draws, weights: Sequence[int]) -> int:

@@ -264,7 +264,7 @@ def _fill_false_positives(
         cumulative(shares, list(shares)), shares, list(shares)
     )
     for i, spot in enumerate(model.spots, 1):
-        x, y = scene.lattice.to_lattice(spot.at).tolist()
+        x, y = scene.lattice.point_at(spot.at)
         noise = round(spot.spread * scene.lattice.units_per_m * 65536 / BELL_STD)
         tables.spot[camera, i] = x, y, noise
 

@@ -141,7 +141,7 @@ def region_panel(plan: FloorPlan, pose: Pose, axes: Axes, title: str) -> None:
 def cells_panel(plan: FloorPlan, pose: Pose, axes: Axes, method: FieldOfView, title: str) -> None:
     """Draw the cells in view of a pose by a method."""
     _ground(plan, axes, title)
-    x, y = plan.lattice.to_lattice((pose.x, pose.y)).tolist()
+    x, y = plan.lattice.point_at((pose.x, pose.y))
     heading = round(pose.heading_deg / 360 * TURN) % TURN
     mask = method.cells(Home(plan), x, y, heading, pose.reach(plan))
     layer_on_axes(plan, mask, axes)

@@ -182,7 +182,7 @@ class LiveEngine:
         if name not in actors:
             raise InputError(f"there is nobody named {name!r}")
         space, lattice = actors[name].space, self.simulation.home.plan.lattice
-        at = lattice.to_lattice(place).tolist()
+        at = lattice.point_at(place)
         part = space.part_at(*at)
         if part < 0:
             part = space.part_near(*at)

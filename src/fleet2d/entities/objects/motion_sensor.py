@@ -37,7 +37,7 @@ class MotionSensor(Sensor):
 
     def start(self, home: Home, step_us: int) -> None:
         """Find its place."""
-        x, y = home.plan.lattice.to_lattice(self.at).tolist()
+        x, y = home.plan.lattice.point_at(self.at)
         if home.plan.room_at(*self.at) is None:
             raise PlacementError(
                 f"({self.at[0]:g}, {self.at[1]:g}) m is outside the home: hang the sensor in a room"

@@ -51,6 +51,6 @@ class SmartPlug(Sensor):
         there = np.zeros(still.shape, np.bool_)
         reach = round(self.reach * lattice.units_per_m)
         for use in home.object(self.of).uses:
-            at_x, at_y = lattice.to_lattice((use.x, use.y)).tolist()
+            at_x, at_y = lattice.point_at((use.x, use.y))
             there |= (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2 <= reach * reach
         return seen_by(there & still & view.present[: view.users, 1:], view.first)

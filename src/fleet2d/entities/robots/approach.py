@@ -45,7 +45,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> Spot:
     actor, lattice = now.actor, now.home.plan.lattice
     here = (actor.state.x, actor.state.y)
     person = lattice.to_lattice((x, y))
-    goal = lattice.to_lattice(now.nearest_free(x, y)).tolist()
+    goal = lattice.point_at(now.nearest_free(x, y))
     route = actor.space.route(here, (goal[0], goal[1]))
     reach = distance * lattice.units_per_m
     if route is None or _distance(person, here) <= reach:
@@ -74,7 +74,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> Spot:
     """
     actor, home = now.actor, now.home
     lattice, here = home.plan.lattice, (actor.state.x, actor.state.y)
-    person = lattice.to_lattice((x, y)).tolist()
+    person = lattice.point_at((x, y))
     reach = math.ceil(distance * lattice.units_per_m)
     if _distance(person, here) >= reach:
         return here

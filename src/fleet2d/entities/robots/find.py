@@ -192,7 +192,7 @@ class Find(Behavior):
         back = spot_back(now, x, y, self.distance)
         if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
             plan.go_to_point(*back)
-        face(plan, *now.home.plan.lattice.to_lattice((x, y)).tolist())
+        face(plan, *now.home.plan.lattice.point_at((x, y)))
         return plan.stay(self.stay)
 
     def _look_on(self, now: Situation, plan: Plan) -> Plan | None:

@@ -97,7 +97,7 @@ class Follow(Behavior):
         self.pause = min(2 * self.pause, max(SELDOM, self.update)) if rests else self.update
         self.last = x, y
         approach(now, plan, x, y, self.distance)
-        face(plan, *now.home.plan.lattice.to_lattice((x, y)).tolist())
+        face(plan, *now.home.plan.lattice.point_at((x, y)))
         until = now.time + self.pause
         if self.longest:
             until = min(until, self.since + self.longest)

@@ -198,7 +198,7 @@ class Hangout(Behavior):
     def _face_people(self, now: Situation, plan: Plan) -> None:
         """Turn to the middle of the room that it stands in."""
         room = now.home.plan.rooms[int(self.places.room[self.place])]
-        x, y = now.home.plan.lattice.to_lattice(room.anchor_xy).tolist()
+        x, y = now.home.plan.lattice.point_at(room.anchor_xy)
         if (x, y) != (plan.x, plan.y):
             face(plan, x, y)
 

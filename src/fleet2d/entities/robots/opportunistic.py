@@ -67,6 +67,6 @@ class Opportunistic(Behavior):
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note("approaches", name)
         approach(now, plan, x, y, self.distance)
-        face(plan, *now.home.plan.lattice.to_lattice((x, y)).tolist())
+        face(plan, *now.home.plan.lattice.point_at((x, y)))
         plan.note("interacts", name).stay(self.interaction)
         return plan.note("interaction_over", name)

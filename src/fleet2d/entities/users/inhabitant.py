@@ -14,8 +14,9 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Seat, Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.kernels.headings import TURN, turn_between
+from fleet2d.kernels.random import Bits
 from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.laws import KNOTS, Bits, Law, exponential
+from fleet2d.routines.laws import KNOTS, Law, exponential
 from fleet2d.routines.planner import NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
 

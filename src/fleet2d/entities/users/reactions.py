@@ -146,7 +146,7 @@ class Reactions(Behavior):
 
 
 def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
-    x, y = now.home.plan.lattice.to_lattice((event.x, event.y)).tolist()
+    x, y = now.home.plan.lattice.point_at((event.x, event.y))
     return x, y
 
 

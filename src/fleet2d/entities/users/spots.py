@@ -73,8 +73,7 @@ class Spots:
 
     def in_metres(self, x: int, y: int) -> "Point":
         """Return a lattice point [m]."""
-        xy: Point = tuple(self._actor.home.plan.lattice.to_metres((x, y)).tolist())
-        return xy
+        return self._actor.home.plan.lattice.xy_of(x, y)
 
     def room_at(self, x: int, y: int) -> "Room | None":
         """Return the room that holds a lattice point."""
@@ -114,8 +113,7 @@ class Spots:
         seats: list[Seat] = []
         for kind in kinds:
             for thing in (thing for thing in home.objects if thing.type == kind):
-                centre = thing.footprint.centroid
-                room = home.plan.room_at(centre.x, centre.y)
+                room = home.room_of(thing)
                 if room is not None and room.index in indices:
                     usable = [i for i, use in enumerate(thing.uses) if self._gets_to(use)]
                     fit = [i for i in usable if thing.uses[i].posture == posture]
@@ -126,11 +124,8 @@ class Spots:
 
     def _gets_to(self, use: "UsePlace") -> bool:
         """Tell whether the body gets to a place at furniture, from nearby if that is too tight."""
-        space = self._actor.space
         at = (use.x, use.y) if use.approach is None else use.approach
-        x, y = self._actor.home.plan.lattice.to_lattice(at).tolist()
-        there = space.part_at(x, y)
-        return (space.part_near(x, y) if there < 0 else there) == self._actor.part
+        return self._actor.space.part_about(at) == self._actor.part
 
     def _grid(self, room: "Room") -> list[Spot]:
         """Return the spots of a room: a grid of cells, a tighter one in a small room."""

@@ -100,7 +100,7 @@ def _distances(home: "Home", space: "Space") -> F64:
     lattice = home.plan.lattice
     places = []
     for room in home.rooms:
-        x, y = lattice.to_lattice(room.anchor_xy).tolist()
+        x, y = lattice.point_at(room.anchor_xy)
         places.append(space.nearest(x, y, None, room.index) or (x, y))
     columns, rows = np.array(places, np.int64).reshape(-1, 2).T // SUB
     metres = np.array([space.distance_field(np.array([place]))[rows, columns] for place in places])

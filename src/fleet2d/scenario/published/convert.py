@@ -109,7 +109,7 @@ def _move_starts(
             space = home.space(entity.radius)
         except InputError as error:
             raise reader.wrong((*paths[name], "radius"), str(error)) from None
-        x, y = lattice.to_lattice(start).tolist()
+        x, y = lattice.point_at(start)
         near = space.nearest(x, y, 0)
         if space.part_at(x, y) >= 0 or near is None:
             continue
