@@ -105,6 +105,8 @@ def hostile() -> dict[str, bytes]:
 
     from fleet2d.artifacts.lock import RunLock
     from fleet2d.engine.simulation import Simulation
+    from fleet2d.studies.journal import Journal
+    from fleet2d.viewer.serve import PageServer
 
     dotted = b"\x80\x04\x8c\x13fleet2d.paper.speed\x8c\x10subprocess.Popen\x93\x8c\x04true\x85R."
     imported = b"\x80\x04\x8c\x17fleet2d.artifacts.store\x8c\x04Path\x93\x8c\x01x\x85R."
@@ -114,6 +116,8 @@ def hostile() -> dict[str, bytes]:
         "imported by us": dotted,
         "another's class in our module": imported,
         "a simulation": pickle.dumps(Call(Simulation, {})),
+        "a journal of a study": pickle.dumps(Call(Journal, Path("x"))),
+        "a server": pickle.dumps(Call(PageServer, [])),
         "a lock": pickle.dumps(Call(RunLock, Path("/tmp"))),
         "eval": pickle.dumps(Call(eval, "1")),
         "objects from bytes": pickle.dumps(Call(np.ndarray, (1,), "O", bytes(8))),

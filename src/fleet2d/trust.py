@@ -1,6 +1,6 @@
 """Whose code may run: none of a stored run or of a stranger's scenario, unless it is named."""
 
-import re
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -10,8 +10,8 @@ from typing import Any, Self
 
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
 
-# 'folder/package.module:Class', as a scenario names a component of its own.
-_OWN = re.compile(r"[^:]+:[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+# Files that a message lists.
+_MOST_LISTED = 20
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,28 @@ def restricted(trust: Trust) -> Iterator[None]:
         _TRUST.reset(token)
 
 
+@contextmanager
+def of_others(trust: Trust | None = None) -> Iterator[None]:
+    """Restrict what is read from a stored run: to what the command line or a caller trusts."""
+    with restricted(_TRUST.get() or trust or Trust()):
+        yield
+
+
+def current_trust() -> Trust | None:
+    """Return what is trusted now; None where all code is the user's own."""
+    return _TRUST.get()
+
+
+@contextmanager
+def under(trust: Trust | None) -> Iterator[None]:
+    """Restrict as another process did, of which `current_trust` was sent."""
+    token = _TRUST.set(trust)
+    try:
+        yield
+    finally:
+        _TRUST.reset(token)
+
+
 def check_trust(name: str, files: Sequence[Path]) -> None:
     """Refuse to import a component of a scenario's own whose files aren't trusted.
 
@@ -81,27 +103,49 @@ def check_trust(name: str, files: Sequence[Path]) -> None:
             raise ScenarioError(f"{name!r} would run {file}: name it by --trust if you trust it")
 
 
+def check_code(what: str, content: object) -> None:
+    """List the code that a scenario or a study would run, unless all of it may run now.
+
+    Args:
+        what: What is to be run, for the message.
+        content: It as plain data.
+
+    Raises:
+        ScenarioError: Something would run that isn't trusted; nothing has run.
+    """
+    trust = _TRUST.get()
+    if trust is not None and (refusal := _refusal(what, content, trust)):
+        raise ScenarioError(refusal)
+
+
 def refuse_untrusted(directory: Path, scenario: Mapping[str, Any], trust: Trust) -> None:
     """List the code that a stored scenario would run, unless all of it is trusted.
 
     Raises:
         RunDirectoryError: Something would run that isn't trusted; nothing has run.
     """
-    code = code_of(scenario)
-    foreign = {file: names for file, names in code.items() if not trust.allows(file)}
+    if refusal := _refusal(str(directory), scenario, trust):
+        raise RunDirectoryError(refusal)
+
+
+def _refusal(what: str, content: object, trust: Trust) -> str:
+    """Return what there is to say of code that isn't trusted; empty if all of it is."""
+    foreign = {file: names for file, names in code_of(content).items() if not trust.allows(file)}
     if not foreign:
-        return
-    lines = [f"  {file} ({', '.join(names)})" for file, names in foreign.items()]
-    named = " ".join(f"--trust {file}" for file in foreign)
-    raise RunDirectoryError(
-        "\n".join(
-            [
-                f"{directory} is of a scenario with components of its own, which would run:",
-                *lines,
-                "None of it has run. Read it; if you trust it, and what it imports, say so:"
-                f" {named}",
-            ]
-        )
+        return ""
+    lines = [
+        f"  {file} ({', '.join(names[:3])}{', …' * (len(names) > 3)})"
+        for file, names in list(foreign.items())[:_MOST_LISTED]
+    ]
+    if len(foreign) > _MOST_LISTED:
+        lines.append(f"  … {len(foreign) - _MOST_LISTED} more")
+    named = " ".join(f"--trust {shlex.quote(str(file))}" for file in list(foreign)[:_MOST_LISTED])
+    return "\n".join(
+        [
+            f"{what} has components of its own, which would run:",
+            *lines,
+            f"None of it has run. Read it; if you trust it, and what it imports, say so: {named}",
+        ]
     )
 
 
@@ -136,5 +180,13 @@ def _types(value: object, where: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     elif isinstance(value, list | tuple):
         for index, entry in enumerate(value):
             yield from _types(entry, (*where, str(index)))
-    elif isinstance(value, str) and _OWN.fullmatch(value):
+    elif isinstance(value, str) and _names_code(value):
         yield ".".join(where), value
+
+
+def _names_code(text: str) -> bool:
+    """Whether a text is written as a component of a scenario's own is: 'folder/module:Class'."""
+    path, colon, qualname = text.rpartition(":")
+    module = path.removesuffix(".py").rpartition("/")[2]
+    parts = (*module.split("."), *qualname.split("."))
+    return bool(colon) and all(part.isidentifier() for part in parts)

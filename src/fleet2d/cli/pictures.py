@@ -7,6 +7,7 @@ import typer
 
 from fleet2d.cli.arguments import Resolution, file_name
 from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
 Figure = Annotated[
     Literal["life", "heat", "strip"],
@@ -54,6 +55,8 @@ def show(
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Of a run: where it ends.")] = None,
     figure: Figure = "life",
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
     if diary:
@@ -72,7 +75,8 @@ def show(
             " directory, --fov for a floor plan"
         )
     if what is not None and is_run:
-        target = _draw_run(what, out, stretch)
+        with restricting(trust, trust_dir):
+            target = _draw_run(what, out, stretch)
     elif what is not None and what.is_dir():
         raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
     elif what is not None and not what.exists() and what.parent != Path():

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.cli.arguments import TrustFiles, TrustFolders, trust_of
 from fleet2d.cli.runs import run_with_progress
 from fleet2d.cli.summary import print_summary, summary_of
+from fleet2d.trust_options import TrustFiles, TrustFolders, trust_of
 
 
 def resume(

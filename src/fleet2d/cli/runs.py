@@ -13,6 +13,7 @@ import typer
 from fleet2d.cli.arguments import file_name, split
 from fleet2d.cli.summary import print_summary, summary_of
 from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
@@ -69,6 +70,8 @@ def export(
         str | None, typer.Option("--from", help="Of the page: where it begins, 'day 3 18:30'.")
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Of the page: where it ends.")] = None,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Write a run for others: the page as one file, or sensors in the layout of CASAS."""
     from fleet2d.artifacts.reader import open_run
@@ -87,7 +90,8 @@ def export(
         from fleet2d.viewer.moments import steps_of
 
         first, last = steps_of(run, begin, end)
-        export_html(run, html, first, last)
+        with restricting(trust, trust_dir):
+            export_html(run, html, first, last)
         typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
 
 

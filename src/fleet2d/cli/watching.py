@@ -7,6 +7,7 @@ import typer
 
 from fleet2d.cli.arguments import split
 from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
 
 def view(
@@ -21,6 +22,8 @@ def view(
     browser: Annotated[bool, typer.Option(help="Whether to open the browser.")] = True,
     seed: Annotated[int | None, typer.Option(help="Of a scenario: its seed.")] = None,
     out: Annotated[Path | None, typer.Option(help="Of a scenario: directory of the run.")] = None,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Show runs in the browser, on this machine only; end it with Ctrl-C."""
     names = list(what or [])
@@ -28,22 +31,26 @@ def view(
     if names and all(path.is_dir() for path in directories):
         if seed is not None or out is not None:
             raise InputError("--seed and --out are for a scenario, not for stored runs")
-        _view_runs(directories, port, browser=browser)
+        with restricting(trust, trust_dir):
+            if trust or trust_dir:
+                _import_code(directories)
+            _view_runs(directories, port, browser=browser)
         return
     scenario, overrides = split(names)
     if scenario is not None and scenario.endswith("/"):
         raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
     from fleet2d.viewer.live import watch_scenario
 
-    watch_scenario(
-        scenario,
-        overrides,
-        seed=seed,
-        out=out,
-        port=port,
-        open_browser=browser,
-        announce=_announce,
-    )
+    with restricting(trust, trust_dir):
+        watch_scenario(
+            scenario,
+            overrides,
+            seed=seed,
+            out=out,
+            port=port,
+            open_browser=browser,
+            announce=_announce,
+        )
 
 
 def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
@@ -60,6 +67,15 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
     serve(directories, port=port, open_browser=browser, announce=_announce)
 
 
+def _import_code(directories: list[Path]) -> None:
+    """Import what is trusted of some runs now: the threads of the server trust nothing."""
+    from fleet2d.artifacts.reader import open_run
+    from fleet2d.scenario.model import load_scenario
+
+    for directory in directories:
+        load_scenario(open_run(directory).manifest["scenario"])
+
+
 def _announce(address: str) -> None:
     typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")
 
@@ -73,6 +89,8 @@ def film(
     end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
     speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
     height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Make a film of a stretch of a stored run."""
     from fleet2d.artifacts.reader import open_run
@@ -82,18 +100,22 @@ def film(
     run = open_run(directory)
     first, last = steps_of(run, begin, end)
     target = out or directory / "film.mp4"
-    frames = write_film(run, target, first, last, speed=speed, height=height)
+    with restricting(trust, trust_dir):
+        frames = write_film(run, target, first, last, speed=speed, height=height)
     typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
 
 
 def report(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
     out: Annotated[Path | None, typer.Option(help="HTML file to write.")] = None,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Write a report of a stored run: what ran, metrics, figures, how to run it again."""
     from fleet2d.artifacts.reader import open_run
     from fleet2d.viewer.report import write_report
 
     target = out or directory / "report.html"
-    write_report(open_run(directory), target)
+    with restricting(trust, trust_dir):
+        write_report(open_run(directory), target)
     typer.echo(target)

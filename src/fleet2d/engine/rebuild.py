@@ -26,10 +26,14 @@ from fleet2d.kernels.motion import (
     trace_track,
 )
 from fleet2d.scenario.model import load_scenario
+from fleet2d.trust import of_others
 from fleet2d.units import micros
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
+
+# Sections of a scenario that say how bodies move; code of the others isn't needed, nor imported.
+_BODIES = ("simulation", "floorplan", "users", "robots")
 
 I64 = NDArray[np.int64]
 
@@ -194,7 +198,9 @@ def _follow_walk(
 
 def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
     """Return the body as it was configured, to walk its random walk again."""
-    scenario = load_scenario(run.manifest["scenario"])
+    stored = run.manifest["scenario"]
+    with of_others():
+        scenario = load_scenario({key: stored[key] for key in _BODIES if key in stored})
     bucket = "users" if entity in scenario.users else "robots"
     configured = {**scenario.users, **scenario.robots}[entity]
     home = Home(plan)

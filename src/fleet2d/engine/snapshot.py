@@ -83,12 +83,16 @@ _NO_STATE = (
     "fleet2d.engine.simulation",
     "fleet2d.engine.snapshot",
     "fleet2d.fit",
+    "fleet2d.leaves",
     "fleet2d.outside",
     "fleet2d.paper",
     "fleet2d.scenario",
+    "fleet2d.studies",
     "fleet2d.testing",
     "fleet2d.trust",
+    "fleet2d.trust_options",
     "fleet2d.view",
+    "fleet2d.viewer",
 )
 
 MAGIC = b"fleet2d simulation"

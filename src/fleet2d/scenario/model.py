@@ -28,6 +28,7 @@ from fleet2d.scenario.compose import compose
 from fleet2d.scenario.document import Document
 from fleet2d.scenario.explain import explain
 from fleet2d.sight.settings import SightSettings
+from fleet2d.trust import check_code
 from fleet2d.units import Duration, PositiveDuration, format_duration, micros
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -261,6 +262,7 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
     Raises:
         ScenarioError: as `load_scenario`.
     """
+    check_code("the scenario", document.data)
     try:
         scenario = Scenario.model_validate(document.data)
     except ValidationError as error:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from fleet2d.errors import InputError
+from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import Checked
@@ -53,19 +54,22 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Run a study, or what is missing of it."""
     from fleet2d.studies.api import default_location, make_executor
     from fleet2d.studies.driver import RunOptions, check_study, run_study
     from fleet2d.studies.progress import observing
 
-    checked = check_study(source)
-    if dry_run:
-        _print_plan(checked, workers)
-        return
+    with restricting(trust, trust_dir):
+        checked = check_study(source)
+        if dry_run:
+            _print_plan(checked, workers)
+            return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # what is loaded lives to the end, which comes at once then
-    with _terminated_as_interrupted():
+    with _terminated_as_interrupted(), restricting(trust, trust_dir):
         try:
             with observing(show=sys.stderr.isatty() and not quiet) as observer:
                 options = RunOptions(fail_fast, changed, observer)
@@ -116,6 +120,8 @@ def rerun(
         str, typer.Argument(metavar="VARIANT", help="Its number, or the start of its identity.")
     ],
     out: Annotated[Path | None, typer.Option(help="Store the run in this directory.")] = None,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Run one variant again, and compare it with what is stored."""
     from fleet2d.studies.reader import open_study
@@ -126,7 +132,8 @@ def rerun(
     stored = next(row for row in rows if row["variant"] == number)
     words = ", ".join(f"{c} = {stored[c]}" for c in study.columns if stored[c] is not None)
     typer.echo(f"variant {number}: {words}")
-    found = study.rerun(number, out)
+    with restricting(trust, trust_dir):
+        found = study.rerun(number, out)
     if out is not None:
         typer.echo(f"stored in {out}")
     if stored["digest"] is None:
@@ -231,6 +238,8 @@ def tune(
         Literal["local", "ray", "serial"], typer.Option(help="Where the workers are.")
     ] = "local",
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
     """Search parameters on training homes, and judge what is found on homes not seen."""
     from fleet2d.studies.api import default_location, make_executor
@@ -238,9 +247,10 @@ def tune(
     from fleet2d.studies.specification import read_specification
     from fleet2d.studies.tune import tune as search
 
-    specification = read_specification(source)
+    with restricting(trust, trust_dir):
+        specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    with _terminated_as_interrupted():
+    with _terminated_as_interrupted(), restricting(trust, trust_dir):
         try:
             with observing_trials(show=sys.stderr.isatty() and not quiet) as observer:
                 found = search(specification, folder, make_executor(executor, workers), observer)

@@ -2,7 +2,7 @@
 
 import pickle
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from fleet2d.errors import Fleet2DError
@@ -10,6 +10,7 @@ from fleet2d.studies.design import Design
 from fleet2d.studies.engine import Outcome, check_setup, describe_error, execute, run_scenario
 from fleet2d.studies.identity import FileHashes, identity, input_hash, scenario_content
 from fleet2d.studies.record import Task, record_of
+from fleet2d.trust import Trust, current_trust, under
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
@@ -31,26 +32,29 @@ class StudyJob:
         design: The design.
         metrics: Patterns of the numbers to keep.
         tables: Names of the tables to keep.
+        trust: Whose code may run, in whichever process.
     """
 
     design: Design
     metrics: tuple[str, ...]
     tables: tuple[str, ...]
+    trust: Trust | None = field(default_factory=current_trust)
 
     def __call__(self, task: Task) -> bytes:
         """Run a variant; return its record. What goes wrong in it is part of the record."""
+        with under(self.trust):
+            return record_of(task, self._outcome(task)).encode()
+
+    def _outcome(self, task: Task) -> Outcome:
         try:
             scenario = self.design.scenario(task.index)
             inputs = input_hash(scenario, self._files)
         except Fleet2DError as error:  # a file has changed since it was planned
-            outcome = Outcome("failed", error=describe_error(error))
-        else:
-            found, _ = identity(scenario_content(scenario), inputs)
-            if found == task.identity:
-                outcome = execute(scenario, self.metrics, self.tables)
-            else:
-                outcome = Outcome("failed", error=CHANGED)
-        return record_of(task, outcome).encode()
+            return Outcome("failed", error=describe_error(error))
+        found, _ = identity(scenario_content(scenario), inputs)
+        if found == task.identity:
+            return execute(scenario, self.metrics, self.tables)
+        return Outcome("failed", error=CHANGED)
 
     def __post_init__(self) -> None:
         """Begin without knowing any file."""
@@ -69,14 +73,17 @@ class SetupJob:
 
     Attributes:
         design: The design.
+        trust: Whose code may run, in whichever process.
     """
 
     design: Design
+    trust: Trust | None = field(default_factory=current_trust)
 
     def __call__(self, task: Task) -> bytes:
         """Return what is wrong with a variant; nothing if nothing is."""
         try:
-            check_setup(self.design.scenario(task.index))
+            with under(self.trust):
+                check_setup(self.design.scenario(task.index))
         except Fleet2DError as error:
             return str(error).encode()
         return b""

@@ -1,6 +1,6 @@
 """Reading a study: its variants and its tables as one data set, without loading all of it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -22,6 +22,7 @@ from fleet2d.studies.parts import (
     with_variant,
 )
 from fleet2d.studies.results import Counts, variants_table
+from fleet2d.trust import Trust, of_others
 
 if TYPE_CHECKING:
     import duckdb
@@ -209,18 +210,29 @@ class Study:
         """
         return stored_scenario(self._directory, variant)
 
-    def rerun(self, variant: int, out: str | Path | None = None, **settings: Any) -> "Run":
+    def rerun(
+        self,
+        variant: int,
+        out: str | Path | None = None,
+        *,
+        trust: Iterable[str | Path] = (),
+        **settings: Any,
+    ) -> "Run":
         """Run one variant again.
 
         Args:
             variant: Its number.
             out: Where to store the run; None: in memory.
+            trust: Files and folders of code that may be run, if the scenario has components of its
+                own that aren't loaded yet.
             settings: Changes, as `fleet2d.run` takes them, such as more `artifacts`.
 
         Raises:
             RunDirectoryError: There is no such variant, or the directory can't be used.
+            ScenarioError: Its code isn't trusted.
         """
-        return run_scenario(self.scenario(variant), out, **settings)
+        with of_others(Trust.of(trust)):
+            return run_scenario(self.scenario(variant), out, **settings)
 
     # Answers
 

@@ -18,6 +18,7 @@ from fleet2d.scenario.explain import explain
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis
 from fleet2d.studies.tune_settings import TuneSettings
+from fleet2d.trust import check_code
 
 SEED = "seed"
 RESERVED = (
@@ -214,7 +215,9 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
         file = StudyFile.model_validate(document.data)
     except ValidationError as error:
         raise explain(error, document) from None
-    return Specification(file, document, _base(file.base, document), folder, path)
+    base = _base(file.base, document)
+    check_code(str(path or "the study"), [document.data, base.data])
+    return Specification(file, document, base, folder, path)
 
 
 def _base(base: Any, document: Document) -> Document:

@@ -16,6 +16,7 @@ from fleet2d.studies.engine import describe_error, flat_numbers, run_scenario
 from fleet2d.studies.record import Task
 from fleet2d.studies.sampling import Parameter, rounded
 from fleet2d.studies.schedule import Schedule
+from fleet2d.trust import Trust, current_trust, under
 
 if TYPE_CHECKING:
     import optuna
@@ -46,11 +47,13 @@ class TrialJob:
         design: The variants.
         search: The searched parameters.
         objectives: The names of the numbers.
+        trust: Whose code may run, in whichever process.
     """
 
     design: Design
     search: Mapping[str, Parameter]
     objectives: tuple[str, ...]
+    trust: Trust | None = field(default_factory=current_trust)
 
     def scenario(
         self, index: int, settings: Mapping[str, Any], until_s: float | None = None
@@ -80,7 +83,8 @@ class TrialJob:
         """Return (objectives, error), pickled; one of them is None."""
         assert isinstance(task, TrialTask)
         try:
-            run = run_scenario(self.scenario(task.index, task.settings, task.until_s))
+            with under(self.trust):
+                run = run_scenario(self.scenario(task.index, task.settings, task.until_s))
             numbers = dict(flat_numbers(run.metrics))
             missing = [name for name in self.objectives if name not in numbers]
             if missing:

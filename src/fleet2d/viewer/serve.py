@@ -53,6 +53,7 @@ class PageServer:
         try:
             self._socket.bind((HOST, port))
         except (OSError, OverflowError) as error:
+            self._socket.close()
             raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
         host, self._port = self._socket.getsockname()[:2]
         self.listens_at: tuple[str, int] = (str(host), int(self._port))
