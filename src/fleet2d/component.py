@@ -50,6 +50,7 @@ PACKAGES = {
     "presence_model": "fleet2d.algorithms.presence",
     "metric": "fleet2d.metrics",
     "sight": "fleet2d.sight",
+    "intervention": "fleet2d.interventions",
 }
 """Where the built-in components of each kind live."""
 

@@ -33,6 +33,7 @@ class EventKind(StrEnum):
     # Of robots.
     APPROACHES = "approaches"
     BATTERY = "battery"
+    CALLED = "called"
     CALLS = "calls"
     CHARGED = "charged"
     DOCKS = "docks"

@@ -9,8 +9,8 @@ import pytest
 from tests.scenes import everything, scenario
 
 import fleet2d
-from fleet2d.engine.interventions import read_intervention
-from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
+from fleet2d.engine.interventions import OUTSIDE, Due, read_intervention
+from fleet2d.errors import InputError, PlacementError, ScenarioError
 from fleet2d.events import Event
 
 
@@ -191,7 +191,7 @@ def test_a_change_by_a_script_is_done_again() -> None:
     run = fleet2d.Simulation(content)
     run.advance(300)
     run.change(shut="kitchen_door")
-    with pytest.raises(ComponentError, match="no door 'x'"):
+    with pytest.raises(ScenarioError, match="no door 'x'"):
         run.change(shut="x")
     stored = run.run()
     interventions = stored.manifest["interventions"]
@@ -210,5 +210,6 @@ def test_a_branch_keeps_what_was_done_and_what_is_to_be_done() -> None:
 
 
 def test_interventions_are_read_as_they_are_written() -> None:
-    content = {"do": "put", "step": 3, "entity": "ana", "x": 1, "y": 2, "heading": 5}
-    assert content == read_intervention(content).model_dump(mode="json")
+    content = {"do": "put", "step": 3, "entity": "ana", "to": [1.5, 2.0], "heading_deg": 5.0}
+    step, act = read_intervention(content)
+    assert content == Due(step, OUTSIDE, 0, act).record

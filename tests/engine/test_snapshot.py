@@ -154,8 +154,7 @@ def test_a_copy_can_be_changed_without_the_other_noticing(way: str) -> None:
 @pytest.mark.parametrize("way", WAYS)
 def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way: str) -> None:
     content = everything("20 min")
-    x, y = Simulation(content).actors["ben"].find_anywhere("kitchen", 0, "there")
-    later = [{"do": "put", "step": 900, "entity": "ben", "x": x, "y": y, "heading": 5}]
+    later = [{"do": "put", "step": 900, "entity": "ben", "to": "kitchen", "heading_deg": 5}]
     simulation = Simulation(content, interventions=later)
     simulation.advance(100)
     simulation.replan("astro")

@@ -99,7 +99,7 @@ class Changes:
         if change.at is None:
             raise ScenarioError(f"changes.{index}: there is no 'at': say when it happens")
         try:
-            self._check(change)
+            self.check_names(change)
         except ScenarioError as error:
             raise ScenarioError(f"changes.{index}: {error}") from None
         self._put(self._step_of(change.at), change, "scenario")
@@ -122,7 +122,7 @@ class Changes:
             ComponentError: There is nothing of that name to change.
         """
         try:
-            self._check(change)
+            self.check_names(change)
         except ScenarioError as error:
             raise ComponentError(f"{by} asks for a change that can't be: {error}") from None
 
@@ -312,7 +312,7 @@ class Changes:
         elapsed = micros(at) if isinstance(at, timedelta) else self.clock.elapsed(at)
         return max(0, self.clock.step_at_or_after(elapsed))
 
-    def _check(self, change: HomeChange) -> None:
+    def check_names(self, change: HomeChange) -> None:
         """Refuse what names nothing that is there.
 
         Raises:

@@ -186,7 +186,7 @@ class Keeper:
     def _keep_interventions(self, state: State) -> None:
         """Let the manifest name what was done to the run so far."""
         manifest = self._store.manifest
-        all_of_them = [*state.done, *state.script]
-        if len(all_of_them) != len(manifest.interventions):
-            manifest.interventions = [each.model_dump(mode="json") for each in all_of_them]
+        records = state.interventions.records
+        if len(records) != len(manifest.interventions):
+            manifest.interventions = records
             self._store.keep("manifest.json", manifest.to_json())

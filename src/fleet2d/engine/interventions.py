@@ -1,127 +1,108 @@
-"""Interventions: what a script, a test or a person does to a run from outside.
+"""Interventions in a run: when each is done, and what the manifest keeps of it.
 
-They are data: each is kept with its step, so that a run is reproduced from its manifest. What is
-done at a step holds for everything in that step: interventions come before the floor plan.
+What was done from outside is kept with its step, so that a run is done again from its manifest.
+What the scenario's script did is kept with its place there, for readers: the scenario itself does
+it again.
 """
 
-from typing import Annotated, Any, Literal
+from bisect import insort
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
-from pydantic import Field, TypeAdapter
+from fleet2d.clock import Clock
+from fleet2d.interventions.intervention import Intervention, dump_intervention, parse_intervention
+from fleet2d.units import micros
 
-from fleet2d.component import Settings
-from fleet2d.engine.state import State
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.arbitration import Arbiter
-from fleet2d.entities.plan import Plan, Pose
-from fleet2d.errors import PlacementError
-from fleet2d.floorplan.change import HomeChange
-from fleet2d.kernels.headings import TURN
+# The order of what is due at one step.
+ENDS, SCRIPT, OUTSIDE = range(3)
 
 
-class Intervention(Settings):
-    """Something done to a run at a step."""
+class Due(NamedTuple):
+    """Something that is to be done at a step.
 
-    step: int = Field(ge=0, description="the step at which it is done")
+    Attributes:
+        step: The step.
+        rank: First what is over ends, then comes the scenario's script, then what is outside.
+        number: Of those, in the order in which they were asked for.
+        act: What is done, or ends.
+        by: Where in the scenario it stands, like "script.0"; empty for what comes from outside.
+    """
 
-    def apply(self, state: State) -> None:
-        """Do it at the present step."""
-        raise NotImplementedError
+    step: int
+    rank: int
+    number: int
+    act: Intervention
+    by: str = ""
 
+    @property
+    def ends(self) -> bool:
+        """Whether it is over at that step, and doesn't begin."""
+        return self.rank == ENDS
 
-class Put(Intervention):
-    """Put a body somewhere, at once; it decides anew from there."""
+    @property
+    def record(self) -> dict[str, Any]:
+        """What the manifest keeps of it.
 
-    do: Literal["put"] = "put"
-    entity: str = Field(description="name of the body")
-    x: int = Field(description="where its centre is put [lattice units]")
-    y: int = Field(description="where its centre is put [lattice units]")
-    heading: int = Field(ge=0, lt=TURN, description="heading [1/4096 turn]")
-
-    def apply(self, state: State) -> None:
-        """Put it there.
-
-        Raises:
-            PlacementError: A shut door, or furniture that was moved, leaves no room for it there.
+        Example:
+            >>> Due(60, OUTSIDE, 0, read_intervention({"replan": "astro"})[1]).record
+            {'do': 'replan', 'step': 60, 'entity': 'astro'}
         """
-        row, actor = _body(state, self.entity)
-        part = actor.space.part_at(self.x, self.y)
-        if part < 0:
-            x, y = actor.home.plan.lattice.to_metres((self.x, self.y)).round(2).tolist()
-            raise PlacementError(f"{actor.path}: there is no room for its body at ({x:g}, {y:g}) m")
-        actor.state, actor.part = Pose(self.x, self.y, self.heading, 0), part
-        state.recorder.move_body(row)
-        _decide_anew(actor, self.step)
+        fields = dump_intervention(self.act)
+        by = {"by": self.by} if self.by else {}
+        return {"do": fields.pop("do"), "step": self.step, **fields, **by}
 
 
-class Replan(Intervention):
-    """Let a body decide anew, whatever it is doing."""
+class Interventions:
+    """What is done to a run.
 
-    do: Literal["replan"] = "replan"
-    entity: str = Field(description="name of the body")
+    Attributes:
+        done: What was done, in order, as the manifest keeps it.
+    """
 
-    def apply(self, state: State) -> None:
-        """Ask its behaviors at the present step."""
-        _decide_anew(_body(state, self.entity)[1], self.step)
+    def __init__(self, clock: Clock) -> None:
+        self.done: list[dict[str, Any]] = []
+        self._clock = clock
+        self._queue: list[Due] = []
+        self._count = 0
 
+    def add(self, act: Intervention, step: int, rank: int = OUTSIDE, by: str = "") -> None:
+        """Let something be done at a step, after all of its rank that was added before."""
+        insort(self._queue, Due(step, rank, self._count, act, by), key=lambda due: due[:3])
+        self._count += 1
 
-class Change(Intervention):
-    """Change the home."""
+    def next_due(self) -> int | None:
+        """Return the step at which something is done next."""
+        return self._queue[0].step if self._queue else None
 
-    do: Literal["change"] = "change"
-    change: HomeChange = Field(description="what changes, as in `changes` of a scenario")
+    def take(self, step: int) -> Iterator[Due]:
+        """Yield what is due by a step, in order; keep what is begun, and let it end in time."""
+        while self._queue and self._queue[0].step <= step:
+            due = self._queue.pop(0)
+            yield due
+            if due.ends:
+                continue
+            self.done.append(due.record)
+            if due.act.lasts is not None:
+                ends = due.step * self._clock.step_us + micros(due.act.lasts)
+                self.add(due.act, max(self._clock.step_at_or_after(ends), due.step + 1), ENDS)
 
-    def apply(self, state: State) -> None:
-        """Let the floor plan take it up at the present step."""
-        state.changes.ask(self.change, self.step, "a script")
-
-
-class Drive(Intervention):
-    """Take the decisions of a body out of the hands of its behaviors."""
-
-    do: Literal["drive"] = "drive"
-    entity: str = Field(description="name of the body")
-
-    def apply(self, state: State) -> None:
-        """From now on it follows plans from outside, and stays where it is without one."""
-        row, actor = _body(state, self.entity)
-        actor.behaviors, actor.arbiter = [], Arbiter([])
-        state.driven.add(row)
-        _decide_anew(actor, self.step)
-
-
-class Decide(Intervention):
-    """Give a body that is driven from outside a plan."""
-
-    do: Literal["decide"] = "decide"
-    entity: str = Field(description="name of the body")
-    plan: dict[str, Any] = Field(description="the plan, as Plan.data() writes it")
-
-    def apply(self, state: State) -> None:
-        """Let the body follow the plan from the present step on."""
-        _, actor = _body(state, self.entity)
-        actor.choose(Plan.of(actor, self.step, self.plan))
-        _decide_anew(actor, self.step)
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """What was done, and what is to be done from outside at a known step."""
+        return [*self.done, *(due.record for due in self._queue if due.rank == OUTSIDE)]
 
 
-AnyIntervention = Annotated[Put | Replan | Change | Drive | Decide, Field(discriminator="do")]
-
-_ADAPTER: TypeAdapter[Intervention] = TypeAdapter(AnyIntervention)
-
-
-def read_intervention(content: Any) -> Intervention:
-    """Return an intervention as a manifest has it.
+def read_intervention(content: Mapping[str, Any]) -> tuple[int, Intervention]:
+    """Return the step and the intervention that a manifest has.
 
     Example:
-        >>> read_intervention({"do": "replan", "step": 60, "entity": "astro"}).step
+        >>> read_intervention({"do": "replan", "step": 60, "entity": "astro"})[0]
         60
     """
-    return _ADAPTER.validate_python(content)
+    fields = {key: value for key, value in content.items() if key not in ("step", "by")}
+    return int(content.get("step", 0)), parse_intervention(fields)
 
 
-def _body(state: State, name: str) -> tuple[int, Actor]:
-    return next((row, actor) for row, actor in enumerate(state.actors) if actor.name == name)
-
-
-def _decide_anew(actor: Actor, step: int) -> None:
-    actor.ask(step)
-    actor.arbiter.wake_step = None
+def is_from_outside(content: Mapping[str, Any]) -> bool:
+    """Tell whether an intervention of a manifest is none of the scenario's own script."""
+    return "by" not in content

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from fleet2d.algorithms.log import Log
 from fleet2d.blame import blame
 from fleet2d.engine.state import State
+from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
 from fleet2d.floorplan.change import HomeChanges
 
@@ -32,10 +33,15 @@ class Span:
 
 def intervene(state: State, span: Span) -> None:
     """Do what a script, a test or a person does at this step."""
-    while state.script and state.script[0].step <= span.first:
-        intervention = state.script.pop(0)
-        intervention.apply(state)
-        state.done.append(intervention)
+    due = state.interventions.next_due()
+    if due is None or due > span.first:
+        return
+    world = EngineWorld(state, span.first)
+    for each in state.interventions.take(span.first):
+        if each.ends:
+            each.act.end(world)
+        else:
+            each.act.begin(world)
 
 
 def change_home(state: State, span: Span) -> None:
@@ -83,7 +89,7 @@ def move(state: State, span: Span) -> None:
         state.learners.next_due(),
         state.changes.next_due(),
         state.layers.next_due(span.first),
-        state.next_intervention(),
+        state.interventions.next_due(),
     )
     for due in dues:
         if due is not None:

@@ -12,6 +12,7 @@ from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of
@@ -86,6 +87,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         recorder=recorder,
         store=store,
         events=EventStream([recorder, sensors, *([] if log is None else [log])]),
+        interventions=Interventions(clock),
         max_span=scenario.simulation.max_span,
     )
     for those in [*gazes, *cameras]:

@@ -14,9 +14,7 @@ from fleet2d.artifacts.reader import LEARNED_NAME, Run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.checkpoint import Checkpoint, Keeper
-from fleet2d.engine.interventions import (
-    read_intervention,
-)
+from fleet2d.engine.interventions import is_from_outside, read_intervention
 from fleet2d.engine.keeping import (
     deferred_interrupt,
     describe_end,
@@ -103,13 +101,16 @@ class Simulation(Steering):
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
         self._store = store
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
-        for intervention in interventions:
-            self._state.intervene(read_intervention(intervention))
+        # What the scenario's own script did, it does again.
+        outside = [dict(record) for record in interventions if is_from_outside(record)]
+        for record in outside:
+            step, act = read_intervention(record)
+            self._state.interventions.add(act, step)
         self._pace: Pace | None = None
         self._stopping = self._broken = False
         self._run: Run | None = None  # once it is finished
         describe_start(self._store.manifest, self.scenario, self.seed, self.clock, self.home.plan)
-        store.manifest.interventions = [*map(dict, interventions)]
+        store.manifest.interventions = outside
         self._keeper: Keeper | None = None
         if store.directory is not None:
             settings = scenario.artifacts
@@ -153,10 +154,11 @@ class Simulation(Steering):
 
     def catch_up(self, interventions: Sequence[Mapping[str, Any]]) -> None:
         """Let be done again what was done to the run after its checkpoint."""
-        known = [*self._state.done, *self._state.script]
-        for intervention in map(read_intervention, interventions):
-            if intervention not in known:
-                self._state.intervene(intervention)
+        known = self._state.interventions.records
+        for record in interventions:
+            if is_from_outside(record) and record not in known:
+                step, act = read_intervention(record)
+                self._state.interventions.add(act, step)
 
     # Copies
 
@@ -307,8 +309,7 @@ class Simulation(Steering):
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
         wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
-        done = [intervention.model_dump(mode="json") for intervention in state.done]
-        self._store.manifest.interventions = done
+        self._store.manifest.interventions = state.interventions.done
         describe_end(self._store.manifest, self.clock, self.step, results, wall_s, self._pace)
         self._store.close(status)
         self._run = self._store.run()

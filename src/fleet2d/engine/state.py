@@ -1,9 +1,7 @@
 """The state of a run: all that changes from step to step, and nothing else."""
 
-from bisect import insort
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +15,7 @@ from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
@@ -28,9 +27,6 @@ from fleet2d.events import Event, EventKind, EventStream
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
-
-if TYPE_CHECKING:
-    from fleet2d.engine.interventions import Intervention
 
 # The most steps that watchers take in together: the fewer, the more bodies there are.
 MOST_STEPS = 1 << 16
@@ -59,8 +55,7 @@ class State:
         max_span: The most steps of a span; None for as many as there is room for.
         settled: The step before which all watchers have taken everything in.
         pending: Events that interrupted the plan of a body, by its row, until it decides.
-        script: Interventions that are still to come, in order of their steps.
-        done: Those that were made.
+        interventions: What is done to the run from outside, and what was.
         driven: Rows of the bodies that are driven from outside.
         awaited: Kinds of events at which a script wants the span to end.
         notes_emitted: How many of the notes of each body's present plan have happened.
@@ -81,12 +76,11 @@ class State:
     recorder: Recorder
     store: RunStore
     events: EventStream
+    interventions: Interventions
     max_span: int | None
     watchers: list[Watcher] = field(init=False)
     settled: int = 0
     pending: dict[int, list[SightEvent]] = field(default_factory=dict)
-    script: "list[Intervention]" = field(default_factory=list)
-    done: "list[Intervention]" = field(default_factory=list)
     driven: set[int] = field(default_factory=set)
     awaited: frozenset[str] = frozenset()
     notes_emitted: list[int] = field(init=False)
@@ -108,15 +102,7 @@ class State:
         """The most steps that watchers take in together."""
         return max(LEAST_STEPS, min(MOST_STEPS, MOST_POSES // max(1, len(self.actors))))
 
-    # Interventions
-
-    def intervene(self, intervention: "Intervention") -> None:
-        """Let something be done at the step that it names, after all that is to be done before."""
-        insort(self.script, intervention, key=lambda later: later.step)
-
-    def next_intervention(self) -> int | None:
-        """Return the step at which something is done from outside next."""
-        return self.script[0].step if self.script else None
+    # Decisions of scripts
 
     def wait_for(self, kinds: frozenset[str]) -> None:
         """Let spans end at events of these kinds, besides those that algorithms wait for."""

@@ -1,7 +1,7 @@
 """Steering a simulation: looking at its state, stepping it, and doing things to it from outside."""
 
 import operator
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Any
@@ -11,21 +11,25 @@ from pydantic import ValidationError
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.reader import Run
 from fleet2d.clock import Clock, next_time
-from fleet2d.engine.interventions import Change, Decide, Drive, Intervention, Put, Replan
 from fleet2d.engine.state import State
+from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.events import Event, EventKind, Listener
 from fleet2d.floorplan.change import HomeChange
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels.headings import TURN, in_radians
+from fleet2d.interventions.bodies import Decide, Drive
+from fleet2d.interventions.home import Change
+from fleet2d.interventions.intervention import Intervention, parse_intervention
+from fleet2d.interventions.verbs import Verbs
+from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 from fleet2d.units import parse_duration
 
 
-class Steering(ABC):
+class Steering(Verbs):
     """What scripts, tests and outside minds may see of a simulation, and do to it.
 
     Attributes:
@@ -227,13 +231,27 @@ class Steering(ABC):
 
     # Interventions: each is kept in the manifest, and done again by `reproduce`.
 
-    def replan(self, name: str) -> None:
-        """Let a body's behaviors decide anew at the present step, whatever it is doing.
+    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
+        """Do something at the present step: an intervention, or one as a script has it.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: It is none, or there is nothing of that name.
+            PlacementError: There is no such place, or nobody gets there.
+            InputError: The run is finished.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.intervene({"put": "ana", "to": "kitchen"})
+            >>> simulation.run().manifest["interventions"]
+            [{'do': 'put', 'step': 0, 'entity': 'ana', 'to': 'kitchen'}]
         """
-        self._intervene(Replan(step=self.step, entity=self._body(name).name))
+        if self._run is not None:
+            raise InputError("the run is finished: nothing can be done to it any more")
+        if isinstance(act, Mapping):
+            act = parse_intervention(act)
+        act.check(EngineWorld(self._state, self.step))
+        self._state.interventions.add(act, self.step)
 
     def change(self, change: HomeChange | None = None, /, **what: Any) -> None:
         """Change the home at the present step: ``simulation.change(shut="bath_door")``.
@@ -243,42 +261,13 @@ class Steering(ABC):
             what: its keys, as in the scenario's `changes`.
 
         Raises:
-            ScenarioError: The keys are no change.
-            ComponentError: There is nothing of that name.
+            ScenarioError: The keys are no change, or there is nothing of that name.
         """
         try:
             asked = HomeChange(**what) if change is None else change
         except ValidationError as error:
             raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
-        self._state.changes.check(asked, "a script")
-        self._intervene(Change(step=self.step, change=asked))
-
-    def put(self, name: str, place: Any, heading_deg: float | None = None) -> None:
-        """Put a body somewhere at the present step, as if it were carried; it decides anew there.
-
-        Args:
-            name: The body.
-            place: A room, a list of kinds of rooms, or a point (x, y) [m].
-            heading_deg: Where it faces, counter-clockwise from +x; None: as before.
-
-        Raises:
-            ScenarioError: There is nobody of that name.
-            PlacementError: There is no such place, or its body doesn't fit there.
-
-        Example:
-            >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.put("ana", "kitchen")
-            >>> simulation.advance()
-            >>> simulation.state["ana"]["room"].startswith("kitchen")
-            True
-        """
-        actor = self._body(name)
-        x, y = actor.find_anywhere(place, self.step * self.clock.step_us, "put")
-        heading = actor.state.heading
-        if heading_deg is not None:
-            heading = round(heading_deg / 360 * TURN) % TURN
-        self._intervene(Put(step=self.step, entity=name, x=x, y=y, heading=heading))
+        self.intervene(Change(change=asked))
 
     def drive(self, name: str) -> None:
         """Take the decisions of a body into one's own hands: see `pending` and `advance`.
@@ -287,7 +276,7 @@ class Steering(ABC):
             ScenarioError: There is nobody of that name.
         """
         row = list(self.actors).index(self._body(name).name)
-        self._intervene(Drive(step=self.step, entity=name))
+        self.intervene(Drive(entity=name))
         self._state.driven.add(row)
         self._state.bodies.ask_at[row] = self.step
 
@@ -317,7 +306,7 @@ class Steering(ABC):
         row = list(self.actors).index(self._body(name).name)
         if row not in self._state.driven:
             raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
-        self._intervene(Decide(step=self.step, entity=name, plan=plan.data()))
+        self.intervene(Decide(entity=name, plan=plan.data()))
 
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""
@@ -341,11 +330,6 @@ class Steering(ABC):
                 f" There are: {', '.join(actors)}"
             )
         return actors[name]
-
-    def _intervene(self, intervention: Intervention) -> None:
-        if self._run is not None:
-            raise InputError("the run is finished: nothing can be done to it any more")
-        self._state.intervene(intervention)
 
     def _state_of(self, actor: Actor) -> dict[str, Any]:
         state = actor.state

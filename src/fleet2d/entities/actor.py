@@ -12,11 +12,12 @@ from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.battery import Charge
-from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
+from fleet2d.entities.behavior import Attention, Behavior, Command, SightEvent, Situation
 from fleet2d.entities.entity import Entity
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
 from fleet2d.entities.kinds import is_kind
+from fleet2d.entities.orders import Order
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, Pose
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
@@ -111,6 +112,8 @@ class Actor:
             pays = ((behavior, behavior.attention(self)) for behavior in self.behaviors)
             self._attentive = next((pair for pair in pays if pair[1] is not None), None)
         self.arbiter = Arbiter(self.behaviors)
+        self.order: Order | None = None  # what it does in place of its behaviors
+        self.command: Command | None = None  # what it was called to do, and hasn't taken up
         self._chosen: Plan | None = None
         self._waiting: Waiting | None = None
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
@@ -150,6 +153,29 @@ class Actor:
         """Take a plan from outside as its next decision, which is due now."""
         self._chosen, self._waiting = plan, None
 
+    def obey(self, order: Order | None, step: int) -> None:
+        """Follow an order from a step on, in place of its behaviors; None: hand back to them."""
+        self.order, self._waiting, self.arbiter.own = order, None, frozenset()
+        self.decide_anew(step)
+
+    def decide_anew(self, step: int) -> None:
+        """Ask all its behaviors at a step, whatever it is doing."""
+        self.ask(step)
+        self.arbiter.wake_step = None
+
+    def hear(self, command: Command, step: int) -> bool:
+        """Keep a command until a behavior takes it up; tell whether one is to be asked now.
+
+        One behind the behavior that has its way has to wait for its turn.
+        """
+        self.command = command
+        takers = (i for i, behavior in enumerate(self.behaviors) if behavior.takes(command))
+        first, active = next(takers, None), self.arbiter.active
+        now = self.order is None and first is not None and (active is None or first <= active)
+        if now:
+            self.decide_anew(step)
+        return now
+
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
@@ -181,6 +207,8 @@ class Actor:
 
     def heeds(self, event: SightEvent, step: int) -> bool:
         """Tell whether it reacts to what a robot does."""
+        if self.order is not None:
+            return False
         return self._attentive is not None and self._attentive[0].heeds(self, event, step)
 
     @property
@@ -342,7 +370,7 @@ class Actor:
             self.charge.follow(self.motion, now.step * self.clock.step_us)
             if self.charge.is_empty:
                 return False
-        if self._chosen is not None:  # from outside
+        if self._chosen is not None or self.order is not None:  # from outside
             return False
         with blame(self.path, now.step):
             found = self.arbiter.goes_on(now, self.plan, self._asked)
@@ -361,6 +389,9 @@ class Actor:
         if plan is None and waiting is not None and not now.events:
             plan = waiting.go_on(now)
         with blame(self.path, step):
+            if plan is None and self.order is not None:
+                plan = self._asked(self.order, now)
+                self.order = self.order if plan else None
             plan = plan or self.arbiter.choose(now, self.plan, self._asked)
         if plan is None:
             plan = now.plan()
@@ -404,7 +435,8 @@ class Actor:
             plan, self._waited = waits.leave_out(now, whom), (0, -1)
             if plan is None:
                 plan = waits.give_up(now, whom)
-                self.arbiter.give_up(now)
+                if self.order is None:
+                    self.arbiter.give_up(now)
         if plan is None:
             plan, self._waiting = waits.wait(now, whom), waits
         if self.plan.began[0] == step:  # it has begun, and is over at once
@@ -418,7 +450,8 @@ class Actor:
         if self.charge is not None and self.charge.is_empty:
             self.ask(None)  # it stands there for good
             return
-        self.arbiter.watch(now, self.plan, fresh=fresh)
+        if self.order is None:
+            self.arbiter.watch(now, self.plan, fresh=fresh)
         steps = [s for s in (self.plan.over_at, self.arbiter.wake_step) if s is not None]
         if self.charge is not None:
             empty_us = self.charge.falls_to(0.0, self.motion)
@@ -426,8 +459,8 @@ class Actor:
                 steps.append(max(self.clock.step_at_or_after(empty_us), now.step + 1))
         self.ask(min(steps, default=None))
 
-    def _asked(self, behavior: Behavior, now: Situation) -> Plan | None:
-        """Return a behavior's plan; where a shut door or a cost is in its way, wait a little."""
+    def _asked(self, behavior: Behavior | Order, now: Situation) -> Plan | None:
+        """Return a behavior's or an order's plan; wait where a door or a cost is in its way."""
         try:
             return behavior.decide(now)
         except (PlacementError, NoWayError) as error:

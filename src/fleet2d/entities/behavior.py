@@ -38,11 +38,32 @@ class Attention(NamedTuple):
     hears: int
 
 
+class Command(NamedTuple):
+    """What a user or an app calls a robot to do: see `Behavior.answers`.
+
+    Attributes:
+        do: What it is to do: "come", "find", "dock", or what a behavior of one's own answers to.
+        target: The person to find; empty for others.
+        place: Where to come to; () for others.
+    """
+
+    do: str
+    target: str = ""
+    place: "RoomChoice | Point | tuple[()]" = ()
+
+    @property
+    def text(self) -> str:
+        """The command for the table of events."""
+        where = self.place if self.place and isinstance(self.place[0], str) else None
+        spot = [f"({self.place[0]:g}, {self.place[1]:g})"] if self.place and not where else []
+        return " ".join([self.do, *filter(None, [self.target]), *(where or spot)])
+
+
 class SightEvent(NamedTuple):
     """Somebody came into view of a camera, or was lost from it; or a robot met somebody."""
 
     # user_seen | user_lost; of a user's camera, robot_seen | robot_lost; of Attention, robot_near |
-    # robot_coming | robot_close | robot_calls
+    # robot_coming | robot_close | robot_calls; called, of a robot that was: see Situation.command
     event: str
     user: str  # for whom somebody was taken; empty for somebody not recognized; or the robot
     x: float  # where that was perceived last [m]
@@ -93,6 +114,19 @@ class Situation:
         """
         return self.actor.in_view()
 
+    @property
+    def command(self) -> Command | None:
+        """What the body was called to do, as long as no behavior has taken it up."""
+        return self.actor.command
+
+    def take_command(self, do: str) -> Command | None:
+        """Take up a command of a kind, if the body was called to do that: nobody else gets it."""
+        command = self.actor.command
+        if command is None or command.do != do:
+            return None
+        self.actor.command = None
+        return command
+
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
         actor, lattice = self.actor, self.home.plan.lattice
@@ -142,6 +176,9 @@ class Behavior(Component):
     # Events of its cameras at which it may break in on those behind it.
     listens: ClassVar[frozenset[str]] = frozenset()
 
+    # What it does when its robot is called to: find, come, dock, or a word of one's own.
+    answers: ClassVar[frozenset[str]] = frozenset()
+
     when: Hours = Field(
         default=(), description="the hours in which it may have its way; left out: at all times"
     )
@@ -181,6 +218,18 @@ class Behavior(Component):
     def reads(self) -> tuple[str, ...]:
         """Return the algorithms that it goes by: a scenario without one of them is refused."""
         return ()
+
+    def takes(self, command: Command) -> bool:
+        """Tell whether it would do what its robot is called to do."""
+        return command.do in self.answers
+
+    def activities(self) -> tuple[str, ...]:
+        """Return the activities that it knows how to perform."""
+        return ()
+
+    def perform(self, plan: Plan, activity: str) -> None:
+        """Let a plan lead to where one of its activities is done."""
+        raise NotImplementedError
 
     def busy(self) -> bool:
         """Tell whether it is in the middle of something, which neither hours nor cooldown end."""

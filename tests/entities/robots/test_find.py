@@ -206,8 +206,7 @@ def test_a_distribution_of_an_own_algorithm_will_do() -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"at": []}, "give one of them"),
-        ({"every": "1 h"}, "give one of them"),
+        ({"every": "1 h"}, "not by both"),
         ({"policy": "magic"}, "policy"),
         ({"views": 0}, "views"),
         ({"deadline": 0}, "longer than 0"),

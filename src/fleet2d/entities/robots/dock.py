@@ -1,7 +1,7 @@
 """Dock: drive to the charger before the battery is empty, and charge."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -24,8 +24,11 @@ class Dock(Behavior):
 
     It breaks in on the behaviors behind it at the moment at which the charge reaches the threshold.
     Behind all others, with `rest`, it also takes a robot that has nothing else to do to the
-    charger. Events: `docks` and `charged`, with the charge.
+    charger. Called to dock, it goes to the charger at once, whatever the charge is. Events: `docks`
+    and `charged`, with the charge.
     """
+
+    answers: ClassVar[frozenset[str]] = frozenset({"dock"})
 
     threshold: Share = Field(default=0.2, description="charge at which it goes to the charger")
     until: Share = Field(default=1.0, description="charge with which it leaves the charger")
@@ -71,7 +74,9 @@ class Dock(Behavior):
         charge = now.actor.charge
         assert charge is not None
         plan, there = now.plan(), charge.charger
-        if charge.level <= self.threshold or (self.charging and charge.level < self.until):
+        called = now.take_command("dock") is not None
+        low = charge.level <= self.threshold
+        if called or low or (self.charging and charge.level < self.until):
             if not self.charging or (plan.x, plan.y) != there:
                 plan.go_to_point(*there).note("docks", charge.percent)
             self.charging = True

@@ -1,14 +1,14 @@
 """Find: look for a person, room by room, by what is believed and how far it is."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.component import register
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Behavior, Command, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed
 from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_camera, face, spot_back
@@ -35,6 +35,7 @@ class Search(NamedTuple):
     """A search under way."""
 
     since: datetime
+    user: str
     missed: tuple[Missed, ...] = ()
     route: tuple[int, ...] = ()  # sites to go to yet, of a policy that decides beforehand
     going_to: int | None = None
@@ -43,7 +44,7 @@ class Search(NamedTuple):
 
 @register("behavior", "find")
 class Find(Behavior):
-    """Look for a person at given times, until found, given up, or believed to be out.
+    """Look for a person at given times, or when called, until found, given up or believed out.
 
     A site is a room, looked round in from so many places that little of it stays out of view. In
     which order the sites are looked at is for the `policy` to say, from what `source` says of where
@@ -52,9 +53,12 @@ class Find(Behavior):
     begins.
 
     The person is found when the cameras perceive somebody as that person; it may be somebody else
-    whom they mistake. Events, with the person's name: `find_begins`, and one of `found`,
-    `not_at_home` and `gave_up`.
+    whom they mistake. Called to find somebody, the robot begins at once, or as soon as the
+    behaviors before this one let it, and drops the search that it was on. Events, with the person's
+    name: `find_begins`, and one of `found`, `not_at_home` and `gave_up`.
     """
+
+    answers: ClassVar[frozenset[str]] = frozenset({"find"})
 
     user: str = Field(default=ANYONE, min_length=1, description="whom it looks for, or anyone")
     source: str | None = Field(
@@ -62,7 +66,10 @@ class Find(Behavior):
         description="the algorithm that says where people are; left out: rooms count by their size",
     )
     policy: Policy = Field(default="receding", description="in which order it looks at the rooms")
-    at: tuple[TimeOfDay, ...] = Field(default=(), description="times of day at which it begins")
+    at: tuple[TimeOfDay, ...] = Field(
+        default=(),
+        description="times of day at which it begins; without them and `every`: when it is called",
+    )
     every: PositiveDuration | None = Field(
         default=None, description="or how much time lies between two searches, from the start on"
     )
@@ -102,15 +109,17 @@ class Find(Behavior):
 
     @model_validator(mode="after")
     def _begins(self) -> Self:
-        if bool(self.at) == (self.every is not None):
-            raise problem(
-                "it begins by 'at' (times of day) or 'every' (a duration): give one of them"
-            )
+        if self.at and self.every is not None:
+            raise problem("it begins by 'at' (times of day) or 'every' (a duration), not by both")
         return self
 
     def about(self) -> tuple[str, ...]:
         """Return whom it looks for."""
         return () if self.user == ANYONE else (self.user,)
+
+    def takes(self, command: Command) -> bool:
+        """Tell whether it would look for who is wanted."""
+        return super().takes(command) and self.user in (ANYONE, command.target)
 
     def start(self, actor: "Actor") -> None:
         """Find where to look round in each room."""
@@ -124,7 +133,9 @@ class Find(Behavior):
         self.search: Search | None = None
         self.plan: Plan | None = None  # the last one it made
         start = actor.clock.start
-        self.due = self._next(start if self.every else start - timedelta(microseconds=1), start)
+        self.due: datetime | None = self._next(
+            start if self.every else start - timedelta(microseconds=1), start
+        )
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithm that it goes by."""
@@ -148,18 +159,29 @@ class Find(Behavior):
     def decide(self, now: Situation) -> Plan | None:
         """Begin a search that is due, go on with one, or leave the robot to others."""
         plan = now.plan()
-        if self.search is None:
-            if not self._is_due(now):
-                return None
-            self.search = Search(now.time)
-            plan.note("find_begins", self.user)
+        user = self._called(now)
+        if user is None and self.search is None and self._is_due(now):
+            user = self.user
+        if user is not None:
+            self.search = Search(now.time, user)
+            plan.note("find_begins", user)
+        elif self.search is None:
+            return None
         else:
             self._take_in(now)
+            user = self.search.user
         seen = now.in_view
-        name = self.user if self.user != ANYONE else next(iter(sorted(seen)), ANYONE)
+        name = user if user != ANYONE else next(iter(sorted(seen)), ANYONE)
         if name in seen:
             return self._found(now, plan, *seen[name])
         return self._go_on(now) or self._look_on(now, plan)
+
+    def _called(self, now: Situation) -> str | None:
+        """Return whom it is called to find, once; None: nobody."""
+        if now.command is None or not self.takes(now.command):
+            return None
+        command = now.take_command("find")
+        return None if command is None else command.target
 
     def _go_on(self, now: Situation) -> Plan | None:
         """Return what is left of a look in which somebody else came into view."""
@@ -172,9 +194,9 @@ class Find(Behavior):
     def _is_due(self, now: Situation) -> bool:
         """Tell whether a search is due, and not too late; in either case it isn't due any more."""
         due, start = self.due, now.actor.clock.start
-        while self.due <= now.time:
+        while self.due is not None and self.due <= now.time:
             due, self.due = self.due, self._next(self.due, start)
-        return due <= now.time <= due + self.late
+        return due is not None and due <= now.time <= due + self.late
 
     def _take_in(self, now: Situation) -> None:
         """Note that the look that the last plan made found nobody, if it came to its end."""
@@ -187,8 +209,9 @@ class Find(Behavior):
             self.search = search._replace(missed=missed, route=search.route[1:], going_to=None)
 
     def _found(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
-        self.search = None
-        approach(now, plan.note("found", self.user), x, y, self.distance)
+        assert self.search is not None
+        user, self.search = self.search.user, None
+        approach(now, plan.note("found", user), x, y, self.distance)
         back = spot_back(now, x, y, self.distance)
         if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
             plan.go_to_point(*back)
@@ -225,7 +248,8 @@ class Find(Behavior):
 
     def _prior(self, now: Situation) -> tuple[NDArray[np.float64], float]:
         """Return the probability of each site, and that of being out, before any look."""
-        belief = room_belief(now, self.source, self.user)
+        assert self.search is not None
+        belief = room_belief(now, self.source, self.search.user)
         sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
         shares = belief.share[self.sites.rooms]
         known = sum(shares.tolist())
@@ -244,13 +268,16 @@ class Find(Behavior):
         return ages
 
     def _end(self, plan: Plan, event: str) -> Plan:
-        self.search = None
-        return plan.note(event, self.user)
+        assert self.search is not None
+        user, self.search = self.search.user, None
+        return plan.note(event, user)
 
-    def _next(self, after: datetime, start: datetime) -> datetime:
-        """Return when the next search is due after a moment."""
+    def _next(self, after: datetime, start: datetime) -> datetime | None:
+        """Return when the next search is due after a moment; None: only when called."""
         if self.every is not None:
             return start + ((after - start) // self.every + 1) * self.every
+        if not self.at:
+            return None
         midnight = datetime.combine(after.date(), datetime.min.time())
         times = sorted(midnight + i * DAY + at for i in range(2) for at in self.at)
         return next(time for time in times if time > after)

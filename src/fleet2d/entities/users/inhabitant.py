@@ -124,6 +124,20 @@ class Inhabitant(Behavior):
         if sleeps_in is not None:
             self.settings[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
 
+    def activities(self) -> tuple[str, ...]:
+        """Return the activities of its persona."""
+        return tuple(self.settings)
+
+    def perform(self, plan: Plan, activity: str) -> None:
+        """Go to where an activity is done, and sit or lie down as one does."""
+        setting = self._at_present(self.settings[activity])
+        if setting.activity.away:
+            plan.leave_home()
+        elif setting.rooms:
+            self._go(plan.come_home(), setting, Draws(self.key, plan.time_us))
+        else:
+            raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
+
     def _leave_out(self, actor: "Actor") -> None:
         """Rest instead of what this home has no room for, and note it."""
         none = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]

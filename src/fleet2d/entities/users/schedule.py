@@ -116,6 +116,19 @@ class Schedule(Behavior):
         self.plan = plan.stay(until=self.until)
         return self.plan
 
+    def activities(self) -> tuple[str, ...]:
+        """Return the activities of its agendas."""
+        return tuple(dict.fromkeys(e.activity for day in self.week for e in day if e.activity))
+
+    def perform(self, plan: Plan, activity: str) -> None:
+        """Go to where an activity is done: the first place that an agenda has for it."""
+        entries = (entry for day in self.week for entry in day)
+        place = next(entry.place for entry in entries if entry.activity == activity)
+        if place:
+            plan.come_home().go_to(place)
+        else:
+            plan.leave_home()
+
     def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, Entry]]:
         """Yield what begins from `since` on and before the midnight `until`."""
         midnight = datetime.combine(since.date(), datetime.min.time())

@@ -1,0 +1,52 @@
+"""Come: go where a user or an app calls the robot to, and wait there."""
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, ClassVar
+
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.entities.behavior import Behavior, Command, Situation
+from fleet2d.entities.furniture import stop_at
+from fleet2d.entities.plan import Plan
+from fleet2d.units import Duration
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+
+
+@register("behavior", "come")
+class Come(Behavior):
+    """Go where the robot is called to, and wait there for a while.
+
+    It does nothing on its own: an intervention `call` with a place wakes it. In a room it stops at
+    the point farthest from the walls. Where a shut door is in the way, it waits and tries again.
+    Event: `visits`, with the place.
+    """
+
+    answers: ClassVar[frozenset[str]] = frozenset({"come"})
+    resumes: ClassVar[bool] = True
+
+    stay: Duration = Field(
+        default=timedelta(minutes=10), description="how long it waits there for what comes next"
+    )
+
+    def start(self, actor: "Actor") -> None:
+        """Begin with nowhere to go."""
+        self.command: Command | None = None
+
+    def busy(self) -> bool:
+        """Tell whether it is on its way."""
+        return self.command is not None
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Go where it is called to, if it is."""
+        command = now.take_command("come")
+        if command is not None:
+            self.command = command
+        if self.command is None:
+            return None
+        goal = stop_at(now.actor, self.command.place)
+        plan = now.plan().go_to_point(*goal).note("visits", self.command.text.partition(" ")[2])
+        self.command = None
+        return plan.stay(self.stay)

@@ -1,0 +1,234 @@
+"""The interventions as methods: what a simulation, and a trial of one, may be told to do."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from datetime import timedelta
+from typing import Any
+
+from pydantic import ValidationError
+
+from fleet2d.interventions import bodies, home, people, robots
+from fleet2d.interventions.intervention import Intervention, refused
+
+Time = str | timedelta
+"""A duration: '90 s', '1 h', or a timedelta."""
+
+
+class Verbs(ABC):
+    """What may be done to a run from outside, at the present step.
+
+    Each method does what the entry of the same name in a scenario's `script` does. What is done is
+    kept in the manifest, and done again by `fleet2d.reproduce`.
+    """
+
+    @abstractmethod
+    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
+        """Do something at the present step.
+
+        Args:
+            act: An intervention, or one as a script has it: ``{"put": "ana", "to": "kitchen"}``.
+
+        Raises:
+            ScenarioError: It is none, or there is nothing of that name.
+            PlacementError: There is no such place, or nobody gets there.
+            InputError: The run is finished.
+        """
+
+    # Bodies
+
+    def put(self, name: str, to: Any, heading_deg: float | None = None) -> None:
+        """Put a body somewhere at the present step, as if it were carried; it decides anew there.
+
+        Args:
+            name: The person or robot.
+            to: A room, furniture, a list of those to try in turn, or a point (x, y) [m].
+            heading_deg: Where it faces, counter-clockwise from +x; None: as before.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+            PlacementError: There is no such place, or its body doesn't fit there.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.put("ana", "kitchen")
+            >>> simulation.advance()
+            >>> simulation.state["ana"]["room"].startswith("kitchen")
+            True
+        """
+        self._do(bodies.Put, entity=name, to=to, heading_deg=heading_deg)
+
+    def send(
+        self,
+        name: str,
+        to: Any,
+        heading_deg: float | None = None,
+        *,
+        duration: Time | None = None,
+    ) -> None:
+        """Send a body somewhere on foot; there it stays.
+
+        Args:
+            name: The person or robot.
+            to: A room, furniture, a list of those to try in turn, or a point (x, y) [m].
+            heading_deg: Where it faces then, counter-clockwise from +x; None: as it came.
+            duration: For how long it stays there; None: until it is released.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+            PlacementError: There is no such place, or it can't get there.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.send("ana", to="kitchen", duration="1 h")
+            >>> simulation.advance(600)
+            >>> simulation.state["ana"]["room"]
+            'kitchen_0'
+        """
+        self._do(bodies.Send, entity=name, to=to, heading_deg=heading_deg, duration=duration)
+
+    def hold(self, name: str, *, duration: Time | None = None) -> None:
+        """Let a body stand still where it is, for so long, or until it is released.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+        """
+        self._do(bodies.Hold, entity=name, duration=duration)
+
+    def release(self, name: str) -> None:
+        """Hand a body back to its own behaviors.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+        """
+        self._do(bodies.Release, entity=name)
+
+    def replan(self, name: str) -> None:
+        """Let a body's behaviors decide anew at the present step, whatever it is doing.
+
+        Raises:
+            ScenarioError: There is nobody of that name.
+        """
+        self._do(bodies.Replan, entity=name)
+
+    # People
+
+    def away(self, name: str, *, duration: Time | None = None) -> None:
+        """Send a person out of the home, for so long, or until called home or released.
+
+        Raises:
+            ScenarioError: There is no such person.
+        """
+        self._do(people.Away, entity=name, duration=duration)
+
+    def call_home(
+        self, name: str, to: Any = ("living_room", "any"), *, duration: Time | None = None
+    ) -> None:
+        """Call a person home, who stays for so long, or until released.
+
+        Raises:
+            ScenarioError: There is no such person.
+            PlacementError: There is no such place, or nobody gets there.
+        """
+        self._do(people.CallHome, entity=name, to=to, duration=duration)
+
+    def activity(
+        self, name: str, activity: str, to: Any = None, *, duration: Time | None = None
+    ) -> None:
+        """Let a person do something, for so long, or until released.
+
+        Args:
+            name: The person.
+            activity: What, by its name in the persona or agenda.
+            to: Where; None: where the person does it by its own behavior.
+            duration: For how long; None: until released.
+
+        Raises:
+            ScenarioError: There is no such person, or it has no place for that activity.
+            PlacementError: There is no such place, or nobody gets there.
+        """
+        self._do(people.Activity, entity=name, activity=activity, to=to, duration=duration)
+
+    # Robots
+
+    def call(
+        self,
+        name: str,
+        *,
+        to: Any = None,
+        find: str | None = None,
+        dock: bool = False,
+        command: str | None = None,
+    ) -> None:
+        """Call a robot, as a user or an app does; its behaviors receive it as a command.
+
+        Args:
+            name: The robot.
+            to: Come there: a room, furniture, or a point (x, y) [m]; needs a behavior `come`.
+            find: Find that person; needs a behavior `find`.
+            dock: Go to the charger; needs a behavior `dock`.
+            command: A word that a behavior of your own answers to.
+
+        Raises:
+            ScenarioError: There is no such robot, or none of its behaviors answers.
+            PlacementError: There is no such place, or it can't get there.
+        """
+        self._do(robots.Call, entity=name, to=to, find=find, dock=dock, command=command)
+
+    # The home
+
+    def open(self, door: str) -> None:
+        """Open a door, even a locked one.
+
+        Raises:
+            ScenarioError: There is no such door.
+        """
+        self._do(home.Open, door=door)
+
+    def shut(self, door: str) -> None:
+        """Shut a door, as soon as nobody stands in the doorway.
+
+        Raises:
+            ScenarioError: There is no such door.
+        """
+        self._do(home.Shut, door=door)
+
+    def lock(self, door: str) -> None:
+        """Lock a door: nobody opens it by hand once it is shut.
+
+        Raises:
+            ScenarioError: There is no such door.
+        """
+        self._do(home.Lock, door=door)
+
+    def unlock(self, door: str) -> None:
+        """Unlock a door.
+
+        Raises:
+            ScenarioError: There is no such door.
+        """
+        self._do(home.Unlock, door=door)
+
+    def move(self, furniture: str, to: tuple[float, float], turn_deg: float = 0.0) -> None:
+        """Move a piece of furniture: its middle comes to stand at (x, y) [m], turned.
+
+        Raises:
+            ScenarioError: There is no such piece, or it can't stand there.
+        """
+        self._do(home.Move, object=furniture, to=to, turn_deg=turn_deg)
+
+    def room(self, name: str, type: str) -> None:  # noqa: A002
+        """Use a room for something else from now on.
+
+        Raises:
+            ScenarioError: There is no such room, or no such type of rooms.
+        """
+        self._do(home.Room, name=name, type=type)
+
+    def _do(self, verb: type[Intervention], **fields: Any) -> None:
+        try:
+            act = verb(**{key: value for key, value in fields.items() if value is not None})
+        except ValidationError as error:
+            raise refused(f"{verb.type_name}()", error) from None
+        self.intervene(act)

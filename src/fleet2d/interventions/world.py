@@ -1,0 +1,54 @@
+"""What interventions act upon: the part of a run that they may see and touch."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from fleet2d.clock import Clock
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.plan import Pose
+from fleet2d.events import EventKind
+from fleet2d.floorplan.change import HomeChange
+from fleet2d.floorplan.home import Home
+
+
+class World(Protocol):
+    """A run at the step at which something is done to it."""
+
+    @property
+    def step(self) -> int:
+        """The present step."""
+
+    @property
+    def clock(self) -> Clock:
+        """The steps of the run."""
+
+    @property
+    def home(self) -> Home:
+        """The home, as it is at present."""
+
+    @property
+    def users(self) -> Mapping[str, Actor]:
+        """The people, by name."""
+
+    @property
+    def robots(self) -> Mapping[str, Actor]:
+        """The robots, by name."""
+
+    def move(self, actor: Actor, pose: Pose, part: int) -> None:
+        """Put a body elsewhere, in a part of its space; it decides anew there."""
+
+    def drive(self, actor: Actor) -> None:
+        """Take the decisions of a body out of the hands of its behaviors."""
+
+    def check_change(self, change: HomeChange) -> None:
+        """Refuse a change of the home that can't be.
+
+        Raises:
+            ScenarioError: There is nothing of that name to change.
+        """
+
+    def change(self, change: HomeChange) -> None:
+        """Change the home at the present step."""
+
+    def emit(self, entity: str, event: EventKind, detail: str) -> None:
+        """Record that something happened at the present step."""
