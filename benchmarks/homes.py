@@ -26,11 +26,11 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from fleet2d.floorplan.furnish import furnish
+from fleet2d.floorplan.furniture.furnish import furnish
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms.vocabulary import room_type, usual_type
 from fleet2d.floorplan.synthetic.source import Synthetic
-from fleet2d.floorplan.vocabulary import room_type, usual_type
 from fleet2d.kernels.mesh import rasterize_cells
 from fleet2d.kernels.region import regions_of_cells
 

@@ -22,9 +22,9 @@ import shapely
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.gates import Gates
+from fleet2d.floorplan.geometry.gates import Gates
+from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.chambers import see_each
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh

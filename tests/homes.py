@@ -11,7 +11,7 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
 
-from fleet2d.floorplan.mesh import build_mesh, snap_polygon
+from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.kernels.mesh import Mesh, rasterize_cells
 
 Int64 = npt.NDArray[np.int64]

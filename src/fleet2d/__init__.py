@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from fleet2d.errors import ComponentError as ComponentError
     from fleet2d.errors import Fleet2DError as Fleet2DError
     from fleet2d.errors import InputError as InputError
-    from fleet2d.floorplan.change import HomeChange as HomeChange
-    from fleet2d.floorplan.change import HomeChanges as HomeChanges
-    from fleet2d.floorplan.home import Home as Home
+    from fleet2d.floorplan.home.change import HomeChange as HomeChange
+    from fleet2d.floorplan.home.change import HomeChanges as HomeChanges
+    from fleet2d.floorplan.home.home import Home as Home
     from fleet2d.floorplan.load import load_floorplan as load_floorplan
     from fleet2d.floorplan.plan import FloorPlan as FloorPlan
     from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion
@@ -56,9 +56,9 @@ _HOME_OF = {
     "Fleet2DError": "errors",
     "FloorPlan": "floorplan.plan",
     "History": "algorithms.history",
-    "Home": "floorplan.home",
-    "HomeChange": "floorplan.change",
-    "HomeChanges": "floorplan.change",
+    "Home": "floorplan.home.home",
+    "HomeChange": "floorplan.home.change",
+    "HomeChanges": "floorplan.home.change",
     "InputError": "errors",
     "LabelledRegion": "floorplan.plan",
     "Length": "units",

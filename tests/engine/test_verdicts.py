@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d import Behavior
 from fleet2d.engine.verdicts import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.look import Crowd
 from fleet2d.kernels.motion import Poses

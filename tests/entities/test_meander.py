@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from tests.scenes import OWN, path, run, scenario
 
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 
 
 def walker(duration: str = "30 min", step: str = "1 s", **fields: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.arrangement import described, moved, number_objects
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 
 LATTICE = Lattice(0.05, (0.0, 0.0), 200, 200)

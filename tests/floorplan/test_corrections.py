@@ -3,8 +3,8 @@ import shapely
 from pydantic import ValidationError
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.bundled import Bundled
 from fleet2d.floorplan.corrections import RoomCorrection, corrected
+from fleet2d.floorplan.formats.bundled import Bundled
 from fleet2d.floorplan.plan import FloorPlan
 
 LEFT, RIGHT, DOOR = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.6, 4.0), (4.0, 2.0, 4.1, 2.9)

@@ -15,14 +15,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.drawing import read_image
-from fleet2d.floorplan.geojson import read_geojson
-from fleet2d.floorplan.houseexpo import read_houseexpo
+from fleet2d.floorplan.formats.drawing import read_image
+from fleet2d.floorplan.formats.geojson import read_geojson
+from fleet2d.floorplan.formats.houseexpo import read_houseexpo
+from fleet2d.floorplan.formats.native import read_native
+from fleet2d.floorplan.formats.ros import read_ros
+from fleet2d.floorplan.formats.valetudo import read_valetudo
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.native import read_native
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.ros import read_ros
-from fleet2d.floorplan.valetudo import read_valetudo
 
 Place = tuple[Any, ...]
 

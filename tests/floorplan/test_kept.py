@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import fleet2d
-from fleet2d.floorplan import home as homes
 from fleet2d.floorplan import source
-from fleet2d.floorplan.bundled import HOMES
+from fleet2d.floorplan.formats.bundled import HOMES
+from fleet2d.floorplan.home import home as homes
 from fleet2d.floorplan.kept import Kept
 from fleet2d.metrics.presence.occupancy import walking_distances
 

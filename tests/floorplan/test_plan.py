@@ -7,8 +7,8 @@ import shapely
 from tests.reference.fields import squared_distance
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.space import Space
 
 
 @pytest.fixture
@@ -124,8 +124,8 @@ def test_plan_without_area_is_refused(free: shapely.Polygon) -> None:
 def test_rounding_that_would_change_the_area_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Known failure 7: an area that doesn't survive rounding is an error, not a surprise."""
     # No outline is known that snaps so badly, so the snapping is made to.
-    import fleet2d.floorplan.free_space as module
-    from fleet2d.floorplan.mesh import Snapped
+    import fleet2d.floorplan.geometry.free_space as module
+    from fleet2d.floorplan.geometry.mesh import Snapped
 
     half = Snapped([shapely.box(0, 0, 2560, 6400)], -(2560.0 * 6400), 46080.0)
     monkeypatch.setattr(module, "snap_polygon", lambda _: half)

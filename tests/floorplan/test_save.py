@@ -11,13 +11,13 @@ import yaml
 
 from fleet2d import cli
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.bundled import HOMES
-from fleet2d.floorplan.doorways import DoorLine
+from fleet2d.floorplan.formats.bundled import HOMES
+from fleet2d.floorplan.formats.native import native_document
+from fleet2d.floorplan.formats.native_schema import native_schema
 from fleet2d.floorplan.load import is_floorplan, load_floorplan
-from fleet2d.floorplan.native import native_document
-from fleet2d.floorplan.native_schema import native_schema
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.save import save_floorplan
 
 Cli = Callable[..., tuple[int, str, str]]

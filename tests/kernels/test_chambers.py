@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from tests.reference.chambers import nearest_labels
 
-from fleet2d.floorplan.mesh import build_mesh
+from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.kernels.chambers import fill_beside, label_frames, see_each, spread_labels
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight

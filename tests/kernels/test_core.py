@@ -19,7 +19,7 @@ from tests.homes import home_of
 import fleet2d
 from fleet2d import _core
 from fleet2d.engine.cameras import new_memory
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import Rule
 from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses

@@ -17,7 +17,7 @@ from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.engine.cameras import new_memory
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.lens import Lenses, in_wedge
 from fleet2d.kernels.look import USER_LOST, USER_SEEN, Memory, Rule, look
 from fleet2d.kernels.perception import MOST_GHOSTS, About, ErrorTables, UserDraw

@@ -12,7 +12,7 @@ from tests.homes import Home, home_of
 from tests.reference import seen as slow
 from tests.strategies import quick, seeds
 
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.motion import Poses

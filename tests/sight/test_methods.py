@@ -13,9 +13,9 @@ from tests.scenes import flat_path
 import fleet2d
 from fleet2d.component import components
 from fleet2d.errors import InputError
-from fleet2d.floorplan.doorways import DoorLine
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.flashlight import Flashlight

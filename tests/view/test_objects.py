@@ -9,10 +9,10 @@ import shapely
 from matplotlib.colors import to_rgb
 from tests.view.test_floorplan import pixels, words
 
-from fleet2d.floorplan.checkup import checkup
-from fleet2d.floorplan.doorways import DoorLine
-from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
+from fleet2d.floorplan.furniture.catalogue import FURNITURE, stand_furniture
+from fleet2d.floorplan.home.checkup import checkup
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.view.checkup import draw_checkup
 from fleet2d.view.floorplan import draw_floorplan
 from fleet2d.view.objects import FILL_COLORS, SYMBOLS

@@ -16,7 +16,7 @@ from fleet2d.streams import Draws, stream_key
 from fleet2d.units import InputPath, PositiveDuration
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from fleet2d.kernels.look import IDENTITY, STEP, X, Y
 from fleet2d.kernels.timelines import Window
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 
 class SensorRow(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT, Activities, Names
-from fleet2d.floorplan.rooms import beside_rooms
+from fleet2d.floorplan.rooms.room import beside_rooms
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.look import (
     CAMERA,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.errors import ComponentError
-from fleet2d.floorplan.change import HomeChanges
+from fleet2d.floorplan.home.change import HomeChanges
 from fleet2d.problems import did_you_mean
 
 # The columns of every table.

@@ -13,7 +13,7 @@ from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.timelines import Window
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 Array = TypeVar("Array", bound=NDArray[Any])
 

@@ -13,7 +13,7 @@ from fleet2d.problems import did_you_mean
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.reader import Run
-    from fleet2d.floorplan.layers import Layer
+    from fleet2d.floorplan.home.layers import Layer
 
 PREFIX = "layer."
 EVERYWHERE = -1

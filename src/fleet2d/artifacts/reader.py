@@ -122,7 +122,7 @@ class Run:
             ArtifactError: The run directory holds none.
         """
         if self._plan is None:
-            from fleet2d.floorplan.native import read_native
+            from fleet2d.floorplan.formats.native import read_native
 
             path = Path() if self.directory is None else self.directory / FLOORPLAN_NAME
             if not path.is_file():

@@ -61,7 +61,7 @@ def _check_floorplan(
     source: str, out: Path | None, radius: float, resolution: float | None
 ) -> None:
     """Print a floor plan's findings and draw them; exit with 2 if nobody can live there."""
-    from fleet2d.floorplan.checkup import checkup
+    from fleet2d.floorplan.home.checkup import checkup
     from fleet2d.floorplan.load import load_floorplan
     from fleet2d.view.checkup import draw_checkup
 
@@ -88,7 +88,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a scenario, for completion in an editor."""
     if floorplan:
-        from fleet2d.floorplan.native_schema import native_schema
+        from fleet2d.floorplan.formats.native_schema import native_schema
 
         typer.echo(json.dumps(native_schema(), indent=2))
         return

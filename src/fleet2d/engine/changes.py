@@ -23,11 +23,11 @@ from fleet2d.entities.plan import Track
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.arrangement import moved
-from fleet2d.floorplan.change import HomeChange
-from fleet2d.floorplan.gates import Segment
-from fleet2d.floorplan.home import Home, lattice_footprint
-from fleet2d.floorplan.space import grown_shape
-from fleet2d.floorplan.vocabulary import PRIORITY, usual_type
+from fleet2d.floorplan.geometry.gates import Segment
+from fleet2d.floorplan.home.change import HomeChange
+from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.floorplan.home.space import grown_shape
+from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros

@@ -21,9 +21,9 @@ from fleet2d.engine.seen import SeenArea
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ComponentError, ScenarioError
-from fleet2d.floorplan.costmap import CostmapSettings, costs_of
-from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
+from fleet2d.floorplan.home.costmap import CostmapSettings, costs_of
+from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean

@@ -21,7 +21,7 @@ from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.events import HOME, Event
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros

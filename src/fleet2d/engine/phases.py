@@ -13,7 +13,7 @@ from fleet2d.blame import blame
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
-from fleet2d.floorplan.change import HomeChanges
+from fleet2d.floorplan.home.change import HomeChanges
 
 
 @dataclass

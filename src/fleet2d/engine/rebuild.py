@@ -13,7 +13,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander
 from fleet2d.entities.plan import Pose
 from fleet2d.errors import ArtifactError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.headings import TURN, in_radians
 from fleet2d.kernels.mesh import SUB

@@ -25,7 +25,7 @@ from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.tables import camera_names
 from fleet2d.entities.actor import Actor
 from fleet2d.events import HOME, Event, EventKind
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 
 # Events whose detail is a user, which has a column of its own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})

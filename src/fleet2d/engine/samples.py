@@ -9,7 +9,7 @@ from fleet2d.clock import Clock
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.ordering import in_order
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import micros

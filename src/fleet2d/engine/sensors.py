@@ -17,7 +17,7 @@ from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.objects.sensor import Memory, Sensor, SensorView, in_order
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event, EventKind
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.problems import did_you_mean
 
 

@@ -23,7 +23,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 

@@ -22,9 +22,9 @@ from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
 from fleet2d.entities.plan import Track, Walk
 from fleet2d.errors import ArtifactError
-from fleet2d.floorplan.costmap import CostedSpace
+from fleet2d.floorplan.home.costmap import CostedSpace
+from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.space import Space
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.outside import is_scenario_module, public_name
 from fleet2d.routines.persona import Persona

@@ -24,7 +24,7 @@ from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.events import Event, EventKind, EventStream
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
 

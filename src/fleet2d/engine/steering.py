@@ -17,8 +17,8 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.events import Event, EventKind, Listener
-from fleet2d.floorplan.change import HomeChange
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.change import HomeChange
+from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.bodies import Decide, Drive
 from fleet2d.interventions.home import Change
 from fleet2d.interventions.intervention import Intervention, parse_intervention

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import ComponentError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import Crowd
 from fleet2d.kernels.mesh import SUB

@@ -8,8 +8,8 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.plan import Pose
 from fleet2d.events import Event, EventKind
-from fleet2d.floorplan.change import HomeChange
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.change import HomeChange
+from fleet2d.floorplan.home.home import Home
 
 
 class EngineWorld:

@@ -21,10 +21,10 @@ from fleet2d.entities.orders import Order
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
 from fleet2d.entities.plan import Motion, Plan, Pose
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
-from fleet2d.floorplan.space import Space
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import micros

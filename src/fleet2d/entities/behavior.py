@@ -16,7 +16,7 @@ from fleet2d.units import Duration
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.place import Point, RoomChoice
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
     from fleet2d.floorplan.plan import Room
 
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from fleet2d.component import Settings
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed, without_next_stop
-from fleet2d.floorplan.costmap import NO_WAY, route_by_cost
+from fleet2d.floorplan.home.costmap import NO_WAY, route_by_cost
 from fleet2d.units import Length, PositiveDuration
 
 if TYPE_CHECKING:

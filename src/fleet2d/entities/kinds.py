@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.furniture import FURNITURE
-from fleet2d.floorplan.vocabulary import PRIORITY, usual_type
+from fleet2d.floorplan.furniture.catalogue import FURNITURE
+from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor

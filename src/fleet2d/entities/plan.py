@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fleet2d.entities.furniture import seat_at
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
+from fleet2d.floorplan.home.space import straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
-from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule

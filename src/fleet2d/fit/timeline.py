@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.floorplan.vocabulary import room_type
+from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.rooms import DOOR, USUAL
 from fleet2d.logs.visits import UNKNOWN, Rule, Visit, visits_of

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.kernels.headings import TURN, UNIT, cosine, in_radians, sine
 

@@ -12,12 +12,12 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.component import Settings
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.adjacency import doorway_segments
-from fleet2d.floorplan.doorways import DoorLine, name_doorways
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.regions import LabelledRegion, Region, cells_in, snap_regions
-from fleet2d.floorplan.rooms import Room, beside_rooms, make_rooms
-from fleet2d.floorplan.vocabulary import usual_type
+from fleet2d.floorplan.rooms.adjacency import doorway_segments
+from fleet2d.floorplan.rooms.doorways import DoorLine, name_doorways
+from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
+from fleet2d.floorplan.rooms.room import Room, beside_rooms, make_rooms
+from fleet2d.floorplan.rooms.vocabulary import usual_type
 from fleet2d.problems import problem
 from fleet2d.units import Length
 

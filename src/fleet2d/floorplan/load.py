@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.bundled import HOMES, bundled_names
-from fleet2d.floorplan.native import FORMAT, native_plan, read_native
+from fleet2d.floorplan.formats.bundled import HOMES, bundled_names
+from fleet2d.floorplan.formats.native import FORMAT, native_plan, read_native
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML, read_document, read_yaml
 from fleet2d.problems import did_you_mean
@@ -77,18 +77,18 @@ def _load_foreign(kind: str, path: Path, cell: float | None) -> FloorPlan:
     """Read a file in a format of others."""
     usual = USUAL_CELL_M if cell is None else cell
     if kind == "houseexpo":
-        from fleet2d.floorplan.houseexpo import read_houseexpo
+        from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 
         return read_houseexpo(path, usual)
     if kind == "geojson":
-        from fleet2d.floorplan.geojson import read_geojson
+        from fleet2d.floorplan.formats.geojson import read_geojson
 
         return read_geojson(path, usual)
     if kind == "valetudo":
-        from fleet2d.floorplan.valetudo import read_valetudo
+        from fleet2d.floorplan.formats.valetudo import read_valetudo
 
         return read_valetudo(path, cell)
-    from fleet2d.floorplan.ros import read_ros
+    from fleet2d.floorplan.formats.ros import read_ros
 
     return read_ros(path, cell)
 
@@ -126,8 +126,8 @@ def format_of_file(path: Path) -> str:
 
 
 def _unknown_format(path: Path) -> FloorPlanError:
-    from fleet2d.floorplan.geojson_file import COLLECTION
-    from fleet2d.floorplan.valetudo_file import MAP_CLASS
+    from fleet2d.floorplan.formats.geojson_file import COLLECTION
+    from fleet2d.floorplan.formats.valetudo_file import MAP_CLASS
 
     return FloorPlanError(
         f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
@@ -140,8 +140,8 @@ def _format_of(content: dict[str, Any]) -> str | None:
         return "native"
     if "verts" in content:
         return "houseexpo"
-    from fleet2d.floorplan.geojson_file import COLLECTION
-    from fleet2d.floorplan.valetudo_file import MAP_CLASS
+    from fleet2d.floorplan.formats.geojson_file import COLLECTION
+    from fleet2d.floorplan.formats.valetudo_file import MAP_CLASS
 
     if content.get("type") == COLLECTION:
         return "geojson"
@@ -155,6 +155,6 @@ def _load_image(path: Path, resolution: float | None, cell: float | None) -> Flo
             f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
             " pixel as resolution"
         )
-    from fleet2d.floorplan.drawing import read_image
+    from fleet2d.floorplan.formats.drawing import read_image
 
     return read_image(path, resolution, cell)

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.adjacency import RoomLink, room_links
 from fleet2d.floorplan.arrangement import described, number_objects
-from fleet2d.floorplan.division import Regions, Survey, divide, found_doorways, survey
-from fleet2d.floorplan.doorways import DoorLine, Doorway, fit_lines, name_doorways
-from fleet2d.floorplan.free_space import free_on_lattice, in_order, part_notes
-from fleet2d.floorplan.lattice import Lattice
-from fleet2d.floorplan.mesh import build_mesh
+from fleet2d.floorplan.geometry.free_space import free_on_lattice, in_order, part_notes
+from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.objects import PlacedObject
-from fleet2d.floorplan.rooms import NO_ROOM, LabelledRegion, Room, beside_rooms
-from fleet2d.floorplan.vocabulary import room_type
+from fleet2d.floorplan.rooms.adjacency import RoomLink, room_links
+from fleet2d.floorplan.rooms.division import Regions, Survey, divide, found_doorways, survey
+from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway, fit_lines, name_doorways
+from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, beside_rooms
+from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.leaves import leaf
 from fleet2d.problems import did_you_mean
@@ -345,7 +345,7 @@ class FloorPlan:
 
     def to_native(self) -> dict[str, Any]:
         """Return the plan in Fleet2D's own file format; reading it back gives an equal plan."""
-        from fleet2d.floorplan.native import native_document
+        from fleet2d.floorplan.formats.native import native_document
 
         return native_document(self)
 

@@ -13,8 +13,8 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.geojson_file import COLLECTION
-from fleet2d.floorplan.native import cell_polygons, native_document, written_object
+from fleet2d.floorplan.formats.geojson_file import COLLECTION
+from fleet2d.floorplan.formats.native import cell_polygons, native_document, written_object
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML
 

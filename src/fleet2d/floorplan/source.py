@@ -14,10 +14,10 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_
 from fleet2d.component import Component
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.corrections import RoomCorrection, corrected
-from fleet2d.floorplan.costmap import CostmapSettings
-from fleet2d.floorplan.furnishing import Furnishing, FurniturePiece, furnished
+from fleet2d.floorplan.furniture.furnishing import Furnishing, FurniturePiece, furnished
+from fleet2d.floorplan.home.costmap import CostmapSettings
+from fleet2d.floorplan.home.layers import LayerSettings, check_layers
 from fleet2d.floorplan.kept import Kept
-from fleet2d.floorplan.layers import LayerSettings, check_layers
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.paths import InputPath
 from fleet2d.units import Length

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.floorplan.space import straight_way
+from fleet2d.floorplan.home.space import straight_way
 from fleet2d.kernels.headings import TURN, heading_of
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import time_route

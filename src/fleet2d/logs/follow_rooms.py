@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.plan import Note
-from fleet2d.floorplan.space import straight_way
+from fleet2d.floorplan.home.space import straight_way
 from fleet2d.kernels.motion import time_route
 from fleet2d.logs.log import AWAY
 from fleet2d.logs.nearest import Nearest

@@ -15,7 +15,7 @@ from fleet2d.units import Length
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "blocking")

@@ -11,7 +11,7 @@ from fleet2d.metrics.pairs import pairs_of
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "co_presence")

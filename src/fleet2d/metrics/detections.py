@@ -12,7 +12,7 @@ from fleet2d.metrics.metric import Metric
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 UNKNOWN = "unknown"  # the name in the confusion of somebody not recognized
 NO_ONE = "nobody"  # the name there of who isn't there at all: a false positive

@@ -13,7 +13,7 @@ from fleet2d.metrics.pairs import in_sight, pairs_of
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 # Hall's zones, by the distance at which they end [m].
 ZONES = {"intimate": 0.45, "personal": 1.2, "social": 3.6}

@@ -10,7 +10,7 @@ from fleet2d.metrics.metric import Metric
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "sightings")

@@ -18,7 +18,7 @@ from fleet2d.units import Length, PositiveDuration
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 ENDS = ("found", "not_at_home", "gave_up")
 

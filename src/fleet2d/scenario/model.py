@@ -20,7 +20,7 @@ from fleet2d.component import OneOf, Settings, ShortForm
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.change import HomeChange
+from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean, problem, problem_at

@@ -14,7 +14,7 @@ from fleet2d.sight.fov import I64, Bool, FieldOfView, Reach
 from fleet2d.sight.visibility_polygon import filled_cells
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 # What an entry takes besides its bits: keys, tuple and array.
 ENTRY_BYTES = 450

@@ -12,7 +12,7 @@ from fleet2d.kernels.points import points_in_reach
 from fleet2d.kernels.seen import Reach
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 Bool = NDArray[np.bool_]
 I64 = NDArray[np.int64]

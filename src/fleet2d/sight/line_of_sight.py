@@ -7,7 +7,7 @@ from fleet2d.kernels.points import points_in_sight
 from fleet2d.sight.fov import I64, Bool, FieldOfView
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 
 @register("sight", "line_of_sight")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.headings import HALF_TURN, TURN
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.perception import (

@@ -19,7 +19,7 @@ from fleet2d.problems import problem_at
 from fleet2d.sight.fov import I64, Bool, FieldOfView, Reach
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 I32 = NDArray[np.int32]
 Pieces = tuple[I32, I32]

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.floorplan.checkup import Finding
+from fleet2d.floorplan.home.checkup import Finding
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
 from fleet2d.view.floorplan import (

@@ -21,10 +21,10 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.home.standing import grown_cells
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
-from fleet2d.floorplan.rooms import NO_ROOM
-from fleet2d.floorplan.standing import grown_cells
+from fleet2d.floorplan.rooms.room import NO_ROOM
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.palette import (
     ACCENT_COLOR,

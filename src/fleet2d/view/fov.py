@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Wedge
 
 from fleet2d.errors import InputError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.seen import Reach

@@ -12,7 +12,7 @@ from fleet2d.artifacts.reader import Run
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.plan import Track
 from fleet2d.errors import InputError, PlacementError
-from fleet2d.floorplan.change import HomeChange
+from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveOrder

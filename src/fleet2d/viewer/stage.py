@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.reader import Run
 from fleet2d.engine.rebuild import Trajectory
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.view.floorplan import floorplan_axes

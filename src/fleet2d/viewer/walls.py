@@ -8,8 +8,8 @@ from fleet2d.artifacts.reader import Run
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.arrangement import moved
-from fleet2d.floorplan.doorways import Doorway
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.viewer.contract import DoorFacts, WallsChange
 

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.synthetic.generator import House, Style, generate
 from fleet2d.floorplan.synthetic.geometry import Box, inner_walls, overlap

@@ -18,7 +18,7 @@ from fleet2d.streams import stream_key
 from fleet2d.units import PositiveDuration, Share
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 MINUTE = timedelta(minutes=1)
 DAY = timedelta(days=1)

@@ -17,7 +17,7 @@ from fleet2d.errors import ComponentError
 from fleet2d.units import PositiveDuration
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 SECOND_US = 1_000_000
 

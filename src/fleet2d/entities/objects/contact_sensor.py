@@ -7,7 +7,7 @@ from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.objects.sensor import I64, Sensor, SensorView
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 
 
 @register("object", "contact_sensor")

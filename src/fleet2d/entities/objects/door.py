@@ -9,8 +9,8 @@ from fleet2d.component import Settings, register
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.doorways import Doorway
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.problems import did_you_mean, problem
 from fleet2d.units import PositiveDuration, TimeOfDay
 

@@ -9,7 +9,7 @@ from fleet2d.component import register
 from fleet2d.entities.objects.sensor import I64, Mask, Sensor, SensorView, seen_by
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import TURN, half_sine
 from fleet2d.kernels.region import region_contains_points, visible_region
 from fleet2d.units import AngleDeg, Duration, PositiveLength, micros

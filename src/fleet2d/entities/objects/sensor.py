@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.entities.objects.home_object import HomeObject
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 
 I64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]

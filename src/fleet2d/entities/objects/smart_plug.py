@@ -9,7 +9,7 @@ from fleet2d.component import register
 from fleet2d.entities.objects.occupancy_sensor import room_of
 from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, seen_by
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home.home import Home
 from fleet2d.units import Duration, Length, micros
 
 

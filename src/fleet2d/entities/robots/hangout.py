@@ -22,7 +22,7 @@ from fleet2d.units import Length, PositiveDuration, Share
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
-    from fleet2d.floorplan.space import Space
+    from fleet2d.floorplan.home.space import Space
 
 # A room is looked over when so much of it was shown, or from so many places.
 ENOUGH = 0.95

@@ -6,7 +6,7 @@ from fleet2d.entities.place import ANY
 from fleet2d.routines.household import Household, MemberRooms
 
 if TYPE_CHECKING:
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
     from fleet2d.floorplan.plan import Room
     from fleet2d.routines.activity import Activity
 

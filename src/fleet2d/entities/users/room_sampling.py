@@ -14,7 +14,7 @@ from fleet2d.entities.kinds import kept_places
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyTakes, Takes
 from fleet2d.routines.laws import weighted

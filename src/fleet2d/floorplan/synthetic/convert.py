@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import shapely
 
-from fleet2d.floorplan.doorways import DoorLine
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.synthetic.access import Gap
 from fleet2d.floorplan.synthetic.generator import House
 from fleet2d.floorplan.synthetic.geometry import OUTER_WALL, UNIT_M, WALL, Box, Wall

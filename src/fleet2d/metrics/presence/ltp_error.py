@@ -31,7 +31,7 @@ from fleet2d.units import PositiveDuration, Share
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
+    from fleet2d.floorplan.home.home import Home
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]

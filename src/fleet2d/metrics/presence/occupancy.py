@@ -14,8 +14,8 @@ from fleet2d.kernels.mesh import SUB
 
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home import Home
-    from fleet2d.floorplan.space import Space
+    from fleet2d.floorplan.home.home import Home
+    from fleet2d.floorplan.home.space import Space
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]

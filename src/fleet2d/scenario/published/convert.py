@@ -11,8 +11,8 @@ import yaml
 
 from fleet2d.artifacts.directory import is_disk_full
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
-from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.houseexpo import read_houseexpo
+from fleet2d.floorplan.formats.houseexpo import read_houseexpo
+from fleet2d.floorplan.home.home import Home
 from fleet2d.scenario.document import Document, Keys, read_document
 from fleet2d.scenario.model import Scenario, load_scenario
 from fleet2d.scenario.published.entities import body_keys, convert_robot, convert_users, free_name

@@ -1,0 +1,333 @@
+"""Vector floor plans as GeoJSON (RFC 7946): rooms, walls, doors and furniture as features."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from pydantic import Field
+from shapely import MultiPolygon, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.component import register
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.geojson_file import Feature, Move, Units, in_metres, read_features
+from fleet2d.floorplan.formats.native import read_blocks, read_uses
+from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
+from fleet2d.floorplan.rooms.passage import (
+    TOUCH_M,
+    Passage,
+    door_axes,
+    find_passage,
+    shared_borders,
+)
+from fleet2d.floorplan.rooms.vocabulary import PRIORITY, UNKNOWN, room_type, usual_type
+from fleet2d.floorplan.source import FloorPlanSource, distinct_names, read_json, read_numbers
+from fleet2d.paths import InputPath
+from fleet2d.units import Length
+
+WALL_M = 0.1
+# How far inside the door one stands that leads outside, and how far off an entrance may be put.
+INSIDE_M, ENTRANCE_REACH_M = 0.3, 1.0
+# Side of an object of which the file only has the place.
+POINT_OBJECT_M = 0.1
+
+_USES = ("category", "type", "usage", "use", "room", "room_type", "function")
+# IMDF's categories of units, where the vocabulary has another word for them.
+_IMDF_TYPES = {
+    "restroom": "toilet",
+    "shower": "bathroom",
+    "lounge": "living_room",
+    "privatelounge": "living_room",
+    "walkway": "hallway",
+    "fitnessroom": "gym",
+    "foodservice": "dining_room",
+    "parking": "garage",
+    "elevator": "passenger_elevator",
+    "unspecified": UNKNOWN,
+    "nonpublic": UNKNOWN,
+}
+
+
+@register("floorplan", "geojson")
+class GeoJson(FloorPlanSource):
+    """A vector plan in GeoJSON: our own dialect, or IMDF.
+
+    Attributes:
+        path: The plan's GeoJSON file.
+        units: What its coordinates are; auto goes by the file.
+        wall_m: Thickness of walls drawn as lines, and of those between rooms that touch.
+        level: Which floor, by its id, name or ordinal; None for the one of ordinal 0.
+    """
+
+    path: InputPath = Field(description="the plan's GeoJSON file")
+    units: Units = Field(
+        default="auto", description="what its coordinates are; auto goes by the file"
+    )
+    wall_m: Length = Field(
+        default=WALL_M,
+        ge=0,
+        le=1,
+        description="thickness of walls drawn as lines, and of those between rooms that touch",
+    )
+    level: str | None = Field(
+        default=None,
+        coerce_numbers_to_str=True,
+        description="which floor, by id, name or ordinal; left out: that of ordinal 0",
+    )
+
+    def load(self) -> FloorPlan:
+        """Read the plan."""
+        return read_geojson(
+            self.path, self.cell, units=self.units, wall_m=self.wall_m, level=self.level
+        )
+
+
+def read_geojson(
+    path: Path,
+    cell: float = 0.05,
+    *,
+    units: Units = "auto",
+    wall_m: float = WALL_M,
+    level: str | None = None,
+) -> FloorPlan:
+    """Read a GeoJSON floor plan.
+
+    Free are the areas of kind `free`; where there are none, the rooms. Walls are taken away from
+    that. Where neither is in the file, walls stand where rooms touch. Doors lead through walls.
+
+    Args:
+        path: The GeoJSON file, a FeatureCollection.
+        cell: Side of a grid cell [m].
+        units: What the coordinates are; auto goes by the file's member `units`, else by how far
+            it extends.
+        wall_m: Thickness of walls that are drawn as lines, and of those where rooms touch [m].
+        level: Which floor, by its id, name or ordinal; None for the one of ordinal 0.
+
+    Raises:
+        FloorPlanError: The file can't be read, isn't such a plan, or has no free space.
+    """
+    content = read_json(path)
+    try:
+        notes: list[str] = []
+        raw = read_features(content, level, notes)
+        features, move = in_metres(raw, content, units, notes)
+        name = content.get("name")
+        return _Draft(features, move, wall_m, notes).plan(
+            name if isinstance(name, str) and name else path.stem, cell, path.name
+        )
+    except FloorPlanError as error:
+        raise FloorPlanError(f"{path}: {error}") from error
+
+
+@dataclass
+class _Door:
+    """A doorway of the file: its middle line and what lies there."""
+
+    feature: Feature
+    passage: Passage
+
+    @property
+    def line(self) -> DoorLine:
+        name = self.feature.text("name")
+        return DoorLine(*self.passage.line, name, self.feature.kind == "door")
+
+
+class _Draft:
+    """A plan on its way from features to what `FloorPlan.build` takes; all in metres."""
+
+    def __init__(
+        self, features: Sequence[Feature], move: Move, wall_m: float, notes: list[str]
+    ) -> None:
+        self.features = features
+        self.move = move
+        self.notes = notes
+        self.rooms = [_areas([room]) for room in self._of("room")]
+        self.free = self._free(wall_m)
+        self.doors: list[_Door] = []
+        self.ways_out: list[Passage] = []
+        self._cut_doors()
+
+    def plan(self, name: str, cell: float, file: str) -> FloorPlan:
+        """Build the plan."""
+        return FloorPlan.build(
+            name,
+            self.free,
+            self._regions(cell),
+            cell,
+            source=f"GeoJSON, {file}",
+            entrance=self._entrance(),
+            doorways=[door.line for door in self.doors] if self._of("door", "opening") else None,
+            regions_are="exact" if self.rooms else "none",
+            objects=self._objects(),
+            no_go=[part for area in self._of("no_go") for part in _parts(area.shape)],
+            notes=self.notes,
+        )
+
+    def _of(self, *kinds: str) -> list[Feature]:
+        return [feature for feature in self.features if feature.kind in kinds]
+
+    # --- Free space ----------------------------------------------------------------------------
+
+    def _free(self, wall_m: float) -> MultiPolygon:
+        """Return the free space, without the doors that lead through its walls."""
+        open_space, walls = _areas(self._of("free")), self._walls(wall_m)
+        if open_space.is_empty and not self.rooms:
+            raise FloorPlanError(
+                "it has no room and no free space: no feature of kind room or free"
+            )
+        if open_space.is_empty:
+            free = self._room_space(walls, wall_m)
+        else:
+            free = open_space
+        free = _multi(free.difference(walls))
+        if free.is_empty:
+            raise FloorPlanError("no free space is left: all of it is wall")
+        return free
+
+    def _walls(self, wall_m: float) -> BaseGeometry:
+        """Return the walls that the file draws."""
+        shapes = [wall.shape for wall in self._of("wall")]
+        lines = [shape for shape in shapes if not shape.geom_type.endswith("Polygon")]
+        if lines and wall_m == 0:
+            self.notes.append(f"walls drawn as lines: {len(lines)}, ignored as wall_m is 0")
+        solid = [shape for shape in shapes if shape.geom_type.endswith("Polygon")]
+        return shapely.union_all([*solid, _thick(lines, wall_m)])
+
+    def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
+        """Return the rooms, with walls between those that touch, unless the file has those."""
+        free, borders = _areas(self._of("room")), shared_borders(self.rooms)
+        length = sum(line.length for line in borders)
+        near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
+        drawn = sum(float(line.intersection(near).length) for line in borders)
+        if borders and wall_m > 0 and drawn < length / 2:
+            self.notes.append(
+                f"rooms touch along {length:.1f} m: there are walls of {wall_m:g} m but for doors"
+            )
+            return _multi(free.difference(_thick(borders, wall_m)))
+        # A gap that is no wider than drawings are exact isn't meant.
+        joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
+        return _multi(shapely.union_all([free, *joints]))
+
+    def _cut_doors(self) -> None:
+        """Open the walls where doors are; a door that leads outside stays shut."""
+        cuts: list[Polygon] = []
+        for feature in self._of("door", "opening"):
+            for axes in door_axes(feature.shape):
+                passages = [find_passage(self.free, start, end) for start, end in axes]
+                through = next((p for p in passages if p and p.through), None)
+                out = next((p for p in passages if p), None)
+                name = feature.text("name") or feature.where
+                if through:
+                    self.doors.append(_Door(feature, through))
+                    cuts += [through.opening] if through.halves else []
+                elif out:
+                    self.ways_out.append(out)
+                    self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
+                else:
+                    self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
+        self.free = _multi(shapely.union_all([self.free, *cuts]))
+
+    # --- What is in it -------------------------------------------------------------------------
+
+    def _regions(self, cell: float) -> list[LabelledRegion]:
+        """Return the rooms, and with each its half of the passages through its walls."""
+        halves: list[list[Polygon]] = [[] for _ in self.rooms]
+        for door in self.doors if self.rooms else ():
+            for half in door.passage.halves:
+                away = shapely.distance(self.rooms, half).tolist()
+                overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
+                if max(overlap) < half.area / 2:
+                    halves[away.index(min(away))].append(half)
+        given = [room.text("name") for room in self._of("room")]
+        names = distinct_names(given, "rooms", self.notes)
+        regions = []
+        for feature, area, more, name in zip(
+            self._of("room"), self.rooms, halves, names, strict=True
+        ):
+            # Walls move to the lattice: a little more, so that no cell at them is in no room.
+            shape = shapely.union_all([area, *more]).buffer(cell / 16, join_style="mitre")
+            labels, kind = _use_of(feature)
+            said = feature.properties.get("labels")
+            if isinstance(said, list) and all(isinstance(label, str) for label in said):
+                labels = tuple(said)
+            regions.append(LabelledRegion(labels, _multi(shape), name, kind))
+        return regions
+
+    def _entrance(self) -> tuple[float, float] | None:
+        """Return the place just inside the front door, if the file tells."""
+        given = [feature.shape for feature in self._of("entrance")]
+        if given:
+            if len(given) > 1:
+                self.notes.append(f"it has {len(given)} entrances: the first was taken")
+            at = given[0].centroid
+        elif len(self.ways_out) == 1:
+            at = shapely.Point(self.ways_out[0].inside(INSIDE_M))
+        else:
+            return None
+        roomy = self.free.buffer(-INSIDE_M / 3, join_style="mitre")
+        if not roomy.contains(at) and not roomy.is_empty:
+            near = shapely.get_point(shapely.shortest_line(roomy, at), 0)
+            if near.distance(at) <= ENTRANCE_REACH_M:
+                at = near
+        return round(float(at.x), 6), round(float(at.y), 6)
+
+    def _objects(self) -> list[PlacedObject]:
+        return [thing for feature in self._of("object") for thing in _placed(feature, self.move)]
+
+
+def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
+    """Return a room's labels and its type: by what it is used for, else by its name."""
+    use, name = room.text(*_USES) or UNKNOWN, room.text("name")
+    kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
+    if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:
+        return (name,), usual_type(name)
+    return () if kind == UNKNOWN else (use,), kind
+
+
+def _moved(move: Move, x: float, y: float) -> tuple[float, float]:
+    """Return a place of the file in the frame of the plan [m]."""
+    there_x, there_y = move(np.array([[x, y]]))[0].tolist()
+    return there_x, there_y
+
+
+def _placed(feature: Feature, move: Move) -> Iterable[PlacedObject]:
+    shape, properties, where = feature.shape, feature.properties, f"{feature.where}.properties"
+    if isinstance(shape, Point):
+        half = POINT_OBJECT_M / 2
+        shape = shapely.box(shape.x - half, shape.y - half, shape.x + half, shape.y + half)
+    kind = feature.text("type", "category", "object") or "object"
+    blocks = read_blocks(properties.get("blocks", "path"), f"{where}.blocks")
+    (heading,) = read_numbers([properties.get("heading") or 0.0], 1, f"{where}.heading")
+    uses = []
+    for use in read_uses(properties.get("uses") or [], f"{where}.uses"):
+        x, y = _moved(move, use.x, use.y)
+        approach = None if use.approach is None else _moved(move, *use.approach)
+        uses.append(replace(use, x=x, y=y, approach=approach))
+    name, parts = feature.text("name") or "", _parts(shape)
+    for number, part in enumerate(parts):
+        own = f"{name} {number + 1}" if name and len(parts) > 1 else name
+        yield PlacedObject(
+            own, room_type(kind), part, blocks, () if number else tuple(uses), heading
+        )
+
+
+def _thick(lines: Iterable[BaseGeometry], wall_m: float) -> BaseGeometry:
+    """Return walls of a thickness along lines; square at the ends, so that corners are filled."""
+    shapes = [line.buffer(wall_m / 2, cap_style="square", join_style="mitre") for line in lines]
+    return shapely.union_all(shapes)
+
+
+def _areas(features: Iterable[Feature]) -> MultiPolygon:
+    return _multi(shapely.union_all([feature.shape for feature in features]))
+
+
+def _multi(shape: BaseGeometry) -> MultiPolygon:
+    return MultiPolygon(_parts(shape))
+
+
+def _parts(shape: BaseGeometry) -> list[Polygon]:
+    return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]

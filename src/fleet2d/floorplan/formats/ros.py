@@ -1,0 +1,287 @@
+"""Maps of the ROS `map_server`: a YAML file, and an image that says what is free and occupied."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field
+from shapely import Polygon
+
+from fleet2d.component import register
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.occupancy import OccupancyMap, free_space
+from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
+from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import MAX_COORDINATE_M, PixelSource, read_yaml, shown_value
+from fleet2d.paths import InputPath
+from fleet2d.units import Length
+
+SPECK_AREA_M2 = 0.02
+RAY_WIDTH_M = 0.3
+
+# The grey that map savers write for unknown, and above which free_thresh it would be free.
+UNKNOWN_GREY = 205 / 255
+MAX_RESOLUTION_M = MAX_CELL_M
+
+_KEYS = {
+    "image": "image: map.pgm",
+    "resolution": "resolution: 0.05",
+    "origin": "origin: [0.0, 0.0, 0.0]",
+    "negate": "negate: 0",
+    "occupied_thresh": "occupied_thresh: 0.65",
+    "free_thresh": "free_thresh: 0.196",
+}
+
+
+@register("floorplan", "ros")
+class Ros(PixelSource):
+    """A map of the ROS map_server.
+
+    Attributes:
+        path: The map's YAML file; it names the image.
+        speck_area_m2: Groups of pixels smaller than this with free space all round, such as the
+            legs of a chair, become free; 0 keeps all.
+        ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
+            and gaps in walls; 0 keeps all that is connected.
+        simplify: How far straightened walls may be from the sides of the map's pixels; 0 keeps
+            the walls exact.
+    """
+
+    path: InputPath = Field(description="the map's YAML file; it names the image")
+    speck_area_m2: float = Field(
+        default=SPECK_AREA_M2,
+        ge=0,
+        description="smaller groups of pixels with free space all round become free; 0 keeps all",
+    )
+    ray_width: Length = Field(
+        default=RAY_WIDTH_M,
+        ge=0,
+        description="free space narrower than this doesn't lead on; 0 keeps all that is connected",
+    )
+    simplify: Length = Field(
+        default=0.0,
+        ge=0,
+        description="how far straightened walls may be from the map's pixels; 0: exact walls",
+    )
+
+    @classmethod
+    def usual_cell(cls, settings: Mapping[str, Any]) -> float:
+        """Return the map's resolution."""
+        return _settings(read_yaml(settings["path"])).usual_cell
+
+    def files(self) -> list[Path]:
+        """Return the YAML file and the image."""
+        settings = _settings(read_yaml(self.path))
+        return [self.path, _image_file(settings.image, self.path)[0]]
+
+    def load(self) -> FloorPlan:
+        """Read the map."""
+        return read_ros(
+            self.path,
+            self.cell,
+            speck_area_m2=self.speck_area_m2,
+            ray_width=self.ray_width,
+            simplify=self.simplify,
+        )
+
+
+def read_ros(
+    path: Path,
+    cell: float | None = None,
+    *,
+    speck_area_m2: float = SPECK_AREA_M2,
+    ray_width: float = RAY_WIDTH_M,
+    simplify: float = 0.0,
+) -> FloorPlan:
+    """Read a map of the ROS map_server.
+
+    Args:
+        path: The YAML file.
+        cell: Side of a grid cell [m]; None for the map's resolution.
+        speck_area_m2: Groups of pixels smaller than this become free [m²]; see `free_space`.
+        ray_width: Free space narrower than this doesn't lead on [m]; see `free_space`.
+        simplify: How far straightened walls may be from the sides of the pixels [m].
+
+    Raises:
+        FloorPlanError: A file can't be read, isn't such a map, or has no free space.
+    """
+    content = read_yaml(path)
+    try:
+        settings = _settings(content)
+        file, notes = _image_file(settings.image, path)
+        raw = _occupancy(settings, read_grey(file), notes)
+        free, done = free_space(raw, speck_area_m2=speck_area_m2, ray_width=ray_width)
+        notes += done
+        if simplify > 0:
+            free = _simplified(free, simplify, notes)
+        return FloorPlan.build(
+            path.stem,
+            free,
+            cell=settings.usual_cell if cell is None else cell,
+            source=f"ROS map, {path.name}",
+            doorways=None,
+            regions_are="none",
+            notes=notes,
+        )
+    except FloorPlanError as error:
+        raise FloorPlanError(f"{path}: {error}") from error
+
+
+# --- The YAML file -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _MapSettings:
+    """What the YAML file says; lengths in metres, the angle in radians."""
+
+    image: str
+    resolution: float
+    origin: tuple[float, float, float]
+    negate: bool
+    occupied_thresh: float
+    free_thresh: float
+    raw: bool
+
+    @property
+    def usual_cell(self) -> float:
+        return max(self.resolution, MIN_CELL_M)
+
+
+def _settings(content: dict[str, Any]) -> _MapSettings:
+    for key, line in _KEYS.items():
+        if key not in content:
+            raise FloorPlanError(f"no ROS map: the key {key!r} is missing, as in `{line}`")
+    image = content["image"]
+    if not isinstance(image, str) or not image:
+        raise FloorPlanError(
+            f"image is {shown_value(image)}: the name of a PGM or PNG file is expected"
+        )
+    resolution = _number(content["resolution"], "resolution")
+    if not 0 < resolution <= MAX_RESOLUTION_M:
+        raise FloorPlanError(
+            f"resolution is {resolution:g} m per pixel: above 0 and at most"
+            f" {MAX_RESOLUTION_M:g} m is expected (0.05 is usual)"
+        )
+    free, occupied = (_threshold(content, key) for key in ("free_thresh", "occupied_thresh"))
+    if free > occupied:
+        raise FloorPlanError(
+            f"free_thresh, {free:g}, is above occupied_thresh, {occupied:g}: they are the wrong way"
+            " round"
+        )
+    mode = content.get("mode", "trinary")
+    if mode not in ("trinary", "scale", "raw"):
+        raise FloorPlanError(f"mode is {shown_value(mode)}: trinary, scale or raw is expected")
+    negate = content["negate"]
+    if negate not in (0, 1):
+        raise FloorPlanError(f"negate is {shown_value(negate)}: 0 or 1 is expected")
+    if negate and mode == "raw":
+        raise FloorPlanError(
+            "negate is 1 in mode raw, which ROS 1 and ROS 2 take differently: save the map with"
+            " negate 0, or as trinary"
+        )
+    origin = _origin(content["origin"])
+    return _MapSettings(image, resolution, origin, bool(negate), occupied, free, mode == "raw")
+
+
+def _number(value: object, key: str) -> float:
+    """Return a finite number; YAML takes 5e-2, which people write, for text."""
+    try:
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError
+        number = float(value)
+    except (ValueError, OverflowError):
+        raise FloorPlanError(f"{key} is {shown_value(value)}: a number is expected") from None
+    if not math.isfinite(number):
+        raise FloorPlanError(f"{key} is {number}: a finite number is expected")
+    return number
+
+
+def _threshold(content: dict[str, Any], key: str) -> float:
+    value = _number(content[key], key)
+    if not 0 <= value <= 1:
+        raise FloorPlanError(f"{key} is {value:g}: a probability from 0 to 1 is expected")
+    return value
+
+
+def _origin(value: object) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise FloorPlanError(f"origin is {shown_value(value)}: a list [x, y, yaw] is expected")
+    x, y, yaw = (_number(v, f"origin[{k}]") for k, v in enumerate(value))
+    if max(abs(x), abs(y)) > MAX_COORDINATE_M:
+        found = shown_value(value)
+        raise FloorPlanError(f"origin is {found}: too far out for coordinates in metres")
+    return x, y, yaw
+
+
+# --- The image ---------------------------------------------------------------------------------
+
+
+def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
+    """Find the image, and say so if it isn't where the YAML file says."""
+    file = path.parent / image
+    if _is_file(file):
+        return file, []
+    # Maps move to other computers, and absolute paths in them don't.
+    beside = path.parent / image.replace("\\", "/").rpartition("/")[2]
+    if _is_file(beside):
+        return beside, [f"there is no image {image}: {beside.name} beside {path.name} was taken"]
+    raise FloorPlanError(
+        f"there is no image {file}: put it there, or correct `image`, which is relative to the"
+        " YAML file"
+    )
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # its name is too long to be one
+        return False
+
+
+def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -> OccupancyMap:
+    """Tell free, occupied and unknown pixels apart as map_server does."""
+    shades = np.arange(picture.white + 1) / picture.white
+    chance = shades if settings.negate else 1 - shades
+    if settings.raw:  # percent; what is above 100 is unknown, and neither free nor occupied
+        percent = np.rint(shades * 255)
+        chance = np.where(percent <= 100, percent / 100, np.nan)
+    occupied = _chosen(chance > settings.occupied_thresh, picture)
+    free = _chosen(chance < settings.free_thresh, picture)
+    grey = round(UNKNOWN_GREY * picture.white)
+    if not settings.negate and chance[grey] < settings.free_thresh and picture.white >= 255:
+        pixels = int(np.count_nonzero(picture.values == grey))
+        if pixels:
+            notes.append(
+                f"free_thresh is {settings.free_thresh:g}: so {pixels} pixels of the grey that map"
+                " savers write for unknown count as free; 0.196 makes them unknown"
+            )
+    x, y, yaw = settings.origin
+    # Rounded, so that the last bit of a machine's cosine doesn't matter, and quarter turns are.
+    turn = (round(math.cos(yaw), 12), round(math.sin(yaw), 12))
+    return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn)
+
+
+def _chosen(shades: NDArray[np.bool_], picture: GreyPicture) -> NDArray[np.bool_]:
+    """Return the opaque pixels of some shades."""
+    chosen: NDArray[np.bool_] = shades[picture.values]
+    return chosen if picture.clear is None else chosen & ~picture.clear
+
+
+def _simplified(free: Polygon, tolerance: float, notes: list[str]) -> Polygon:
+    """Return the polygon with fewer corners, if that leaves a sound one."""
+    simple: Polygon = shapely.simplify(free, tolerance, preserve_topology=True)
+    if simple.is_empty or not simple.is_valid:
+        notes.append(f"walls are exact: straightening them within {tolerance:g} m would cross them")
+        return free
+    before, after = (shapely.count_coordinates(polygon) for polygon in (free, simple))
+    notes.append(
+        f"walls were straightened within {tolerance:g} m: {after} corners instead of {before}, and"
+        f" {simple.area - free.area:+.2f} m2"
+    )
+    return simple

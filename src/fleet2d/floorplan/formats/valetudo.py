@@ -1,0 +1,334 @@
+"""Maps of robot vacuums with Valetudo: JSON, format version 2.
+
+Their pixels are numbered from the top and their lengths are in centimetres. Here the place
+(x, y) [cm] of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored; the
+plan and the recorded path share this frame.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+import shapely.affinity
+from numpy.typing import NDArray
+from pydantic import Field
+from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.component import register
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.occupancy import outline
+from fleet2d.floorplan.formats.valetudo_file import (
+    Box,
+    Layer,
+    Mask,
+    checked_map,
+    entities_of,
+    note_size,
+    objects_in,
+    pixel_side,
+    read_charger,
+    read_layers,
+    read_points,
+)
+from fleet2d.floorplan.objects import PlacedObject, UsePlace
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, usual_type
+from fleet2d.floorplan.source import PixelSource, distinct_names, read_json
+from fleet2d.kernels.fields import squared_distance
+from fleet2d.kernels.masks import label_parts
+from fleet2d.paths import InputPath
+
+NoGo = Literal["keep_out", "wall", "ignore"]
+
+# A charger's side, the room that one takes in front of it, and how far off that may be [m].
+CHARGER_M, STAND_RADIUS_M, STAND_REACH_M = 0.2, 0.2, 1.0
+
+MAX_PARTS = 10_000
+
+# What touches a pixel by no more than this [pixels] only shares its side.
+TINY = 1e-6
+
+
+@register("floorplan", "valetudo")
+class Valetudo(PixelSource):
+    """A map of a robot vacuum that runs Valetudo.
+
+    Attributes:
+        path: The map's JSON file.
+        no_go: What no-go areas and virtual walls are: areas that robots keep out of, walls for
+            everybody and for sight, or nothing.
+    """
+
+    path: InputPath = Field(description="the map's JSON file")
+    no_go: NoGo = Field(
+        default="keep_out",
+        description="no-go areas and virtual walls: robots keep_out of them, they are a wall, or"
+        " ignore them",
+    )
+
+    @classmethod
+    def usual_cell(cls, settings: Mapping[str, Any]) -> float:
+        """Return the side of the map's pixels."""
+        return pixel_side(checked_map(read_json(settings["path"])))
+
+    def load(self) -> FloorPlan:
+        """Read the map."""
+        return read_valetudo(self.path, self.cell, no_go=self.no_go)
+
+
+def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_out") -> FloorPlan:
+    """Read the map of a robot vacuum.
+
+    Free is what is floor or segment and not wall, along the sides of the pixels. Every segment is a
+    room under the name that it has in the vacuum's app.
+
+    Args:
+        path: The JSON file.
+        cell: Side of a grid cell [m]; None for the side of the map's pixels.
+        no_go: What becomes of no-go areas and virtual walls: `FloorPlan.no_go`, or the pixels that
+            they touch are walls, or they are ignored.
+
+    Raises:
+        FloorPlanError: The file can't be read, isn't such a map, or has no floor.
+    """
+    content = read_json(path)
+    try:
+        content = checked_map(content)
+        pixel_m = pixel_side(content)
+        notes: list[str] = []
+        layers = read_layers(content, notes)
+        box = Box.around(np.concatenate([layer.runs for layer in layers]))
+        note_size(content, box, notes)
+        free = _free_pixels(layers, box, notes)
+        areas = _no_go_areas(content, free, box, no_go, notes)
+        if not free.any():
+            raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
+        _note_entities(content, notes)
+        regions = _regions(layers, pixel_m, notes)
+        return FloorPlan.build(
+            path.stem,
+            _in_metres(free, box, pixel_m),
+            regions,
+            pixel_m if cell is None else cell,
+            source=f"Valetudo map, {path.name}",
+            doorways=None,
+            regions_are="exact" if regions else "none",
+            objects=_charger(content, free, box),
+            no_go=areas,
+            notes=notes,
+        )
+    except FloorPlanError as error:
+        raise FloorPlanError(f"{path}: {error}") from error
+
+
+def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
+    """Read where the vacuum drove.
+
+    Returns:
+        The pieces of its path in the file's order, each float64 (n, 2) [m] in the plan's frame, as
+        recorded: at unknown times, and points may repeat. An empty list if the map has no path.
+
+    Raises:
+        FloorPlanError: The file can't be read, or isn't such a map.
+    """
+    content = read_json(path)
+    try:
+        pieces = [
+            read_points(entity, where)
+            for entity, where in entities_of(checked_map(content), "path")
+        ]
+    except FloorPlanError as error:
+        raise FloorPlanError(f"{path}: {error}") from error
+    return [piece for piece in pieces if len(piece)]
+
+
+def read_valetudo_path(path: Path) -> NDArray[np.float64]:
+    """Read where the vacuum drove, float64 (n, 2) [m]: all pieces of the path, one after another.
+
+    Raises:
+        FloorPlanError: The file can't be read, or isn't such a map.
+    """
+    return np.concatenate([np.empty((0, 2)), *read_valetudo_paths(path)])
+
+
+def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
+    """Read where the vacuum's charger is (x, y) [m] in the plan's frame, if the map says so.
+
+    Raises:
+        FloorPlanError: The file can't be read, or isn't such a map.
+    """
+    content = read_json(path)
+    try:
+        return read_charger(checked_map(content))
+    except FloorPlanError as error:
+        raise FloorPlanError(f"{path}: {error}") from error
+
+
+# --- Free space and rooms ----------------------------------------------------------------------
+
+
+def _free_pixels(layers: list[Layer], box: Box, notes: list[str]) -> Mask:
+    """Return which pixels are floor and not wall, bool (rows, columns)."""
+    segments_at = np.zeros((box.rows, box.columns), np.uint16)
+    floor, wall = (np.zeros(segments_at.shape, np.bool_) for _ in range(2))
+    for layer in layers:
+        part = Box.around(layer.runs)
+        window = box.window(part)
+        if layer.kind == "wall":
+            wall[window] |= part.painted(layer.runs)
+        else:
+            floor[window] |= part.painted(layer.runs)
+        if layer.kind == "segment":
+            segments_at[window] += part.painted(layer.runs)
+    for both, what in (
+        (floor & wall, "floor and wall: they are taken for wall"),
+        (segments_at > 1, "in several segments: they belong to the smallest of those"),
+    ):
+        if both.any():
+            notes.append(f"{np.count_nonzero(both)} pixels are {what}")
+    return floor & ~wall
+
+
+def _in_metres(mask: Mask, box: Box, pixel_m: float) -> MultiPolygon:
+    """Return the exact outlines of pixels [m]."""
+    part = label_parts(mask, False)
+    if part.max(initial=-1) >= MAX_PARTS:
+        raise FloorPlanError(
+            f"its pixels are in {part.max() + 1} separate groups, more than {MAX_PARTS}: that is"
+            " noise, not a home"
+        )
+    rows, columns = np.nonzero(mask)
+    parts = part[rows, columns]
+    low = np.full((int(part.max(initial=-1)) + 1, 2), np.iinfo(np.int64).max)
+    high = np.zeros_like(low)
+    for axis, values in enumerate((rows, columns)):
+        np.minimum.at(low[:, axis], parts, values)
+        np.maximum.at(high[:, axis], parts, values + 1)
+    polygons = []
+    for index, ((row, column), (row1, column1)) in enumerate(zip(low, high, strict=True)):
+        polygon = outline(part[row:row1, column:column1] == index)
+        polygons.append(shapely.affinity.translate(polygon, box.column + column, box.row + row))
+    return shapely.transform(MultiPolygon(polygons), lambda xy: xy * pixel_m)
+
+
+def _regions(layers: list[Layer], pixel_m: float, notes: list[str]) -> list[LabelledRegion]:
+    """Return the segments in the file's order, each under a name of its own."""
+    regions: list[LabelledRegion] = []
+    segments = [layer for layer in layers if layer.kind == "segment"]
+    names = distinct_names([segment.name for segment in segments], "segments", notes)
+    for layer, name in zip(segments, names, strict=True):
+        box = Box.around(layer.runs)
+        shape = _in_metres(box.painted(layer.runs), box, pixel_m)
+        kind = usual_type(layer.name) if layer.named else UNKNOWN
+        regions.append(LabelledRegion((layer.name,), shape, name, kind))
+    return regions
+
+
+# --- What lies on the floor ---------------------------------------------------------------------
+
+
+def _no_go_areas(
+    content: dict[str, Any], free: Mask, box: Box, no_go: NoGo, notes: list[str]
+) -> list[Polygon]:
+    """Return the areas that robots keep out of [m]; those that are walls leave the free pixels."""
+    pixel_m = pixel_side(content)
+    areas: list[Polygon] = []
+    for kind, what in (("no_go_area", "no-go areas"), ("virtual_wall", "virtual walls")):
+        shapes = []
+        for entity, where in entities_of(content, kind):
+            shape = _forbidden(read_points(entity, where) / pixel_m, kind)
+            if shape.is_empty:
+                notes.append(f"{where}, {kind}, has no extent: ignored")
+            else:
+                shapes.append(shape)
+        if not shapes:
+            continue
+        done = {"keep_out": "robots keep out of them", "ignore": "ignored"}.get(no_go)
+        if no_go == "keep_out":
+            areas += [part for shape in shapes for part in _parts_in_metres(shape, pixel_m)]
+        if no_go == "wall":
+            before = np.count_nonzero(free)
+            for shape in shapes:
+                _take_out(shape, free, box)
+            area = (before - np.count_nonzero(free)) * pixel_m**2
+            done = f"obstacles on {area:.2f} m2 of floor"
+        notes.append(f"{what} in the map: {len(shapes)}, {done}")
+    return areas
+
+
+def _forbidden(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
+    """Return where a no-go area is, or the band a pixel wide round a virtual wall [pixels]."""
+    if kind == "virtual_wall":
+        if len(corners) < 2:
+            return Polygon()
+        return LineString(corners).buffer(0.5, cap_style="flat", join_style="mitre")
+    if len(corners) < 3:
+        return Polygon()
+    return shapely.make_valid(Polygon(corners), method="structure", keep_collapsed=False)
+
+
+def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
+    # Rounded, so that the last bits of a machine's arithmetic don't matter.
+    metres = shapely.transform(shape, lambda xy: np.round(xy * pixel_m, 6))
+    return [part for part in shapely.get_parts(metres).tolist() if part.geom_type == "Polygon"]
+
+
+def _take_out(shape: BaseGeometry, free: Mask, box: Box) -> None:
+    """Take out of the free pixels those that a shape [pixels] reaches into."""
+    shape = shape.buffer(-TINY, join_style="mitre")
+    x0, y0, x1, y1 = shape.bounds
+    first, last = (int(np.clip(y - box.row, 0, box.rows - 1)) for y in (y0, y1))
+    left, right = (int(np.clip(x - box.column, 0, box.columns - 1)) for x in (x0, x1))
+    shapely.prepare(shape)
+    for row in range(first, last + 1):  # by rows, to be modest in memory
+        columns = left + np.flatnonzero(free[row, left : right + 1])
+        x, y = columns + float(box.column), np.full(len(columns), float(box.row + row))
+        pixels = shapely.box(*np.stack([x, y, x + 1, y + 1]))
+        free[row, columns] = ~shapely.intersects(shape, pixels)
+
+
+def _charger(content: dict[str, Any], free: Mask, box: Box) -> list[PlacedObject]:
+    """Return the vacuum's charger, and where one stands in front of it."""
+    at = read_charger(content)
+    if at is None:
+        return []
+    (x, y), pixel_m, half = at, pixel_side(content), CHARGER_M / 2
+    roomy = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= (STAND_RADIUS_M / pixel_m) ** 2
+    rows, columns = np.nonzero(roomy)
+    stand_x, stand_y = ((n + 0.5) * pixel_m for n in (columns + box.column, rows + box.row))
+    away = (stand_x - x) ** 2 + (stand_y - y) ** 2
+    nearest = int(np.argmin(away)) if len(away) else None
+    front, uses = 0.0, tuple[UsePlace, ...]()
+    if nearest is not None and away[nearest] <= STAND_REACH_M**2:
+        to_x, to_y = round(float(stand_x[nearest]), 6), round(float(stand_y[nearest]), 6)
+        # Rounded, so that the last bit of a machine's arctangent doesn't matter.
+        front = round(math.atan2(to_y - y, to_x - x), 6)
+        uses = (UsePlace(to_x, to_y, round(math.atan2(y - to_y, x - to_x), 6)),)
+    footprint = shapely.box(x - half, y - half, x + half, y + half)
+    return [PlacedObject("charger", "charger", footprint, "nothing", uses, front)]
+
+
+def _note_entities(content: dict[str, Any], notes: list[str]) -> None:
+    """Say what the map has that the plan hasn't."""
+    charger = read_charger(content)
+    if charger is not None:
+        notes.append(f"the vacuum's charger is at ({charger[0]:.2f}, {charger[1]:.2f}) m")
+    pieces = [read_points(entity, where) for entity, where in entities_of(content, "path")]
+    points = sum(len(piece) for piece in pieces)
+    if points:
+        metres = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in pieces)
+        notes.append(
+            f"the vacuum's recorded path is {metres:.1f} m long, {points} points, in pieces:"
+            f" {len(pieces)}; it is no part of the plan"
+        )
+    counts = Counter(str(entity.get("type")) for entity, _ in objects_in(content, "entities"))
+    for kind in ("path", "charger_location", "robot_position", "no_go_area", "virtual_wall"):
+        counts.pop(kind, None)
+    if counts:
+        found = ", ".join(f"{kind} ({count})" for kind, count in counts.items())
+        notes.append(f"also in the map, without effect on the plan: {found}")

@@ -1,0 +1,1 @@
+"""Furniture: its catalogue, and how a home is furnished."""

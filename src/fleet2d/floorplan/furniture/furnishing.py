@@ -1,0 +1,115 @@
+"""Furniture that a scenario asks for: pieces that it places itself, and the rest by rule."""
+
+from dataclasses import replace
+from typing import Self
+
+import shapely
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.arrangement import number_objects
+from fleet2d.floorplan.furniture.catalogue import FURNITURE, stand_furniture
+from fleet2d.floorplan.furniture.furnish import furnish
+from fleet2d.floorplan.home.standing import BODY_RADIUS, standing_cells, with_approaches
+from fleet2d.floorplan.objects import Blocks, PlacedObject
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.headings import TURN
+from fleet2d.problems import did_you_mean, problem_at
+from fleet2d.units import AngleDeg, Length, PositiveLength
+
+# How far a piece may reach into a wall [m]: tape measures and traced walls differ by as much.
+INTO_WALL = 0.02
+
+
+class Furnishing(Settings):
+    """How a home is furnished by rule, see `fleet2d.floorplan.furniture.furnish.furnish`."""
+
+    seed: int = Field(default=0, ge=0, description="which of the many ways to furnish the home")
+    density: float = Field(
+        default=1.0, ge=0, le=10, description="how likely is what one can do without; 0: none of it"
+    )
+
+
+class FurniturePiece(Settings):
+    """A piece of furniture at a place in the home."""
+
+    type: str = Field(description="what it is, such as 'bed'", examples=["sofa"])
+    at: tuple[Length, Length] = Field(description="its middle [x, y] [m]", examples=[[2.5, 1.0]])
+    heading_deg: AngleDeg = Field(
+        default=90.0, description="where its front faces, counter-clockwise from +x"
+    )
+    size: tuple[PositiveLength, PositiveLength] | None = Field(
+        default=None,
+        description="its width and depth [m]; left out: the middle of what is usual",
+        examples=[[1.6, 2.0]],
+    )
+    name: str | None = Field(
+        default=None, min_length=1, description="its name; left out: its type and a number"
+    )
+    blocks: Blocks | None = Field(
+        default=None, description="what can't pass it; left out: what is usual for its type"
+    )
+
+    @model_validator(mode="after")
+    def _is_known(self) -> Self:
+        if self.type not in FURNITURE:
+            raise problem_at(
+                ("type",),
+                f"there is no furniture of type {self.type!r}{did_you_mean(self.type, FURNITURE)}"
+                f" Known: {', '.join(sorted(FURNITURE))}",
+                self.type,
+            )
+        return self
+
+    def stand(self) -> PlacedObject:
+        """Return the piece, with places to use it from that nobody has checked yet."""
+        heading = round(self.heading_deg / 360 * TURN) % TURN
+        size, blocks = self.size, self.blocks
+        return stand_furniture(
+            self.type, self.at, heading, size, name=self.name or "", blocks=blocks
+        )
+
+
+def furnished(
+    plan: FloorPlan, pieces: tuple[FurniturePiece, ...], rules: Furnishing | None
+) -> FloorPlan:
+    """Return a plan with the pieces that a scenario places, and the rest by rule if asked for.
+
+    Raises:
+        FloorPlanError: A piece stands outside the home or in a wall, or two have the same name.
+    """
+    if pieces:
+        things = [piece.stand() for piece in pieces]
+        for number, thing in enumerate(things):
+            _check_stands(plan, thing, f"floorplan.furniture[{number}]")
+        everything = [*plan.objects, *things]
+        standing = standing_cells(plan, BODY_RADIUS, everything)
+        reachable = [with_approaches(plan, thing, standing, everything) for thing in things]
+        plan = replace(plan, objects=number_objects([*plan.objects, *reachable]))
+    return plan if rules is None else furnish(plan, rules.seed, rules.density)
+
+
+def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
+    """Raise FloorPlanError unless a thing stands in free space."""
+    middle = thing.footprint.centroid
+    at = f"the {thing.type} at ({middle.x:g}, {middle.y:g}) m"
+    x0, y0, x1, y1 = plan.bounds
+    free = shapely.transform(shapely.union_all(plan.polygons), plan.lattice.to_metres)
+    if not free.intersects(middle):
+        raise FloorPlanError(
+            f"{where}: {at} is not inside {plan.name}, whose free space lies from"
+            f" ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m"
+        )
+    lost = shapely.difference(thing.footprint.buffer(-INTO_WALL), free).area
+    if lost > 0:
+        wide, deep = (b - a for a, b in zip(*_corners(thing), strict=True))
+        raise FloorPlanError(
+            f"{where}: {at} overlaps a wall of {plan.name}: its box is {wide:.2f} m x {deep:.2f} m;"
+            " move it, turn it (heading_deg), or give it another size"
+        )
+
+
+def _corners(thing: PlacedObject) -> tuple[tuple[float, float], tuple[float, float]]:
+    x0, y0, x1, y1 = thing.footprint.bounds
+    return (x0, y0), (x1, y1)

@@ -1,0 +1,246 @@
+"""A home while furniture is put into it, on its cells: what is free, and which ways stay open."""
+
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from fleet2d.floorplan.furniture.room_view import (
+    Group,
+    RoomView,
+    Score,
+    count_cells,
+    largest_part,
+    near,
+)
+from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.home.standing import BODY_RADIUS, Window, grown_cells, with_approaches
+from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.kernels.masks import label_parts
+from fleet2d.streams import Draws
+
+DOOR_CLEARANCE = 0.9
+"""Floor that is kept free before a doorway, to either side [m]."""
+
+Bool = NDArray[np.bool_]
+
+
+class Interior:
+    """A home while furniture is put into it.
+
+    Attributes:
+        plan: The home.
+        objects: What stands in it, what the plan brings first.
+        standing: Where the middle of a body can be among them, bool (rows, columns).
+    """
+
+    def __init__(self, plan: FloorPlan) -> None:
+        self.plan = plan
+        self.objects: list[PlacedObject] = []
+        self.standing: Bool = Space(plan, BODY_RADIUS).part_of_cell >= 0
+        self.whole = whole_cells(plan)
+        self.doors = door_cells(plan, self.standing)
+        self.taken = np.zeros_like(self.whole)
+        self._views: dict[int, RoomView] = {}
+        self._main: dict[int, Bool] = {}
+        self._approached = np.zeros_like(self.whole)
+        for thing in plan.objects:
+            window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
+            self.taken[window] |= covered
+            if thing.blocks != "nothing":
+                window, covered = grown_cells(plan.lattice, thing.footprint, BODY_RADIUS)
+                self.standing[window] &= ~covered
+        for thing in plan.objects:
+            self._keep(thing)
+
+    def place(self, room: Room, group: Group, draws: Draws, score: Score | None = None) -> bool:
+        """Put a group into a room if there is a place for it.
+
+        Args:
+            room: The room.
+            group: What to put there.
+            draws: What decides among good places.
+            score: More points for some places, see `RoomView.places`.
+        """
+        view = self.view(room)
+        for turn, row, column in view.places(group, self.taken, draws, score):
+            things = view.pieces(group, turn, row, column)
+            if things and self._fits(view, things):
+                window = view.rectangle(group, turn, row, column)
+                self.taken[window] = True
+                return True
+        return False
+
+    def view(self, room: Room) -> RoomView:
+        """Return a room as its walls see it."""
+        if room.index not in self._views:
+            self._views[room.index] = RoomView(self.plan, room, self.whole, self.doors)
+        return self._views[room.index]
+
+    def _fits(self, view: RoomView, things: list[PlacedObject]) -> bool:
+        """Add things if they stand free, can be used, and cut nobody's way."""
+        for thing in things:
+            if not shapely.covers(self._inside, thing.footprint):
+                return False
+        before = self.standing[view.window].copy()
+        grown = []
+        for thing in things:
+            if thing.blocks != "nothing":
+                window, covered = grown_cells(self.plan.lattice, thing.footprint, BODY_RADIUS)
+                self.standing[window] &= ~covered
+                grown.append(window)
+        usable = None
+        if self._ways_stay_open(view, before, grown):
+            usable = self._usable(view, things)
+        if usable is None:
+            self.standing[view.window] = before
+            return False
+        for thing in usable:
+            self._keep(thing)
+        return True
+
+    def _ways_stay_open(self, view: RoomView, before: Bool, grown: list[Window]) -> bool:
+        """Tell whether what was joined still is, and the room can still be entered.
+
+        Args:
+            view: The room.
+            before: Where a body could stand in its window.
+            grown: Where that has changed.
+        """
+        after = self.standing[view.window]
+        if bool((self._approached[view.window] & ~after).any()):
+            return False
+        if bool((before & view.inside).any()) and not bool((after & view.inside).any()):
+            return False
+        if not grown:
+            return True
+        # What stays joined close by stays joined; else there may be a way farther off.
+        near = tuple(_round([w[k] for w in grown], view.window[k].start) for k in (0, 1))
+        return not _split(before[near], after[near], 0) or not _split(before, after, view.pocket)
+
+    def _usable(self, view: RoomView, things: list[PlacedObject]) -> list[PlacedObject] | None:
+        """Return the things with ways to use them, or None if one can't be used."""
+        usable, everything = [], [*self.objects, *things]
+        for thing in things:
+            reachable = with_approaches(self.plan, thing, self._reached(view), everything)
+            if thing.uses and not reachable.uses:
+                return None
+            usable.append(reachable)
+        return usable
+
+    def _reached(self, view: RoomView) -> Bool:
+        """Return the standing room of a room and round it that hangs together."""
+        index = view.room.index
+        if index not in self._main:
+            self._main[index] = np.zeros_like(self.standing)
+            main = largest_part(self.standing[view.window], view.inside)
+            self._main[index][view.window] = main
+        # It is never split, so what is left of it still hangs together.
+        return self._main[index] & self.standing
+
+    def _keep(self, thing: PlacedObject) -> None:
+        """Note a thing, and the ways to it as what nothing may be put on."""
+        lattice = self.plan.lattice
+        self.objects.append(thing)
+        for use in thing.uses:
+            if use.approach is not None:
+                row, column = lattice.cell_of(*lattice.point_at(use.approach))
+                self._approached[row, column] = bool(self.standing[row, column])
+
+    @cached_property
+    def _inside(self) -> shapely.Geometry:
+        """The free space [m], prepared."""
+        lattice = self.plan.lattice
+        inside = shapely.transform(shapely.union_all(self.plan.polygons), lattice.to_metres)
+        shapely.prepare(inside)
+        return inside
+
+
+def _round(slices: list[slice], start: int) -> slice:
+    """Return the slice that holds others and one cell more to either side, counted from a start."""
+    first, last = min(s.start for s in slices) - 1, max(s.stop for s in slices) + 1
+    return slice(max(first - start, 0), last - start)
+
+
+def _split(before: Bool, after: Bool, pocket: int) -> bool:
+    """Tell whether a part of a mask was cut in two, or lost although larger than a pocket."""
+    old, new = (label_parts(np.ascontiguousarray(mask), False) for mask in (before, after))
+    parts = int(old.max()) + 1
+    whose, now = old[after], new[after]
+    becomes = np.full(parts, -1, np.int64)
+    becomes[whose] = now
+    if bool((becomes[whose] != now).any()):
+        return True
+    sizes = np.bincount(old[before], minlength=parts)
+    return bool(((becomes < 0) & (sizes > pocket)).any())
+
+
+def whole_cells(plan: FloorPlan) -> Bool:
+    """Return the free cells that no wall cuts, bool (rows, columns).
+
+    Walls are followed in steps of a quarter of a cell, so a wall that only nicks the corner of a
+    cell may be missed.
+    """
+    cells: Bool = plan.free.copy()
+    for polygon in plan.polygons:
+        for ring in rings(polygon):
+            points = shapely.get_coordinates(ring)
+            parts = np.abs(np.diff(points, axis=0)).max(axis=1) // (UNITS_PER_CELL // 4) + 1
+            parts = parts.astype(np.int64)
+            piece = np.repeat(np.arange(len(parts)), parts)
+            step = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
+            share = (step / parts[piece])[:, None]
+            along = points[piece] * (1 - share) + points[piece + 1] * share
+            # A wall along the side of a cell touches it without being in it.
+            inner = along[(along % UNITS_PER_CELL != 0).all(axis=1)]
+            column, row = (inner // UNITS_PER_CELL).astype(np.int64).T
+            cells[row, column] = False
+    return cells
+
+
+def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
+    """Return the cells before doorways and before borders that rooms share, bool (rows, columns).
+
+    A border counts where a body can walk across it (`standing` on either side, and an arm's length
+    beside): it is the doorway of a plan that names none.
+    """
+    cell = plan.lattice.cell
+    reach, beside = count_cells(cell, DOOR_CLEARANCE), count_cells(cell, 2 * BODY_RADIUS)
+    out = np.zeros_like(plan.free)
+    for turn in range(4):
+        rooms, stood = np.rot90(plan.room_of_cell, turn), np.rot90(standing, turn)
+        free, zone = np.rot90(plan.free, turn), np.rot90(out, turn)
+        border = np.zeros_like(free)
+        border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
+        crossed = border.copy()
+        crossed[1:] &= stood[1:] & stood[:-1]
+        seeds = border & (crossed | near(crossed, beside, 1) | near(crossed, -beside, 1))
+        seeds |= np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn)
+        for _ in range(reach):
+            zone |= seeds
+            seeds[1:] = seeds[:-1] & free[1:]
+            seeds[0] = False
+    if plan.entrance is not None:
+        xs, ys = plan.lattice.centre_axes()
+        x, y = plan.lattice.point_at(plan.entrance)
+        units = int(DOOR_CLEARANCE * plan.lattice.units_per_m)
+        out |= (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 < units * units
+    return out
+
+
+def _doorway_cells(plan: FloorPlan, *, upright: bool) -> Bool:
+    """Return the free cells along the doorways that one passes along x (upright) or along y."""
+    out = np.zeros_like(plan.free)
+    for door in plan.doorways:
+        start, end = plan.lattice.to_lattice([door.start, door.end])
+        along = np.abs(end - start)
+        if 2 * along[1 if upright else 0] < along[0 if upright else 1]:
+            continue
+        steps = int(along.max()) // (UNITS_PER_CELL // 4) + 1
+        share = np.arange(steps + 1)[:, None]
+        at = (start * (steps - share) + end * share) // steps // UNITS_PER_CELL
+        out[at[:, 1], at[:, 0]] = True
+    return out & plan.free

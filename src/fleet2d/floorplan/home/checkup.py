@@ -1,0 +1,399 @@
+"""A check-up of a home: what is wrong or odd with a floor plan, in plain words, and where."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.home.standing import grown_cells, with_approaches
+from fleet2d.floorplan.objects import PlacedObject, Point
+from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.rooms.room import LabelledRegion
+from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
+
+Severity = Literal["unlivable", "wrong", "odd"]
+
+PERSON_RADIUS = 0.2
+"""The radius of a person who uses the furniture [m], as users have it if nothing is said."""
+
+HOME_M2 = (8.0, 2000.0)
+"""Area of what people live in."""
+
+# What the units of a file may be if its numbers are not metres.
+OTHER_UNITS = (
+    ("centimetres", 0.01),
+    ("millimetres", 0.001),
+    ("inches", 0.0254),
+    ("feet", 0.3048),
+    ("pixels of 5 cm", 0.05),
+)
+LIKELY_M2 = (25.0, 400.0)
+ROOM_M2 = (0.8, 200.0)  # the middle one of a home's rooms
+TINY_ROOM_M2 = 0.5
+SPECK_M2 = 0.02  # less wall than this is no pillar
+PART_M2 = 0.5  # less floor than this is nobody's loss
+DOOR_M = (0.5, 1.6)  # the middle one of a home's doors
+WIDEST_DOOR_M = 2.0
+# Boxes of labels are drawn over the walls; how far, and which part of them may be farther out.
+OVER_WALLS_M = 0.3
+OUTSIDE = 0.25
+# Labels overlap a little where boxes reach over walls: part of the smaller one that is too much.
+OVERLAP = 0.25
+OVERLAP_M2 = 1.0
+# How far from furniture that has no place to use it from somebody must be able to stand [m].
+BESIDE_M = 0.5
+UNLABELLED = 0.5
+
+_ORDER: tuple[Severity, ...] = ("unlivable", "wrong", "odd")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong or odd with a home.
+
+    Attributes:
+        kind: What it is about, such as `parts` or `room`.
+        severity: `unlivable`: nobody can be there at all; `wrong`: something will not work;
+            `odd`: worth a look.
+        text: What is the matter, in a sentence.
+        at: Where to look (x, y) [m], or None for all of the home.
+        shape: What is meant [m], if it has an extent.
+    """
+
+    kind: str
+    severity: Severity
+    text: str
+    at: Point | None = None
+    shape: BaseGeometry | None = None
+
+
+def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
+    """Return what is wrong or odd with a home, the worst first.
+
+    Args:
+        plan: The home.
+        radius: The radius of the robot that is to get around in it [m].
+
+    Example:
+        >>> import shapely
+        >>> from fleet2d.floorplan.plan import LabelledRegion
+        >>> gap = shapely.box(4, 0, 4.2, 0.25)
+        >>> free = shapely.union_all([shapely.box(0, 0, 4, 4), gap, shapely.box(4.2, 0, 8, 4)])
+        >>> kitchen = LabelledRegion(("Kitchen",), shapely.box(0, 0, 4.1, 4))
+        >>> office = LabelledRegion(("Office",), shapely.box(4.1, 0, 8, 4))
+        >>> for finding in checkup(FloorPlan.build("flat", free, [kitchen, office])):
+        ...     print(finding.severity, finding.text)
+        wrong a body of radius 0.15 m can't get to office_0 (15.2 m2)
+    """
+    findings = [
+        *_scale(plan),
+        *_parts(plan),
+        *_specks(plan),
+        *_labels(plan),
+        *_doors(plan),
+        *_standing_in_walls(plan),
+        *_ways(plan, radius),
+        *_uses(plan),
+    ]
+    return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
+
+
+def _scale(plan: FloorPlan) -> Iterator[Finding]:
+    area = plan.area_m2
+    if not HOME_M2[0] <= area <= HOME_M2[1]:
+        size = "small" if area < HOME_M2[0] else "large"
+        yield Finding(
+            "scale",
+            "wrong",
+            f"{area:,.1f} m2 is very {size} for a home: is the plan in metres?{_guess(area)}",
+        )
+        return
+    areas = sorted(room.area_m2 for room in plan.rooms if room.type != UNKNOWN)
+    if len(areas) >= 3 and not ROOM_M2[0] <= areas[len(areas) // 2] <= ROOM_M2[1]:
+        yield Finding(
+            "scale",
+            "odd",
+            f"half of the rooms are {'smaller' if areas[0] < 1 else 'larger'} than"
+            f" {areas[len(areas) // 2]:.1f} m2: is the plan in metres?",
+        )
+
+
+def _guess(area: float) -> str:
+    """Say in which unit the numbers would make a usual home."""
+    for unit, metres in OTHER_UNITS:
+        if LIKELY_M2[0] <= area * metres**2 <= LIKELY_M2[1]:
+            return f" It looks like {unit} ({area * metres**2:.0f} m2)"
+    return ""
+
+
+def _parts(plan: FloorPlan) -> Iterator[Finding]:
+    parts = sorted(shapely.get_parts(_free(plan)).tolist(), key=lambda part: -part.area)[1:]
+    for part in parts:
+        if part.area >= PART_M2:
+            at = part.representative_point()
+            text = f"nothing joins a part of {part.area:.2f} m2 at {_place(at)} to the rest"
+            yield Finding("parts", "wrong", text, (at.x, at.y), part)
+    small = [part for part in parts if part.area < PART_M2]
+    if small:
+        at = small[0].representative_point()
+        lone = len(small) == 1
+        text = (
+            f"nothing joins {len(small)} part{'' if lone else 's'} smaller than {PART_M2:g} m2 to"
+            f" the rest, {'' if lone else 'the largest '}at {_place(at)}"
+        )
+        yield Finding("parts", "odd", text, (at.x, at.y), shapely.MultiPolygon(small))
+
+
+def _specks(plan: FloorPlan) -> Iterator[Finding]:
+    holes = [hole for part in shapely.get_parts(_free(plan)) for hole in part.interiors]
+    specks = [s for s in map(shapely.Polygon, holes) if s.area < SPECK_M2]
+    if specks:
+        at = specks[0].representative_point()
+        yield Finding(
+            "specks",
+            "odd",
+            f"{len(specks)} piece{'s' * (len(specks) > 1)} of wall smaller than {SPECK_M2:g} m2"
+            f" inside the home, the first at {_place(at)}",
+            (at.x, at.y),
+            shapely.MultiPolygon(specks),
+        )
+
+
+# --- Labels --------------------------------------------------------------------------------------
+
+
+def _labels(plan: FloorPlan) -> Iterator[Finding]:
+    for room in plan.rooms:
+        if room.area_m2 < TINY_ROOM_M2 and room.type != UNKNOWN:
+            text = f"{room.name} has only {room.area_m2:.2f} m2"
+            yield Finding("room", "odd", text, room.anchor_xy)
+    unlabelled = sum(room.area_m2 for room in plan.rooms if room.type == UNKNOWN)
+    share = unlabelled / sum(room.area_m2 for room in plan.rooms)
+    if share > UNLABELLED:
+        text = f"{100 * share:.0f} % of the floor belongs to no room with a known use"
+        yield Finding("labels", "odd", text)
+    regions = _by_shape(plan)
+    yield from _outside(plan, regions)
+    yield from _overlaps(regions)
+
+
+def _by_shape(plan: FloorPlan) -> list[LabelledRegion]:
+    """Return the regions that have an extent; those of one shape are one with several labels."""
+    joined: dict[bytes, LabelledRegion] = {}
+    for region in plan.regions:
+        key = shapely.to_wkb(shapely.normalize(region.shape))
+        known = joined.get(key)
+        if known is not None:
+            region = replace(known, labels=known.labels + region.labels)
+        if region.shape.area > 0:
+            joined[key] = region
+    return list(joined.values())
+
+
+def _outside(plan: FloorPlan, regions: list[LabelledRegion]) -> Iterator[Finding]:
+    filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(_free(plan))]
+    reach = shapely.union_all(filled).buffer(OVER_WALLS_M, join_style="mitre")
+    for region in regions:
+        outside = shapely.difference(region.shape, reach)
+        if outside.area > OUTSIDE * region.shape.area:
+            at = outside.representative_point()
+            yield Finding(
+                "outside",
+                "odd",
+                f"{100 * outside.area / region.shape.area:.0f} % of what is labelled"
+                f" {_called(region)} lies outside the home, at {_place(at)}",
+                (at.x, at.y),
+                outside,
+            )
+
+
+def _overlaps(regions: list[LabelledRegion]) -> Iterator[Finding]:
+    shapes = np.array([region.shape for region in regions], dtype=object)
+    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True)):
+        one, other = regions[i], regions[j]
+        if i >= j or set(one.types) == set(other.types):
+            continue
+        both = shapely.intersection(one.shape, other.shape)
+        if both.area > max(OVERLAP_M2, OVERLAP * min(one.shape.area, other.shape.area)):
+            at = both.representative_point()
+            yield Finding(
+                "overlap",
+                "odd",
+                f"the labels {_called(one)} and {_called(other)} overlap by {both.area:.1f} m2"
+                f" at {_place(at)}: the smaller one counts there",
+                (at.x, at.y),
+                both,
+            )
+
+
+def _called(region: LabelledRegion) -> str:
+    return region.name or "/".join(region.types) or UNKNOWN
+
+
+def _doors(plan: FloorPlan) -> Iterator[Finding]:
+    for line in plan.lost_doorways:
+        (x0, y0), (x1, y1) = line.start, line.end
+        yield Finding(
+            "door",
+            "wrong",
+            f"the door {line.name + ' ' if line.name else ''}from ({x0:.2f}, {y0:.2f}) to"
+            f" ({x1:.2f}, {y1:.2f}) m is in no wall: it doesn't close a passage",
+            ((x0 + x1) / 2, (y0 + y1) / 2),
+            shapely.LineString([line.start, line.end]),
+        )
+    doors = [door for door in plan.doorways if door.leaf]
+    for door in doors:
+        if door.width_m > WIDEST_DOOR_M:
+            yield Finding(
+                "door",
+                "odd",
+                f"the door {door.name} is {door.width_m:.2f} m wide",
+                _middle(door.start, door.end),
+                shapely.LineString([door.start, door.end]),
+            )
+    widths = sorted(door.width_m for door in doors)
+    if len(widths) >= 3 and not DOOR_M[0] <= widths[len(widths) // 2] <= DOOR_M[1]:
+        yield Finding(
+            "scale",
+            "odd",
+            f"half of the doors are about {widths[len(widths) // 2]:.2f} m wide or"
+            f" {'less' if widths[len(widths) // 2] < 1 else 'more'}: is the plan in metres?",
+        )
+
+
+# --- Ways ----------------------------------------------------------------------------------------
+
+
+def _ways(plan: FloorPlan, radius: float) -> Iterator[Finding]:
+    """Find where a robot can't get to, be it for the walls or for what stands there."""
+    body = f"a body of radius {radius:g} m"
+    try:
+        space = Home(plan).space(radius)
+    except FloorPlanError:
+        yield Finding("space", "unlivable", f"{body} fits nowhere in {plan.name}")
+        return
+    main = main_part(plan, space)
+    if plan.entrance is not None and main is None:
+        x, y = plan.entrance
+        text = f"{body} can't stand at the entrance at ({x:.2f}, {y:.2f}) m"
+        yield Finding("entrance", "wrong", text, plan.entrance)
+    got_to = space.part_of_cell == (0 if main is None else main)
+    empty = Space(plan, radius) if plan.objects else None
+    for room in plan.rooms:
+        here = plan.room_of_cell == room.index
+        if not (here & got_to).any():
+            yield _closed_room(room, body, empty, space, here)
+            continue
+        for part in range(space.parts):
+            lost = here & (space.part_of_cell == part) & ~got_to
+            if np.count_nonzero(lost) * plan.lattice.cell**2 >= PART_M2:
+                yield _corner(plan, room, lost, body, empty)
+
+
+def main_part(plan: FloorPlan, space: Space) -> int | None:
+    """Return the part of a space that is the home: that of the entrance, else the largest.
+
+    None where the entrance is in no part.
+    """
+    if plan.entrance is None:
+        return 0
+    x, y = plan.lattice.point_at(plan.entrance)
+    part = space.part_at(x, y)
+    return part if part >= 0 else None
+
+
+def _closed_room(
+    room: Room, body: str, empty: Space | None, space: Space, here: NDArray[np.bool_]
+) -> Finding:
+    severity: Severity = "wrong" if room.area_m2 >= TINY_ROOM_M2 else "odd"
+    size = f"{room.name} ({room.area_m2:.1f} m2)"
+    if empty is not None and (here & (empty.part_of_cell == 0)).any():
+        text = f"furniture keeps {body} out of {size}"
+    elif (here & (space.part_of_cell >= 0)).any():
+        text = f"{body} can't get to {size}"
+    else:
+        text = f"{body} fits nowhere in {size}"
+    return Finding("room", severity, text, room.anchor_xy)
+
+
+def _corner(
+    plan: FloorPlan, room: Room, lost: NDArray[np.bool_], body: str, empty: Space | None
+) -> Finding:
+    rows, columns = np.nonzero(lost)
+    nearest = int(np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2))
+    cell = plan.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))
+    x, y = plan.lattice.to_metres(cell).tolist()
+    what = f"{len(rows) * plan.lattice.cell**2:.1f} m2 of {room.name}, at ({x:.2f}, {y:.2f}) m"
+    text = f"{body} can't get to {what}"
+    if empty is not None and empty.part_of_cell[rows[nearest], columns[nearest]] == 0:
+        text = f"furniture keeps {body} out of {what}"
+    return Finding("room", "wrong", text, (x, y))
+
+
+# --- Objects -------------------------------------------------------------------------------------
+
+
+def _standing_in_walls(plan: FloorPlan) -> Iterator[Finding]:
+    free = _free(plan)
+    for thing in plan.objects:
+        inside = shapely.intersection(thing.footprint, free).area
+        if thing.blocks == "nothing" and shapely.distance(thing.footprint, free) < BESIDE_M:
+            continue  # a charger in its niche, a mat half under a door
+        if inside < 0.95 * thing.footprint.area:
+            lost = 100 * (1 - inside / thing.footprint.area)
+            text = f"{lost:.0f} % of {thing.name} is in a wall or outside the home"
+            yield Finding("object", "wrong", text, _centre(thing), thing.footprint)
+    solid = [thing for thing in plan.objects if thing.blocks != "nothing"]
+    for i, thing in enumerate(solid):
+        for other in solid[:i]:
+            both = shapely.intersection(thing.footprint, other.footprint)
+            if both.area > SPECK_M2:
+                text = f"{thing.name} and {other.name} stand in each other ({both.area:.2f} m2)"
+                yield Finding("object", "odd", text, _centre(thing), both)
+
+
+def _uses(plan: FloorPlan) -> Iterator[Finding]:
+    """Find what nobody can get to."""
+    if not plan.objects:
+        return
+    try:
+        space = Home(plan).space(PERSON_RADIUS)
+    except FloorPlanError:
+        return  # said about the robot, or of no use to say of a home for dolls
+    standing = space.part_of_cell == (main_part(plan, space) or 0)
+    for thing in plan.objects:
+        if thing.uses:
+            reached = bool(with_approaches(plan, thing, standing, plan.objects).uses)
+        else:
+            reach = PERSON_RADIUS + BESIDE_M
+            window, beside = grown_cells(plan.lattice, thing.footprint, reach)
+            reached = bool((standing[window] & beside).any())
+        if not reached:
+            text = f"nobody can get to {thing.name}: there is no room to stand from where to use it"
+            yield Finding("object", "wrong", text, _centre(thing), thing.footprint)
+
+
+def _free(plan: FloorPlan) -> BaseGeometry:
+    """Return the free space [m]."""
+    return shapely.transform(shapely.MultiPolygon(plan.polygons), plan.lattice.to_metres)
+
+
+def _place(at: shapely.Point) -> str:
+    return f"({at.x:.2f}, {at.y:.2f}) m"
+
+
+def _centre(thing: PlacedObject) -> Point:
+    middle = thing.footprint.centroid
+    return middle.x, middle.y
+
+
+def _middle(start: Point, end: Point) -> Point:
+    return (start[0] + end[0]) / 2, (start[1] + end[1]) / 2

@@ -1,0 +1,296 @@
+"""Where a round body can be, and its shortest ways: the free space shrunk by the body's radius."""
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.geometry.gates import Segment
+from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
+from fleet2d.floorplan.kept import read_only
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.fields import walking_distance
+from fleet2d.kernels.mesh import (
+    SUB,
+    Mesh,
+    label_triangles,
+    locate,
+    rasterize_cells,
+    strictly_inside,
+)
+from fleet2d.kernels.routes import Corners, Routes
+from fleet2d.kernels.sight import line_of_sight
+
+# Snapping the shrunk walls and rounding a pose move it by less than this many lattice units.
+ROUNDING = 3
+# How many free cells are tried for a way back into the space, nearest first.
+ESCAPES = 200
+# Answers that a space keeps for when they are asked for again.
+ROUTES_KEPT = 4096
+
+I64 = NDArray[np.int64]
+
+
+class Space:
+    """The places where the centre of a body of one radius may be (its configuration space).
+
+    Walls, obstacles and shut doors are grown by a regular octagon round the body: a body keeps its
+    radius from each, on all sides alike, and at most 8 % more from slanted ones.
+
+    Attributes:
+        radius: The body's radius [m].
+        mesh: Triangles of the space [lattice]; empty when the body fits nowhere.
+        part_of_cell: int32 (rows, columns), the connected part that holds each cell's centre, -1
+            where the body can't be.
+        parts: Number of connected parts; part 0 holds the most cells.
+    """
+
+    def __init__(
+        self,
+        plan: FloorPlan,
+        radius: float,
+        *,
+        walls: Mesh | None = None,
+        obstacles: Sequence[Polygon] = (),
+        shut: Sequence[Segment] = (),
+    ) -> None:
+        """Work out the space.
+
+        Args:
+            plan: The floor plan.
+            radius: The body's radius [m].
+            walls: What a body can't see through; left out: the plan's.
+            obstacles: What else it can't drive through [lattice].
+            shut: The lines of shut doors [lattice].
+
+        Raises:
+            FloorPlanError: The body fits nowhere.
+        """
+        self.plan = plan
+        self.walls = plan.mesh if walls is None else walls
+        # What behaviors ask for again and again: the same rooms, and on rounds the same ways.
+        self.route = lru_cache(ROUTES_KEPT)(self._find_route)
+        self.cells = lru_cache(None)(self._find_cells)
+        self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
+        self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
+        self.radius = radius
+        self.key: tuple[Any, ...] = ()  # by which a home finds it again
+        lattice = plan.lattice
+        reach = radius * lattice.units_per_m
+        blocks = [np.asarray(o.exterior.coords) for o in obstacles]
+        blocks += [np.array(segment, np.float64) for segment in shut]
+        polygons = _shrunk(plan.polygons, reach, [grown_shape(block, reach) for block in blocks])
+        if not polygons:
+            raise FloorPlanError(
+                f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
+                " radius or check the scale of the plan"
+            )
+        self._polygons = polygons
+        self.mesh: Mesh = build_mesh(polygons, lattice.columns, lattice.rows)
+        triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
+        part = label_triangles(self.mesh.neighbors)
+        part_of_cell = np.where(triangles >= 0, part[triangles], -1)
+        # Parts too small to hold a cell's centre are of no use to anyone.
+        sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
+        order = np.argsort(-sizes, kind="stable")
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        self.part_of_cell = read_only(
+            np.where(triangles >= 0, rank[part_of_cell], -1).astype(np.int32)
+        )
+        self._part_of_triangle = read_only(rank[part].astype(np.int32))
+        self.parts = int(np.count_nonzero(sizes))
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Space":
+        """Return itself: what it holds never changes."""
+        return self
+
+    @cached_property
+    def routes(self) -> Routes:
+        """The corners of the space and the legs between them, built when first needed."""
+        return Routes(self.mesh, self._corners())
+
+    def part_at(self, x: int, y: int) -> int:
+        """Return the connected part of a lattice point strictly inside the space, else -1."""
+        if not strictly_inside(self.mesh, x, y):
+            return -1
+        return int(self._part_of_triangle[locate(self.mesh, x, y)])
+
+    def part_near(self, x: int, y: int) -> int:
+        """Return the part for a body that stands where it can't be: the nearest one."""
+        near = self.nearest(x, y)
+        return 0 if near is None else self.part_at(*near)
+
+    def _find_part(self, xy: tuple[float, float]) -> int:
+        """Return the part of a place [m], or the nearest one."""
+        x, y = self.plan.lattice.point_at(xy)
+        part = self.part_at(x, y)
+        return self.part_near(x, y) if part < 0 else part
+
+    def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
+        """Return the cells (n, 2) as (row, column) of a part of the space, in one room if given."""
+        mask = self.part_of_cell == part
+        if room is not None:
+            mask &= self.plan.room_of_cell == room
+        return read_only(np.argwhere(mask))
+
+    def _find_nearest(
+        self, x: int, y: int, part: int | None = None, room: int | None = None
+    ) -> tuple[int, int] | None:
+        """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
+        found = self._by_distance(x, y, part, room)
+        return self.plan.lattice.cell_centre(*found[0].tolist()) if len(found) else None
+
+    def _find_route(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+        """Return the shortest path (n, 2) from `start` to `goal` [lattice], or None.
+
+        A start on the border of the space, where a walk can be broken off, first steps back in.
+        """
+        if not strictly_inside(self.mesh, *goal):
+            return None
+        if strictly_inside(self.mesh, *start):
+            route = self.routes.find(*start, *goal)
+            return None if route is None else read_only(route)
+        inside = self._way_in(*start)
+        route = None if inside is None else self.routes.find(*inside, *goal)
+        return None if route is None else read_only(np.concatenate([[start], route]))
+
+    def distance_field(self, places: I64) -> NDArray[np.float64]:
+        """Return how far each cell is on foot from the nearest of some places.
+
+        Args:
+            places: Lattice points (n, 2).
+
+        Returns:
+            float64 (rows, columns) [m], steps to sides and corners of cells, so up to 8 % longer
+            than the straight way; infinite where the body can't be or come from.
+        """
+        return self._metres(self._steps(places))
+
+    def distances(self, place: tuple[int, int], points: I64) -> NDArray[np.float64]:
+        """Return how far some points are on foot from a place, as `distance_field` measures.
+
+        Args:
+            place: Lattice point.
+            points: Lattice points (n, 2).
+
+        Returns:
+            float64 (n,) [m].
+        """
+        steps = self._steps(np.array([place], np.int64))
+        return self._metres(steps[points[:, 1] // SUB, points[:, 0] // SUB])
+
+    def _steps(self, places: I64) -> NDArray[np.int32]:
+        cells = np.asarray(places, np.int64).reshape(-1, 2)[:, ::-1] // SUB
+        return walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
+
+    def _metres(self, steps: NDArray[np.int32]) -> NDArray[np.float64]:
+        return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
+
+    def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
+        walls = self.walls
+        triangle = locate(walls, x, y)
+        for row, column in self._by_distance(x, y)[:ESCAPES].tolist():
+            target = self.plan.lattice.cell_centre(row, column)
+            if triangle >= 0 and line_of_sight(walls, x, y, triangle, *target):
+                return target
+        return None
+
+    def _by_distance(self, x: int, y: int, part: int | None = None, room: int | None = None) -> I64:
+        mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
+        if room is not None:
+            mask = mask & (self.plan.room_of_cell == room)
+        cells = np.argwhere(mask)
+        xs, ys = self.plan.lattice.centre_axes()
+        away = (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
+        return cells[np.argsort(away, kind="stable")]
+
+    def _corners(self) -> Corners:
+        """Find the vertices where the border turns into the space."""
+        vertices = self.mesh.vertices
+        before, at, after = [], [], []
+        for polygon in self._polygons:
+            for ring in (polygon.exterior, *polygon.interiors):
+                points = np.asarray(ring.coords)[:-1].astype(np.int64)
+                before.append(np.roll(points, 1, axis=0))
+                at.append(points)
+                after.append(np.roll(points, -1, axis=0))
+        p, q, r = np.concatenate(before), np.concatenate(at), np.concatenate(after)
+        a, b = q - p, r - q
+        reflex = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0  # the free space lies to the left
+        keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
+        ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
+        walls_meeting = np.bincount(ids, minlength=len(vertices))
+        vertex, first = np.unique(ids[reflex], return_index=True)
+        return Corners(
+            vertex=vertex.astype(np.int64),
+            before=p[reflex][first],
+            after=r[reflex][first],
+            simple=walls_meeting[vertex] == 1,
+        )
+
+
+def _shrunk(
+    polygons: Sequence[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
+) -> list[Polygon]:
+    """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side.
+
+    Args:
+        polygons: Free space.
+        radius: Of the body.
+        blocked: Places taken out of what is left.
+    """
+    octagon = _octagon(radius)
+    shrunk: list[Polygon] = []
+    for polygon in polygons:
+        grown = [
+            _grown_walls(np.asarray(r.coords), octagon)
+            for r in (polygon.exterior, *polygon.interiors)
+        ]
+        grown.append(np.array(blocked, np.object_))
+        rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
+        for part in shapely.get_parts(rest):
+            if part.geom_type == "Polygon" and part.area > 0:
+                shrunk += snap_polygon(part).polygons
+    return shrunk
+
+
+def _octagon(radius: float) -> I64:
+    """Return the corners of the octagon that stands for a body."""
+    a = _even_at_least(radius + ROUNDING)
+    # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
+    b = _even_at_least(a * 0.41421357)
+    return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+
+
+def grown_shape(corners: NDArray[np.float64], radius: float) -> BaseGeometry:
+    """Return a line or the inside of a ring [lattice], grown by the octagon of a body.
+
+    Args:
+        corners: Two ends, or the closed ring of an outline, float64 (n, 2).
+        radius: Of the body [lattice].
+    """
+    walls = _grown_walls(corners, _octagon(radius))
+    solid = [Polygon(corners)] if len(corners) > 3 else []
+    return shapely.union_all([*walls, *solid])
+
+
+def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:
+    """Return every wall of a ring, grown by the octagon, as convex polygons."""
+    ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
+    return np.asarray(shapely.convex_hull(shapely.multipoints(ends)))
+
+
+def _even_at_least(value: float) -> int:
+    return 2 * int(np.ceil(value / 2))
+
+
+def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:
+    """Return the way straight on: int64 (2, 2), read-only as those of `Space.route` are."""
+    return read_only(np.array([begin, end], np.int64))

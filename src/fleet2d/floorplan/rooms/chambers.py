@@ -1,0 +1,158 @@
+"""Chambers: what the passages of a floor plan cut its free space into."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from fleet2d.floorplan.geometry.gates import Gates
+from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.geometry.mesh import build_mesh
+from fleet2d.floorplan.rooms.doorways import Segment
+from fleet2d.kernels.chambers import spread_labels
+from fleet2d.kernels.mesh import WALL, Mesh, label_triangles, rasterize_cells
+
+MIN_CHAMBER_M2 = 0.8
+"""What is smaller, such as the space within a thick wall, is no room."""
+
+I32 = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A passage between two chambers.
+
+    Attributes:
+        line: Number of its line among those given.
+        chambers: The chambers on its two sides.
+    """
+
+    line: int
+    chambers: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Chambers:
+    """Free space, cut at passages.
+
+    Attributes:
+        of_cell: The chamber of each free cell, -1 elsewhere, int32 (rows, columns).
+        count: Number of chambers; each has a cell.
+        links: The passages between them that really part them.
+    """
+
+    of_cell: I32
+    count: int
+    links: tuple[Link, ...]
+
+
+def cut_chambers(
+    lattice: Lattice,
+    polygons: Sequence[Polygon],
+    mesh: Mesh,
+    free: NDArray[np.bool_],
+    segments: Sequence[Segment],
+    min_area_m2: float = MIN_CHAMBER_M2,
+) -> Chambers:
+    """Cut free space at passages.
+
+    A passage with the same chamber on both sides parts nothing, and is ignored. So is the widest
+    passage of a chamber that is too small.
+
+    Args:
+        lattice: Of the plan.
+        polygons: Free space [lattice].
+        mesh: The same, in triangles.
+        free: Free cells, bool (rows, columns).
+        segments: The passages [lattice], exactly from wall to wall; they don't touch each other.
+        min_area_m2: Chambers smaller than this are joined to others [m²].
+    """
+    known = {(x, y) for x, y in mesh.vertices.tolist()}
+    jambs = [end for segment in segments for end in segment if end not in known]
+    if jambs:
+        mesh = build_mesh(polygons, lattice.columns, lattice.rows, corners=jambs)
+    gates = Gates(mesh, segments)
+    shut = gates.shut(range(len(segments)))
+    part = label_triangles(shut.neighbors)
+    sides = _sides(gates.mesh, shut, part, segments)
+    areas = _areas(shut, part) / lattice.units_per_m**2
+    lengths = [(x1 - x0) ** 2 + (y1 - y0) ** 2 for (x0, y0), (x1, y1) in segments]
+    joined = _joined(areas, sides, lengths, min_area_m2)
+    triangle = rasterize_cells(shut, lattice.rows, lattice.columns)
+    chamber = np.append(joined[part], -1).astype(np.int32)[triangle]  # the last serves -1
+    if (free & (chamber < 0)).any():  # a centre that lies on a passage has no triangle
+        chamber = spread_labels(chamber, free)
+    return _numbered(chamber, free, joined, sides)
+
+
+def _sides(
+    whole: Mesh, shut: Mesh, part: I32, segments: Sequence[Segment]
+) -> list[tuple[int, int]]:
+    """Return the parts on the two sides of each passage."""
+    number = {frozenset(segment): i for i, segment in enumerate(segments)}
+    found: list[list[int]] = [[] for _ in segments]
+    for triangle, edge in np.argwhere((whole.neighbors != WALL) & (shut.neighbors == WALL)):
+        ends = whole.triangles[triangle, [edge, (edge + 1) % 3]]
+        (x0, y0), (x1, y1) = whole.vertices[ends].tolist()
+        found[number[frozenset(((x0, y0), (x1, y1)))]].append(int(part[triangle]))
+    return [(min(parts), max(parts)) for parts in found]
+
+
+def _areas(mesh: Mesh, part: I32) -> NDArray[np.float64]:
+    """Return the area of each part, square lattice units."""
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    total = np.zeros(int(part.max()) + 1, np.int64)
+    np.add.at(total, part, doubled)
+    return total / 2
+
+
+def _joined(
+    areas: NDArray[np.float64],
+    sides: Sequence[tuple[int, int]],
+    lengths: Sequence[int],
+    min_area_m2: float,
+) -> NDArray[np.int64]:
+    """Return which parts are one chamber: for each part the lowest part of its chamber."""
+    owner = np.arange(len(areas))
+    total = areas.copy()
+    while True:
+        inner = [i for i, (a, b) in enumerate(sides) if owner[a] != owner[b]]
+        small = [
+            (total[owner[part]], -lengths[i], i)
+            for i in inner
+            for part in sides[i]
+            if total[owner[part]] < min_area_m2
+        ]
+        if not small:
+            return owner
+        a, b = (int(owner[part]) for part in sides[min(small)[2]])
+        low, high = min(a, b), max(a, b)
+        total[low] += total[high]
+        owner[owner == high] = low
+
+
+def _numbered(
+    chamber: I32,
+    free: NDArray[np.bool_],
+    joined: NDArray[np.int64],
+    sides: Sequence[tuple[int, int]],
+) -> Chambers:
+    """Return the chambers numbered by their first cells, row by row."""
+    lost = free & (chamber < 0)
+    if lost.any():  # free cells that no way across sides leads to
+        chamber = np.where(lost, len(joined), chamber).astype(np.int32)
+    found = chamber[free]
+    first = np.full(len(joined) + 1, -1)
+    first[found[::-1]] = np.arange(len(found))[::-1]  # of equals the last, so the first, stays
+    kinds = np.flatnonzero(first >= 0)
+    number = np.full(len(joined) + 2, -1, np.int32)
+    number[kinds[np.argsort(first[kinds], kind="stable")]] = np.arange(len(kinds))
+    links = []
+    for line, parts in enumerate(sides):
+        a, b = (int(number[joined[part]]) for part in parts)
+        if a != b and min(a, b) >= 0:
+            links.append(Link(line, (min(a, b), max(a, b))))
+    return Chambers(number[chamber], len(kinds), tuple(links))

@@ -1,0 +1,222 @@
+"""Doorways: passages between rooms, where a door may hang."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, Polygon
+
+from fleet2d.floorplan.geometry.lattice import Lattice
+
+Point = tuple[float, float]
+Segment = tuple[tuple[int, int], tuple[int, int]]
+
+# How far beyond the given end of a door line its wall may be [m].
+REACH_M = 0.3
+# A corner as near as this to where a line meets the wall is where it was meant to end [lattice].
+AT_CORNER = 8
+# How far from a door line the rooms on its two sides are looked for [m].
+BESIDE_M = (0.1, 0.2, 0.3, 0.45, 0.6)
+# Of a line and an area: the line's inside is all in the area's inside, its ends on the border.
+_FROM_WALL_TO_WALL = "1FFF0F***"
+
+
+@dataclass(frozen=True)
+class DoorLine:
+    """A doorway as a file or a search gives it: a line across a passage.
+
+    Attributes:
+        start: One jamb (x, y) [m], on a wall or near one.
+        end: The other jamb (x, y) [m].
+        name: Its name, or None to be named after the rooms that it joins.
+        leaf: Whether there is a door in it that can be shut; False for a mere opening.
+    """
+
+    start: Point
+    end: Point
+    name: str | None = None
+    leaf: bool = True
+
+
+@dataclass(frozen=True)
+class Doorway:
+    """A passage between two rooms, from wall to wall.
+
+    Attributes:
+        index: Its number in the plan.
+        name: Unique in the plan, such as `bathroom_0-hallway_0`.
+        start: One jamb (x, y) [m], exactly on a wall.
+        end: The other jamb (x, y) [m].
+        rooms: Indices of the rooms on its left and its right, seen from start to end; equal where
+            it stands in the middle of a room.
+        leaf: Whether there is a door in it that can be shut; False for a mere opening.
+    """
+
+    index: int
+    name: str
+    start: Point
+    end: Point
+    rooms: tuple[int, int]
+    leaf: bool
+
+    @property
+    def width_m(self) -> float:
+        """Distance between the jambs [m]."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        return float(((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5)
+
+
+def fit_lines(
+    lattice: Lattice, polygons: Sequence[Polygon], lines: Sequence[DoorLine]
+) -> tuple[list[Polygon], list[Segment | None], list[str]]:
+    """Fit door lines to the walls, exactly.
+
+    A line is lengthened or cut to end at the walls beside it. On a slanted wall no lattice point
+    may lie, so the wall gets a corner there, less than a millimetre off.
+
+    Args:
+        lattice: Of the plan.
+        polygons: Free space [lattice].
+        lines: Where doorways shall be [m].
+
+    Returns:
+        The free space, with corners added; the segment of each line [lattice], or None where it
+        stands in no passage; and a sentence for each such line.
+    """
+    walls = list(polygons)
+    segments: list[Segment | None] = []
+    notes: list[str] = []
+    kept: list[LineString] = []
+    for line in lines:
+        ends = lattice.to_lattice((line.start, line.end)).astype(np.float64)
+        fitted = _fit(walls, ends, REACH_M * lattice.units_per_m)
+        if fitted is not None and not any(fitted[1].intersects(other) for other in kept):
+            walls = fitted[0]
+            kept.append(fitted[1])
+            start, end = shapely.get_coordinates(fitted[1]).astype(np.int64).tolist()
+            segments.append(((start[0], start[1]), (end[0], end[1])))
+            continue
+        (x0, y0), (x1, y1) = line.start, line.end
+        name = f" {line.name}" if line.name else ""
+        why = "ends at no wall" if fitted is None else "touches another one"
+        notes.append(
+            f"the doorway{name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}: left out"
+        )
+        segments.append(None)
+    return walls, segments, notes
+
+
+def name_doorways(
+    lattice: Lattice,
+    room_of_place: NDArray[np.int16],
+    room_names: Sequence[str],
+    fitted: Sequence[tuple[DoorLine, Segment]],
+) -> tuple[Doorway, ...]:
+    """Return the doorways of fitted lines, with the rooms that they join and names.
+
+    Args:
+        lattice: Of the plan.
+        room_of_place: Room index of each cell, -1 inside walls.
+        room_names: By room index.
+        fitted: The lines, and where they are [lattice].
+    """
+    doorways: list[Doorway] = []
+    own = {line.name for line, _ in fitted if line.name}
+    used: Counter[str] = Counter()
+    for line, segment in fitted:
+        rooms = rooms_beside(lattice, room_of_place, segment)
+        name = line.name
+        while name is None or (not line.name and name in own):
+            joined = "-".join(room_names[room] for room in rooms)
+            used[joined] += 1
+            name = joined if used[joined] == 1 else f"{joined}-{used[joined]}"
+        (x0, y0), (x1, y1) = lattice.to_metres(segment).tolist()
+        doorways.append(Doorway(len(doorways), name, (x0, y0), (x1, y1), rooms, line.leaf))
+    return tuple(doorways)
+
+
+def _fit(
+    walls: list[Polygon], ends: NDArray[np.float64], reach: float
+) -> tuple[list[Polygon], LineString] | None:
+    """Return the walls and the line from wall to wall, or None where there is no such line."""
+    middle, along = ends.mean(axis=0), ends[1] - ends[0]
+    length = float(np.sqrt(along @ along))
+    if length == 0:
+        return None
+    index = next((i for i, p in enumerate(walls) if shapely.intersects_xy(p, *middle)), None)
+    if index is None:
+        return None
+    far = (0.5 + reach / length) * along
+    jambs = [_jamb(walls[index], middle, middle + side * far) for side in (-1, 1)]
+    if jambs[0] is None or jambs[1] is None or jambs[0] == jambs[1]:
+        return None
+    line = LineString([jambs[0], jambs[1]])
+    polygon = walls[index]
+    for jamb in jambs:
+        polygon = _with_corner(polygon, np.array(jamb, np.float64))
+    changed = [*walls[:index], polygon, *walls[index + 1 :]]
+    sound = polygon is walls[index] or shapely.MultiPolygon(changed).is_valid
+    if not sound or not shapely.relate_pattern(line, polygon, _FROM_WALL_TO_WALL):
+        return None
+    return changed, line
+
+
+def _jamb(
+    polygon: Polygon, start: NDArray[np.float64], end: NDArray[np.float64]
+) -> tuple[int, int] | None:
+    """Return the even lattice point where the way from `start` to `end` first meets a wall."""
+    met = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, end])))
+    if len(met) == 0:
+        return None
+    hit = met[np.argmin(((met - start) ** 2).sum(axis=1))]
+    corners = shapely.get_coordinates(polygon)
+    away = np.abs(corners - hit).max(axis=1)
+    if away.min() <= AT_CORNER:
+        x, y = corners[np.argmin(away)].tolist()
+    else:
+        x, y = (2 * np.rint(hit / 2)).tolist()
+    return int(x), int(y)
+
+
+def _with_corner(polygon: Polygon, point: NDArray[np.float64]) -> Polygon:
+    """Return the polygon with a corner at a point on or beside one of its walls.
+
+    Also where the point is on the wall: another corner might move that wall away from it.
+    """
+    if (shapely.get_coordinates(polygon) == point).all(axis=1).any():
+        return polygon
+    rings = [np.asarray(ring.coords) for ring in (polygon.exterior, *polygon.interiors)]
+    walls = [(r, i) for r, ring in enumerate(rings) for i in range(len(ring) - 1)]
+    lines = shapely.linestrings([rings[r][i : i + 2] for r, i in walls])
+    ring, after = walls[int(np.argmin(shapely.distance(lines, shapely.Point(point))))]
+    rings[ring] = np.insert(rings[ring], after + 1, point, axis=0)
+    return Polygon(rings[0], rings[1:])
+
+
+def rooms_beside(
+    lattice: Lattice, room_of_place: NDArray[np.int16], segment: Segment
+) -> tuple[int, int]:
+    """Return the rooms to the left and to the right of a segment, looked for step by step."""
+    (x0, y0), (x1, y1) = segment
+    dx, dy = x1 - x0, y1 - y0
+    length = (dx * dx + dy * dy) ** 0.5
+    found: list[int] = []
+    for side in (1, -1):
+        room = -1
+        for step in BESIDE_M:
+            reach = side * step * lattice.units_per_m / length
+            x, y = round((x0 + x1) / 2 - dy * reach), round((y0 + y1) / 2 + dx * reach)
+            row, column = lattice.cell_of(x, y)
+            if 0 <= row < lattice.rows and 0 <= column < lattice.columns:
+                seen = int(room_of_place[row, column])
+                room = seen if room < 0 else room
+                if seen >= 0 and found and room == found[0]:
+                    room = seen
+        found.append(room)
+    left, right = found
+    if left < 0 or right < 0:
+        left = right = max(left, right, 0)
+    return left, right

@@ -1,0 +1,170 @@
+"""Rooms: disjoint sets of cells that cover all free space, and what they are called."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, paint_regions, snap_regions
+from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
+from fleet2d.kernels.chambers import fill_beside, label_frames
+from fleet2d.kernels.fields import squared_distance as squared_distance_kernel
+
+__all__ = ["NO_ROOM", "LabelledRegion", "Room", "assign_rooms", "beside_rooms", "make_rooms"]
+
+NO_ROOM = -1
+
+
+@dataclass(frozen=True)
+class Room:
+    """A named part of the free space: a set of cells.
+
+    Attributes:
+        index: Its number in the plan, the value of its cells in `FloorPlan.room_of_cell`.
+        name: Unique in the plan, such as `bedroom_0`.
+        type: What it is used for, such as `bedroom`.
+        labels: Every type that the file gives it, in file order; empty for space without a label.
+        cells: Number of cells.
+        area_m2: Area of the cells [m²].
+        anchor_xy: Centre of the cell that is deepest inside the room [m].
+        bounds: Smallest box around the cells (x0, y0, x1, y1) [m].
+    """
+
+    index: int
+    name: str
+    type: str
+    labels: tuple[str, ...]
+    cells: int
+    area_m2: float
+    anchor_xy: tuple[float, float]
+    bounds: tuple[float, float, float, float]
+
+
+def assign_rooms(
+    lattice: Lattice, free: NDArray[np.bool_], regions: Sequence[LabelledRegion]
+) -> tuple[NDArray[np.int16], tuple[Room, ...], list[str]]:
+    """Divide the free cells among rooms.
+
+    Where regions overlap the smaller one wins, of equal ones the first. Regions that are equal once
+    they are on the lattice are one room with the labels of all of them. Free cells of no region
+    form one room of type `unknown`.
+
+    Args:
+        lattice: The plan's lattice.
+        free: Free cells, bool (rows, columns).
+        regions: What the file says, in the file's order.
+
+    Returns:
+        The room of each cell, int16 (rows, columns), -1 where not free; the rooms in the file's
+        order; and a sentence for each region that became no room.
+
+    Raises:
+        FloorPlanError: Two regions ask for the same name.
+    """
+    merged = snap_regions(lattice, regions)
+    painted = paint_regions(free, merged)
+    counts = np.bincount(painted[free], minlength=len(merged) + 1)
+    notes = [lost_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
+    if counts[-1]:
+        merged = [*merged, Region((), Polygon())]
+    room_of_cell, rooms = make_rooms(lattice, painted, merged)
+    return room_of_cell, rooms, notes
+
+
+def make_rooms(
+    lattice: Lattice, painted: NDArray[np.int64], merged: Sequence[Region]
+) -> tuple[NDArray[np.int16], tuple[Room, ...]]:
+    """Return the rooms of the regions that have cells, and the room of each cell.
+
+    Args:
+        lattice: The plan's lattice.
+        painted: Region of each cell, -1 where not free, (rows, columns).
+        merged: The regions.
+    """
+    counts = np.bincount(painted[painted != NO_ROOM], minlength=len(merged))
+    kept = [k for k in range(len(merged)) if counts[k] > 0]
+    if len(kept) > np.iinfo(np.int16).max:
+        raise FloorPlanError(f"the floor plan has {len(kept)} rooms: at most 32767 are possible")
+    index_of = np.full(len(counts) + 1, NO_ROOM, np.int16)  # its last entry serves -1
+    index_of[kept] = np.arange(len(kept))
+    room_of_cell = index_of[painted]
+    names = _names([merged[k] for k in kept])
+    frames = label_frames(room_of_cell.astype(np.int32), len(kept))
+    rooms = tuple(
+        _room(lattice, room_of_cell, frames[i], i, names[i], merged[k]) for i, k in enumerate(kept)
+    )
+    return room_of_cell, rooms
+
+
+def _names(regions: list[Region]) -> list[str]:
+    """Return a name for each room: its own, or its type and a number."""
+    own = Counter(region.name for region in regions if region.name is not None)
+    twice = [name for name, uses in own.items() if uses > 1]
+    if twice:
+        raise FloorPlanError(f"two rooms are named {twice[0]!r}: give each room its own name")
+    names: list[str] = []
+    used: Counter[str] = Counter()
+    for region in regions:
+        name, kind = region.name, region.type
+        while name is None or (region.name is None and name in own):
+            name = f"{kind}_{used[kind]}"
+            used[kind] += 1
+        names.append(name)
+    return names
+
+
+def _room(
+    lattice: Lattice,
+    room_of_cell: NDArray[np.int16],
+    frame: NDArray[np.int64],
+    index: int,
+    name: str,
+    region: Region,
+) -> Room:
+    row0, column0, row1, column1 = frame.tolist()
+    inside = room_of_cell[row0:row1, column0:column1] == index
+    depth = squared_distance_kernel(np.pad(inside, 1))
+    deepest = np.unravel_index(np.argmax(depth), depth.shape)  # the first of equals
+    row, column = row0 + int(deepest[0]) - 1, column0 + int(deepest[1]) - 1
+    x, y = lattice.to_metres(lattice.cell_centre(row, column)).tolist()
+    corners = np.array([(column0, row0), (column1, row1)]) * UNITS_PER_CELL
+    (x0, y0), (x1, y1) = lattice.to_metres(corners).tolist()
+    cells = int(np.count_nonzero(inside))
+    return Room(
+        index=index,
+        name=name,
+        type=region.type,
+        labels=region.types,
+        cells=cells,
+        area_m2=cells * lattice.cell**2,
+        anchor_xy=(x, y),
+        bounds=(x0, y0, x1, y1),
+    )
+
+
+def lost_note(
+    lattice: Lattice,
+    region: Region,
+    why: str = "has no free cell that isn't a smaller room's: it is no room",
+) -> str:
+    """Say that a region is no room."""
+    name = region.name or " and ".join(region.types) or UNKNOWN
+    if region.shape.is_empty:
+        return f"the region {name} is empty: it is no room"
+    (x0, y0), (x1, y1) = lattice.to_metres(np.reshape(region.shape.bounds, (2, 2))).tolist()
+    return f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}"
+
+
+def beside_rooms(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the rooms of cells, where cells without one take that of a neighbor.
+
+    First of a neighbor to the side, then of one across a corner; west before east, south before
+    north.
+    """
+    filled: NDArray[np.int16] = fill_beside(room_of_cell)
+    return filled

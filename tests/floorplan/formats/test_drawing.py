@@ -1,0 +1,148 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from fleet2d.component import lookup
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.drawing import Image, read_image
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.plan import FloorPlan
+
+WALL, PAPER = 20, 250
+
+HOME = np.full((80, 120), PAPER, np.uint8)
+HOME[10:70, 10:110] = WALL
+HOME[14:66, 14:58] = PAPER  # 52 x 44 pixels
+HOME[14:66, 62:106] = PAPER  # as large
+HOME[34:46, 58:62] = PAPER  # a door between them
+
+
+def drawn(folder: Path, pixels: NDArray[np.uint8] = HOME) -> Path:
+    path = folder / "flat.pgm"
+    rows, columns = pixels.shape
+    path.write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + pixels.tobytes())
+    return path
+
+
+def read(folder: Path, pixels: NDArray[np.uint8] = HOME, **options: Any) -> FloorPlan:
+    return read_image(drawn(folder, pixels), 0.05, **options)
+
+
+def test_what_dark_walls_enclose_is_free_and_the_paper_around_is_not(tmp_path: Path) -> None:
+    plan = read(tmp_path)
+
+    assert (2 * 52 * 44 + 12 * 4) * 0.05**2 == pytest.approx(plan.area_m2)
+    assert (0.7, 0.7, 5.3, 3.3) == pytest.approx(plan.bounds)  # from the lower left corner
+    assert plan.room_at(0.2, 0.2) is None
+    assert ["room_0", "room_1"] == [room.name for room in plan.rooms]
+    assert 0.6 == pytest.approx(plan.doorways[0].width_m)
+
+
+def test_picture_is_not_mirrored(tmp_path: Path) -> None:
+    pixels = HOME.copy()
+    pixels[14:20, 14:30] = WALL  # the upper left corner
+
+    plan = read(tmp_path, pixels)
+
+    assert plan.room_at(0.8, 3.2) is None
+    assert plan.room_at(0.8, 0.8) is not None
+
+
+@pytest.mark.parametrize(("threshold", "dark"), [(0.3, False), (0.5, False), (0.7, True)])
+def test_what_is_darker_than_the_threshold_is_wall(
+    tmp_path: Path, threshold: float, dark: bool
+) -> None:
+    pixels = HOME.copy()
+    pixels[20:40, 20:40] = 153  # 0.6 of white
+
+    plan = read(tmp_path, pixels, threshold=threshold)
+
+    assert dark == (plan.room_at(1.5, 2.5) is None)
+
+
+def test_lettering_becomes_free_below_the_speck_area(tmp_path: Path) -> None:
+    pixels = HOME.copy()
+    pixels[30:34, 30:34] = WALL  # 0.04 m2
+
+    assert read(tmp_path).area_m2 == pytest.approx(
+        read(tmp_path, pixels, speck_area_m2=0.05).area_m2
+    )
+    assert read(tmp_path).area_m2 == pytest.approx(read(tmp_path, pixels).area_m2 + 0.04)
+
+
+def test_rooms_without_a_way_to_the_rest_are_left_out_and_said(tmp_path: Path) -> None:
+    pixels = HOME.copy()
+    pixels[34:46, 58:62] = WALL
+
+    plan = read(tmp_path, pixels)
+
+    assert 52 * 44 * 0.05**2 == pytest.approx(plan.area_m2)
+    assert "left out: 5.72 m2 of free space" in plan.notes[0]
+
+
+def test_resolution_scales_and_is_the_cell_unless_one_is_given(tmp_path: Path) -> None:
+    path = drawn(tmp_path)
+
+    assert 0.02 == read_image(path, 0.02).lattice.cell
+    assert 0.01 == read_image(path, 0.005, ray_width=0.02).lattice.cell
+    assert 0.1 == read_image(path, 0.02, 0.1).lattice.cell
+    assert read_image(path, 0.1).area_m2 == pytest.approx(4 * read_image(path, 0.05).area_m2)
+
+
+def test_transparent_paper_is_paper(tmp_path: Path) -> None:
+    images = pytest.importorskip("PIL.Image")
+    black = np.zeros_like(HOME)
+    pixels = np.dstack([black, black, black, np.where(HOME == WALL, 255, 0).astype(np.uint8)])
+    images.fromarray(pixels).save(tmp_path / "flat.png")
+
+    plan = read_image(tmp_path / "flat.png", 0.05)
+
+    assert shapely.equals_exact(read(tmp_path).polygons, plan.polygons).all()
+
+
+@pytest.mark.parametrize(
+    ("pixels", "message"),
+    [
+        (np.full((50, 50), PAPER, np.uint8), "no space is enclosed by walls"),
+        (np.full((50, 50), WALL, np.uint8), "all of the picture is darker than threshold"),
+        (np.where(np.arange(120) == 60, PAPER, HOME).astype(np.uint8), "outer walls without gaps"),
+    ],
+)
+def test_drawing_that_encloses_nothing_is_refused(
+    tmp_path: Path, pixels: NDArray[np.uint8], message: str
+) -> None:
+    if pixels.shape == HOME.shape:
+        pixels[:, 56:66] = PAPER
+    with pytest.raises(FloorPlanError, match=message) as caught:
+        read(tmp_path, pixels)
+
+    assert "flat.pgm" in str(caught.value)
+
+
+def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
+    path = drawn(tmp_path)
+
+    source = Image.model_validate({"path": str(path), "resolution": "4 cm"})
+
+    assert Image is lookup("floorplan", "image")
+    assert 0.04 == source.cell
+    assert source.load() == read_image(path, 0.04)
+    assert Image(path=path, resolution=0.05, threshold=0.01).threshold == 0.01
+    for wrong in ({}, {"resolution": 0}, {"resolution": 5}, {"resolution": 0.05, "threshold": 2}):
+        with pytest.raises(ValidationError):
+            Image.model_validate({"path": str(path), **wrong})
+
+
+def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path: Path) -> None:
+    path = drawn(tmp_path)
+
+    assert read_image(path, 0.05) == load_floorplan(path, resolution=0.05)
+    with pytest.raises(FloorPlanError, match="give the metres per pixel as resolution"):
+        load_floorplan(path)
+    with pytest.raises(FloorPlanError, match="family_home is no picture"):
+        load_floorplan("family_home", resolution=0.05)

@@ -1,0 +1,225 @@
+import json
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+import shapely
+import yaml
+
+from fleet2d.component import lookup
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.bundled import Bundled, bundled_names
+from fleet2d.floorplan.formats.houseexpo import read_houseexpo
+from fleet2d.floorplan.formats.native import Native, read_native
+from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+
+OUTLINE = [[0, 0], [5, 0], [5, 3], [0, 3]]
+PLAN = {"format": "fleet2d-floorplan", "version": 1, "name": "flat", "free": [{"outline": OUTLINE}]}
+
+BED = {"type": "bed", "footprint": [[1, 1], [3, 1], [3, 2], [1, 2]]}
+USE = {"x": 2, "y": 1.5, "heading": 0.5}
+
+
+def written(folder: Path, content: object) -> Path:
+    path = folder / "plan.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+def read(folder: Path, **content: Any) -> FloorPlan:
+    return read_native(written(folder, {**PLAN, **content}))
+
+
+def test_plan_written_by_hand_is_read(tmp_path: Path) -> None:
+    hole = [[3, 1], [4, 1], [4, 2], [3, 2]]
+    kitchen = {"type": "Kitchen", "polygon": [[0, 0], [2, 0], [2, 3], [0, 3]]}
+
+    plan = read(
+        tmp_path,
+        free=[{"outline": OUTLINE, "holes": [hole]}],
+        rooms=[kitchen, {"type": "unknown", "name": "den", "region": [{"outline": OUTLINE}]}],
+        entrance=[4.5, 0.5],
+    )
+
+    assert 14.0 == pytest.approx(plan.area_m2)
+    assert [("kitchen_0", "kitchen", ("kitchen",)), ("den", "unknown", ())] == [
+        (room.name, room.type, room.labels) for room in plan.rooms
+    ]
+    assert (4.5, 0.5) == plan.entrance
+    assert plan.room_at(3.5, 1.5) is None
+
+
+@pytest.mark.parametrize("cell", [0.05, 0.2, 1.0])
+def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: float) -> None:
+    for path in sorted((shared_data / "houseexpo").glob("*.json")):
+        if path.name.startswith("f1ac") and cell < 0.1:
+            continue  # the largest takes seconds
+        plan = read_houseexpo(path, cell)
+
+        again = read_native(written(tmp_path, plan.to_native()), cell)
+
+        assert plan.digest == again.digest, path.name
+        assert plan.rooms == again.rooms
+        assert plan.mesh.triangles.tolist() == again.mesh.triangles.tolist()
+
+
+def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
+    ring = shapely.difference(shapely.box(0, 0, 9, 7), shapely.Point(4, 3).buffer(1.2345))
+    den = LabelledRegion(("office", "bedroom"), shapely.box(0, 0, 4, 7), "Ben's den", "office")
+    plan = FloorPlan.build("ring", ring, [den], entrance=(0.1 + 0.2, 1 / 3))
+
+    again = read_native(written(tmp_path, plan.to_native()))
+
+    assert plan == again
+    assert ("Ben's den", "office", ("office", "bedroom")) == (
+        again.rooms[0].name,
+        again.rooms[0].type,
+        again.rooms[0].labels,
+    )
+    assert again.to_native() == plan.to_native()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": "x"}, 'no Fleet2D floor plan: "format" is not "fleet2d-floorplan"$'),
+        ({"format": None, "verts": []}, "it looks like HouseExpo: use type houseexpo"),
+        ({"version": 2}, "version 2 of the format is not known: this Fleet2D reads 1"),
+        ({"roms": []}, "the plan has an unknown key 'roms': did you mean 'rooms'"),
+        ({"name": 3}, "name is not a text"),
+        ({"free": {}}, "free is not a list"),
+        ({"free": []}, "the outline of flat encloses no area"),
+        ({"free": [{"outline": OUTLINE[:2]}]}, r"free\[0\]\.outline has 2 different points"),
+        ({"free": [{"holes": []}]}, r"free\[0\] has no key 'outline'"),
+        ({"free": [OUTLINE]}, r"free\[0\] is not an object with the keys outline, holes"),
+        (
+            {"free": [{"outline": [[0, 0], [4, 4], [4, 0], [0, 4]]}]},
+            r"free\[0\] is no sound outline: self-intersection at \(2, 2\) m",
+        ),
+        ({"free": [{"outline": OUTLINE}] * 2}, "free is no sound outline"),
+        ({"rooms": [{"type": "hall"}]}, r"rooms\[0\] needs either polygon .* or region"),
+        ({"rooms": [{"polygon": OUTLINE}]}, r"rooms\[0\] has no key 'type'"),
+        ({"rooms": [{"type": 3, "polygon": OUTLINE}]}, "name and type must be texts"),
+        ({"rooms": [{"type": "hall", "name": "", "polygon": OUTLINE}]}, "must be texts"),
+        ({"rooms": [{"type": "hall", "labels": "x", "polygon": OUTLINE}]}, "labels is not a list"),
+        ({"rooms": [{"type": "hall", "poligon": OUTLINE}]}, "did you mean 'polygon'"),
+        ({"doorways": {}}, "doorways is not a list"),
+        ({"doorways": [{"start": [0, 0]}]}, r"doorways\[0\] has no key 'end'"),
+        ({"doorways": [{"start": [0, 0], "end": 3}]}, r"doorways\[0\]\.end is 3: a list of 2"),
+        ({"doorways": [{"start": [0, 0], "end": [1, 1], "leaf": 1}]}, "leaf is 1: true or false"),
+        ({"doorways": [{"start": [0, 0], "end": [1, 1], "name": ""}]}, 'name is "": a text'),
+        ({"doorways": [{"start": [0, 0], "end": [1, 1], "lef": True}]}, "did you mean 'leaf'"),
+        ({"objects": [{"footprint": OUTLINE}]}, r"objects\[0\] has no key 'type'"),
+        ({"objects": [{"type": "", "footprint": OUTLINE}]}, r'objects\[0\]\.type is "": a text'),
+        ({"objects": [{"type": "bed", "footprint": [[0, 0]]}]}, "footprint has 1 different points"),
+        ({"objects": [{**BED, "blocks": "air"}]}, 'blocks is "air": one of nothing, path, sight'),
+        ({"objects": [{**BED, "heading": "north"}]}, "heading .* is not a number"),
+        ({"objects": [{**BED, "uses": [{"x": 1, "y": 1}]}]}, r"uses\[0\] has no key 'heading'"),
+        ({"objects": [{**BED, "uses": [{**USE, "posture": "hang"}]}]}, "one of stand, sit, lie"),
+        ({"objects": [{**BED, "uses": [{**USE, "approach": 1}]}]}, "approach is 1: a list of 2"),
+        ({"no_go": [[0, 0], [1, 1]]}, r"no_go\[0\]\[0\] is 0: a list of 2 numbers"),
+        ({"no_go": [[[0, 0], [2, 2], [2, 0], [0, 2]]]}, r"no_go\[0\] is no sound outline"),
+        ({"entrance": [9, 9]}, r"the entrance of flat at \(9, 9\) m is not in free space"),
+        ({"entrance": "door"}, 'entrance is "door": a list of 2 numbers'),
+    ],
+)
+def test_what_is_no_plan_is_refused_with_the_place(
+    tmp_path: Path, change: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(FloorPlanError, match=message) as caught:
+        read(tmp_path, **change)
+
+    assert str(tmp_path / "plan.json") in str(caught.value)
+
+
+def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
+    content = {
+        **PLAN,
+        "objects": [{**BED, "uses": [{**USE, "posture": "lie"}]}],
+        "no_go": [OUTLINE],
+    }
+    path = tmp_path / "plan.yaml"
+    path.write_text(yaml.safe_dump(content))  # with aliases, as the outline is in it twice
+
+    plan = read_native(path)
+
+    assert plan == read_native(written(tmp_path, content))
+    assert plan == load_floorplan(path)
+    assert [("bed_0", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
+
+
+def test_doorways_that_a_file_leaves_out_are_looked_for(tmp_path: Path) -> None:
+    """And those that it says it hasn't are not."""
+    pinched = [[0, 0], [3, 0], [3, 1], [3.1, 1], [3.1, 0], [6, 0], [6, 3], [3.1, 3], [3.1, 1.9]]
+    pinched += [[3, 1.9], [3, 3], [0, 3]]
+    rooms = [
+        {"type": "kitchen", "polygon": [[0, 0], [3.05, 0], [3.05, 3], [0, 3]]},
+        {"type": "hall", "polygon": [[3.05, 0], [6, 0], [6, 3], [3.05, 3]]},
+    ]
+
+    found = read(tmp_path, free=[{"outline": pinched}], rooms=rooms)
+    none = read(tmp_path, free=[{"outline": pinched}], rooms=rooms, doorways=[])
+
+    assert [0.9] == [pytest.approx(door.width_m) for door in found.doorways]
+    assert () == none.doorways
+    assert found == read_native(written(tmp_path, found.to_native()))
+    assert none == read_native(written(tmp_path, none.to_native()))
+
+
+def test_native_and_bundled_are_found_by_name(tmp_path: Path) -> None:
+    source = Native.model_validate({"path": str(written(tmp_path, PLAN)), "cell": 0.1})
+
+    assert 0.1 == source.load().lattice.cell
+    assert Native is lookup("floorplan", "native")
+    assert Bundled is lookup("floorplan", "bundled")
+
+
+# --- The bundled home ---------------------------------------------------------------------------
+
+
+def test_bundled_names_are_the_files() -> None:
+    assert bundled_names() == sorted(get_args(Bundled.model_fields["name"].annotation))
+
+
+def test_family_home_has_the_size_of_the_papers_and_every_room() -> None:
+    plan = Bundled().load()
+
+    assert 184 <= plan.area_m2 <= 188
+    assert {"bedroom": 3, "bathroom": 2, "kitchen": 1, "living_room": 1, "dining_room": 1} == {
+        kind: len(plan.rooms_of_type(kind))
+        for kind in ("bedroom", "bathroom", "kitchen", "living_room", "dining_room")
+    }
+    for kind in ("entryway", "hallway", "office", "laundry", "storage"):
+        assert plan.rooms_of_type(kind), kind
+    assert () == plan.rooms_of_type("unknown")
+    assert () == plan.notes
+    assert plan.entrance is not None
+    assert plan.room("entryway_0") == plan.room_at(*plan.entrance)
+
+
+@pytest.mark.parametrize("cell", [0.05, 0.1])
+def test_family_home_lets_a_body_of_25_cm_into_every_room(cell: float) -> None:
+    plan = Bundled(cell=cell).load()
+    space = Space(plan, radius=0.25)
+
+    assert 1 == space.parts
+    assert all(len(space.cells(room.index)) > 0 for room in plan.rooms)
+    assert plan.entrance is not None
+    assert 0 == space.part_at(*plan.lattice.to_lattice(plan.entrance).tolist())
+
+
+def test_load_floorplan_tells_formats_by_content(tmp_path: Path) -> None:
+    assert "family_home" == load_floorplan().name
+    assert "flat" == load_floorplan(written(tmp_path, PLAN)).name
+    assert 15.0 == pytest.approx(load_floorplan(written(tmp_path, {"verts": OUTLINE}), 0.1).area_m2)
+
+
+def test_load_floorplan_refuses_what_it_does_not_know(tmp_path: Path) -> None:
+    with pytest.raises(FloorPlanError, match="no floor plan that Fleet2D knows"):
+        load_floorplan(written(tmp_path, {"walls": 3}))
+    with pytest.raises(FloorPlanError, match="did you mean 'family_home'"):
+        load_floorplan("family-home")
+    with pytest.raises(FloorPlanError, match="there is no file"):
+        load_floorplan(tmp_path / "nowhere.json")

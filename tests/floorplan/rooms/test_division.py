@@ -1,0 +1,204 @@
+"""Rough boxes over walls, and maps without labels: what rooms come of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from shapely import Polygon
+
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.division import MOST_CORNERS
+from fleet2d.kernels.masks import label_parts
+
+# Two rooms of 3 x 3 m with a wall of 0.1 m and a door between them.
+LEFT, RIGHT, DOOR = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.1, 4.0), (4.0, 2.0, 4.1, 2.9)
+Box = tuple[float, float, float, float]
+
+
+def space(*boxes: Box) -> Polygon:
+    free = shapely.union_all([shapely.box(*box) for box in boxes])
+    assert isinstance(free, Polygon)
+    return free
+
+
+def labelled(free: Polygon, **boxes: Box) -> FloorPlan:
+    regions = [
+        LabelledRegion((name.rstrip("_"),), shapely.box(*box)) for name, box in boxes.items()
+    ]
+    return FloorPlan.build("home", free, regions, doorways=None, regions_are="boxes")
+
+
+def areas(plan: FloorPlan) -> dict[str, float]:
+    return {room.name: round(room.area_m2, 1) for room in plan.rooms}
+
+
+# --- Boxes ----------------------------------------------------------------------------------------
+
+
+def test_box_that_reaches_through_a_wall_ends_at_it() -> None:
+    plan = labelled(space(LEFT, RIGHT, DOOR), bedroom=(0.5, 0.5, 5.0, 4.5), office=(4, 1, 7.3, 4.3))
+
+    assert {"bedroom_0": 9.0, "office_0": 9.1} == pytest.approx(areas(plan), abs=0.11)
+    assert ["bedroom_0-office_0"] == [doorway.name for doorway in plan.doorways]
+    assert plan.room_at(4.5, 2.0) is plan.room("office_0")
+
+
+def test_box_that_is_too_small_for_its_chamber_has_all_of_it() -> None:
+    plan = labelled(space(LEFT, RIGHT, DOOR), bedroom=(1.3, 1.0, 3.9, 3.8), office=RIGHT)
+
+    assert {"bedroom_0", "office_0"} == set(areas(plan))
+    assert 9.0 == pytest.approx(plan.room("bedroom_0").area_m2, abs=0.1)
+
+
+def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone() -> None:
+    walls = shapely.union_all([shapely.box(3, 3, 3.1, 5), shapely.box(3.1, 3, 4.2, 3.1)])
+    free = shapely.difference(shapely.box(1, 1, 5, 5), walls)
+
+    plan = labelled(free, bedroom=(0.9, 0.9, 5.1, 5.1), bathroom=(3.0, 3.0, 5.1, 5.1))
+
+    assert {"bedroom_0": 12.0, "bathroom_0": 3.6} == pytest.approx(areas(plan), abs=0.3)
+    assert 1 == len(plan.doorways)
+
+
+def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
+    plan = labelled(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4, 1, 9, 5))
+
+    assert {"kitchen_0": 12.0, "living_room_0": 20.0} == areas(plan)
+    (link,) = plan.room_graph
+    assert ("open", 4.0, None) == (link.kind, pytest.approx(link.width_m), link.doorway)
+
+
+def test_gap_between_boxes_goes_to_the_nearest() -> None:
+    plan = labelled(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4.4, 1, 9, 5))
+
+    assert {"kitchen_0": 12.8, "living_room_0": 19.2} == areas(plan)
+
+
+def test_large_space_that_no_box_covers_is_a_room_of_its_own() -> None:
+    plan = labelled(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(6.5, 1, 9, 5))
+
+    assert {"kitchen_0": 12.0, "living_room_0": 10.0, "unknown_0": 10.0} == areas(plan)
+
+
+def test_box_under_another_is_one_room_with_both_labels() -> None:
+    plan = labelled(shapely.box(1, 1, 5, 5), dining_room=(0.9, 1, 5, 5), kitchen=(1, 1.1, 5, 5.0))
+
+    assert [("kitchen_0", ("kitchen", "dining_room"))] == [(r.name, r.labels) for r in plan.rooms]
+    assert (
+        "a region dining_room lies under smaller ones: it is one room, kitchen and dining_room"
+        in plan.notes
+    )
+
+
+def test_boxes_that_make_no_room_are_notes_with_the_reason() -> None:
+    plan = labelled(
+        space(LEFT, RIGHT, DOOR),
+        office=LEFT,
+        gym=(7.0, 1, 12, 4),
+        storage=(20, 20, 22, 22),
+        aeration=(2, 1, 2.1, 4),
+    )
+
+    assert {"office_0", "unknown_0"} == set(areas(plan))
+    assert [
+        "the region gym from (7.00, 1.00) to (12.00, 4.00) m covers too little free space: it is no"
+        " room",
+        "the region storage from (20.00, 20.00) to (22.00, 22.00) m covers no free space: it is no"
+        " room",
+        "the region aeration from (2.00, 1.00) to (2.10, 4.00) m covers too little free space: it"
+        " is no room",
+    ] == list(plan.notes)
+
+
+HALL = (1.0, 4.1, 10.2, 5.2)
+
+
+def home_with_hall(height: float) -> FloorPlan:
+    """Return three rooms on a hall that no box covers."""
+    rooms = [(x, 1.0, x + 3.0, 4.0) for x in (1.0, 4.1, 7.2)]
+    doors = [(x + 1, 4.0, x + 1.9, 4.1) for x, *_ in rooms]
+    hall = (*HALL[:3], HALL[1] + height)
+    boxes = dict(zip(("bedroom", "kitchen", "office"), rooms, strict=True))
+    return labelled(space(*rooms, *doors, hall), **boxes)
+
+
+def test_unlabelled_space_that_joins_three_rooms_is_a_hallway_with_a_note() -> None:
+    plan = home_with_hall(1.2)
+
+    assert {"bedroom_0", "kitchen_0", "office_0", "hallway_0"} == set(areas(plan))
+    assert () == plan.room("hallway_0").labels
+    assert ["bedroom_0", "kitchen_0", "office_0"] == [r.name for r in plan.neighbors("hallway_0")]
+    assert ["hallway_0"] == [room.name for room in plan.neighbors("kitchen_0")]
+    assert plan.notes[-1].startswith("hallway_0 is a guess: no label covers its 11.3 m2")
+
+
+def test_large_unlabelled_space_stays_unknown() -> None:
+    assert "unknown_0" in areas(home_with_hall(4.0))
+
+
+# --- No labels ------------------------------------------------------------------------------------
+
+
+def test_space_without_labels_is_divided_at_its_doorways() -> None:
+    plan = FloorPlan.build(
+        "home", space(LEFT, (4.1, 1.0, 8.1, 4.0), DOOR), doorways=None, regions_are="none"
+    )
+
+    assert [("room_0", "room", ()), ("room_1", "room", ())] == [
+        (room.name, room.type, room.labels) for room in plan.rooms
+    ]
+    assert plan.rooms[0].area_m2 > plan.rooms[1].area_m2
+
+
+def test_niche_behind_a_narrow_gap_is_no_room() -> None:
+    niche, gap = (4.1, 2.0, 4.7, 3.4), (4.0, 2.0, 4.1, 2.9)
+
+    plan = FloorPlan.build("home", space(LEFT, niche, gap), doorways=None, regions_are="none")
+
+    assert ["unknown_0"] == [room.name for room in plan.rooms]
+    assert () == plan.doorways
+
+
+MAPS = {
+    "ros_maps/turtlebot3_house/map.yaml": (1, 0),
+    "ros_maps/aws_small_house/map.yaml": (3, 1),
+    "valetudo/dreame_d9_no_segments.json": (3, 1),
+}
+
+
+@pytest.mark.parametrize("name", list(MAPS))
+def test_real_maps_without_labels_become_rooms(shared_data: Path, name: str) -> None:
+    """As one would draw them on the picture; pillars and furniture part nothing."""
+    plan = load_floorplan(shared_data / name)
+
+    assert MAPS[name] == (len(plan.rooms), len(plan.doorways))
+    assert np.array_equal(plan.free, plan.room_of_cell >= 0)
+    sizes = [room.cells for room in plan.rooms]
+    assert sorted(sizes, reverse=True) == sizes
+    for room in plan.rooms:
+        assert 1 == label_parts(plan.room_of_cell == room.index, False).max() + 1, room.name
+
+
+def test_segments_of_a_robot_keep_their_rooms_and_get_doorways(shared_data: Path) -> None:
+    plan = load_floorplan(shared_data / "valetudo" / "dreame_x40_named_rooms.json")
+
+    assert {
+        ("Master Bedroom", "Entrance"),
+        ("Entrance", "Living Room"),
+        ("Kitchen", "Living Room"),
+    } == {tuple(plan.rooms[r].name for r in sorted(d.rooms)) for d in plan.doorways} | {
+        ("Master Bedroom", "Entrance"),
+    }
+
+
+def test_rooms_of_walls_with_very_many_corners_are_those_of_the_plain_walls() -> None:
+    free = space(LEFT, RIGHT, DOOR)
+    dense = shapely.segmentize(free, 0.002)
+    rough = shapely.transform(dense, lambda xy: xy + 0.0008 * (np.arange(len(xy)) % 2)[:, None])
+    plans = [FloorPlan.build("home", f, doorways=None, regions_are="none") for f in (free, rough)]
+
+    assert len(plans[1].mesh.vertices) > MOST_CORNERS
+    assert areas(plans[0]) == pytest.approx(areas(plans[1]), abs=0.11)
+    assert 1 == len(plans[0].doorways) == len(plans[1].doorways)

@@ -1,0 +1,130 @@
+"""Door lines fitted to walls, and what doorways are called."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from tests.homes import all_homes
+from tests.strategies import homes, seeds
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
+
+FREE = shapely.union_all(
+    [shapely.box(0, 0, 2, 3), shapely.box(2.1, 0, 5, 3), shapely.box(2, 1, 2.1, 1.9)]
+)
+ROOMS = [
+    LabelledRegion(("Kitchen",), shapely.box(0, 0, 2.05, 3)),
+    LabelledRegion(("Bathroom",), shapely.box(2.05, 0, 5, 3)),
+]
+
+
+def flat(*lines: DoorLine) -> FloorPlan:
+    return FloorPlan.build("flat", FREE, ROOMS, doorways=lines)
+
+
+def test_doorway_ends_exactly_at_the_jambs() -> None:
+    (doorway,) = flat(DoorLine((2.05, 1.1), (2.05, 1.8))).doorways
+    assert ((2.05, 1.0), (2.05, 1.9)) == (doorway.start, doorway.end)
+    assert doorway.width_m == pytest.approx(0.9)
+
+
+def test_line_drawn_into_the_walls_is_cut_at_them() -> None:
+    (doorway,) = flat(DoorLine((2.05, 0.8), (2.05, 2.1))).doorways
+    assert ((2.05, 1.0), (2.05, 1.9)) == (doorway.start, doorway.end)
+
+
+def test_doorway_is_named_after_the_rooms_on_its_left_and_right() -> None:
+    plan = flat(DoorLine((2.05, 1.0), (2.05, 1.9)))
+    assert "kitchen_0-bathroom_0" == plan.doorways[0].name
+    assert (plan.room("kitchen_0").index, plan.room("bathroom_0").index) == plan.doorways[0].rooms
+    assert plan.doorway("kitchen_0-bathroom_0") is plan.doorways[0]
+
+
+def test_line_the_other_way_round_swaps_left_and_right() -> None:
+    plan = flat(DoorLine((2.05, 1.9), (2.05, 1.0)))
+    assert "bathroom_0-kitchen_0" == plan.doorways[0].name
+
+
+def test_given_name_stays() -> None:
+    assert "hatch" == flat(DoorLine((2.05, 1.0), (2.05, 1.9), name="hatch")).doorways[0].name
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        DoorLine((0.5, 0.5), (1.0, 0.5)),  # in the middle of a room, walls too far
+        DoorLine((2.05, 2.2), (2.05, 2.8)),  # inside the wall
+        DoorLine((9.0, 1.0), (9.0, 2.0)),  # outside
+        DoorLine((2.05, 1.5), (2.05, 1.5)),  # no length
+    ],
+)
+def test_line_in_no_passage_is_noted_and_left_out(line: DoorLine) -> None:
+    plan = flat(line)
+    assert () == plan.doorways
+    assert any("ends at no wall: left out" in note for note in plan.notes)
+
+
+def test_second_of_two_lines_that_cross_is_left_out() -> None:
+    plan = flat(DoorLine((0, 0.5), (2, 0.5)), DoorLine((1, 0), (1, 3)))
+    assert 1 == len(plan.doorways)
+    assert any("touches another one" in note for note in plan.notes)
+
+
+def test_line_between_slanted_walls_gives_them_a_corner_less_than_a_millimetre_off() -> None:
+    room = shapely.Polygon([(0, 0), (4, 0.37), (4.11, 2.93), (0.13, 3.0)])
+    plan = FloorPlan.build("slanted", room, doorways=[DoorLine((2, 0.2), (2, 2.95))])
+    (doorway,) = plan.doorways
+    walls = shapely.union_all([polygon.boundary for polygon in plan.polygons])
+    for end in (doorway.start, doorway.end):
+        assert walls.intersects(shapely.Point(plan.lattice.to_lattice(end)))
+    before = FloorPlan.build("slanted", room)
+    change = shapely.hausdorff_distance(
+        shapely.MultiPolygon(plan.polygons), shapely.MultiPolygon(before.polygons)
+    )
+    assert change / plan.lattice.units_per_m < 0.001
+
+
+def test_stored_plan_has_the_same_doorways() -> None:
+    plan = flat(DoorLine((2.05, 1.1), (2.05, 1.8), leaf=False))
+    lines = [DoorLine(d.start, d.end, d.name, d.leaf) for d in plan.doorways]
+    assert plan.doorways == flat(*lines).doorways
+    assert plan == flat(*lines)
+
+
+def test_unknown_doorway_is_refused_with_those_there_are() -> None:
+    with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_0-bathroom_0"):
+        flat(DoorLine((2.05, 1.0), (2.05, 1.9))).doorway("kitchen")
+
+
+def check_fitted(polygons: list[shapely.Polygon], columns: int, rows: int, seed: int) -> int:
+    """Fit random lines; return how many stood from wall to wall."""
+    rng = np.random.default_rng(seed)
+    lattice = Lattice(0.05, (0.0, 0.0), columns, rows)
+    ends = rng.integers(0, [columns * 64, rows * 64], (12, 2, 2))
+    lines = [DoorLine(tuple(a), tuple(b)) for a, b in lattice.to_metres(ends).tolist()]
+    walls, segments, notes = fit_lines(lattice, polygons, lines)
+    free = shapely.MultiPolygon(walls)
+    assert free.is_valid
+    kept = [shapely.LineString(segment) for segment in segments if segment is not None]
+    for line in kept:
+        assert shapely.relate_pattern(line, free, "1FFF0F***")
+        assert (np.asarray(line.coords) % 2 == 0).all()
+    assert len(lines) == len(kept) + len(notes)
+    return len(kept)
+
+
+@given(homes(), seeds())
+@settings(max_examples=60, deadline=None)
+def test_fitted_lines_cross_free_space_alone(polygons: list[shapely.Polygon], seed: int) -> None:
+    _, _, x1, y1 = shapely.total_bounds(polygons).astype(int).tolist()
+    check_fitted(polygons, x1 // 64 + 2, y1 // 64 + 2, seed)
+
+
+def test_lines_in_real_homes_are_fitted_or_noted(shared_data: Path) -> None:
+    fitted = sum(check_fitted(h.polygons, h.columns, h.rows, 3) for h in all_homes(shared_data))
+    assert fitted > 50

@@ -1,0 +1,148 @@
+import numpy as np
+import pytest
+import shapely
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.rooms.room import LabelledRegion, Room, assign_rooms
+
+LATTICE = Lattice(0.1, (0.0, 0.0), columns=40, rows=30)
+FREE = np.zeros((30, 40), np.bool_)
+FREE[2:28, 2:38] = True
+
+
+def region(label: str, x0: float, y0: float, x1: float, y1: float) -> LabelledRegion:
+    return LabelledRegion((label,), shapely.box(x0, y0, x1, y1))
+
+
+def assigned(*regions: LabelledRegion) -> tuple[np.ndarray, dict[str, Room], list[str]]:
+    room_of_cell, rooms, notes = assign_rooms(LATTICE, FREE, regions)
+    assert list(range(len(rooms))) == [room.index for room in rooms]
+    assert np.array_equal(FREE, room_of_cell >= 0)
+    counts = np.bincount(room_of_cell[FREE], minlength=len(rooms)).tolist()
+    assert counts == [room.cells for room in rooms]
+    assert 0 not in counts
+    assert len(rooms) == len({room.name for room in rooms})
+    return room_of_cell, {room.name: room for room in rooms}, notes
+
+
+def test_no_labels_make_one_unknown_room_of_everything() -> None:
+    """Known failure 6: a plan without labels crashed."""
+    _, rooms, notes = assigned()
+
+    assert ["unknown_0"] == list(rooms)
+    assert ("unknown", (), 26 * 36) == (
+        rooms["unknown_0"].type,
+        rooms["unknown_0"].labels,
+        rooms["unknown_0"].cells,
+    )
+    assert [] == notes
+
+
+def test_uncovered_cells_are_unknown() -> None:
+    _, rooms, _ = assigned(region("Bedroom", 0, 0, 2, 3))
+
+    assert {"bedroom_0": 18 * 26, "unknown_0": 18 * 26} == {k: r.cells for k, r in rooms.items()}
+
+
+def test_rooms_are_numbered_by_type_in_file_order() -> None:
+    _, rooms, _ = assigned(
+        region("Bedroom", 2, 0, 4, 3), region("Toilet", 0, 0, 1, 3), region("Bedroom", 1, 0, 2, 3)
+    )
+
+    assert ["bedroom_0", "toilet_0", "bedroom_1"] == list(rooms)
+    assert 0.8 * 2.6 == pytest.approx(rooms["toilet_0"].area_m2)
+    assert (1.0, 0.2, 2.0, 2.8) == pytest.approx(rooms["bedroom_1"].bounds)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_smaller_box_wins_in_either_order(order: int) -> None:
+    regions = [region("Hall", 0, 0, 4, 3), region("Toilet", 1, 1, 2, 2)][::order]
+
+    _, rooms, _ = assigned(*regions)
+
+    assert 100 == rooms["toilet_0"].cells
+    assert 26 * 36 - 100 == rooms["hall_0"].cells
+
+
+def test_the_first_of_two_boxes_of_equal_size_wins() -> None:
+    _, rooms, _ = assigned(region("Hall", 0, 0, 2, 3), region("Office", 1, 0, 3, 3))
+
+    assert 18 * 26 == rooms["hall_0"].cells
+    assert 10 * 26 == rooms["office_0"].cells
+
+
+def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
+    """Known failure 6: a kitchen with the same box as the dining room got no cells."""
+    _, rooms, notes = assigned(
+        region("Dining_Room", 0, 0, 2, 3),
+        region("Toilet", 2, 0, 4, 3),
+        region("Kitchen", 0, 0, 2, 3),
+    )
+
+    assert ["kitchen_0", "toilet_0"] == list(rooms)
+    assert ("dining_room", "kitchen") == rooms["kitchen_0"].labels
+    assert 18 * 26 == rooms["kitchen_0"].cells
+    assert [] == notes
+
+
+def test_boxes_are_the_same_when_they_round_to_the_same() -> None:
+    _, rooms, _ = assigned(region("Toilet", 0, 0, 2, 3), region("Bathroom", 0, 0, 2.0004, 3))
+
+    assert {"bathroom_0": ("toilet", "bathroom"), "unknown_0": ()} == {
+        k: r.labels for k, r in rooms.items()
+    }
+
+
+def test_a_box_that_misses_the_free_space_is_a_note_and_no_room() -> None:
+    """Known failure 6: a room whose box missed the floor got the whole background."""
+    _, rooms, notes = assigned(
+        region("Garage", 7, 7, 9, 9), region("Garage", -5, -5, -1, -1), region("Garage", 0, 0, 4, 2)
+    )
+
+    assert ["garage_0", "unknown_0"] == list(rooms)
+    assert 2 == len(notes)
+    assert notes[0].startswith("the region garage from (7.00, 7.00) to (9.00, 9.00) m has no free")
+
+
+def test_a_box_under_smaller_ones_is_a_note_and_no_room() -> None:
+    _, rooms, notes = assigned(
+        region("Office", 0, 0, 4, 3), region("Hall", 0, 0, 2, 3), region("Gym", 2, 0, 4, 3)
+    )
+
+    assert ["hall_0", "gym_0"] == list(rooms)
+    assert 1 == len(notes)
+
+
+def test_a_box_thinner_than_a_cell_is_a_note() -> None:
+    _, rooms, notes = assigned(region("Aeration", 1.0, 0, 1.01, 3), region("Hall", 1, 1, 1, 1))
+
+    assert ["unknown_0"] == list(rooms)
+    assert 2 == len(notes)
+
+
+def test_polygons_take_the_cells_inside_them() -> None:
+    triangle = shapely.Polygon([(0, 0), (3, 0), (0, 3)])
+    room_of_cell, rooms, _ = assigned(LabelledRegion(("Loggia",), triangle))
+
+    x, y = LATTICE.centre_axes()
+    expected = FREE & ((x[None, :] + y[:, None]) < 3 * LATTICE.units_per_m)
+    assert np.array_equal(expected, room_of_cell == rooms["loggia_0"].index)
+
+
+def test_given_names_stay_and_numbers_step_round_them() -> None:
+    _, rooms, _ = assigned(
+        region("Bedroom", 0, 0, 1, 3),
+        LabelledRegion(("Bedroom",), shapely.box(1, 0, 2, 3), name="bedroom_0"),
+        LabelledRegion(("Bedroom",), shapely.box(2, 0, 3, 3), name="Anna's", type="child_room"),
+    )
+
+    assert ["bedroom_1", "bedroom_0", "Anna's", "unknown_0"] == list(rooms)
+    assert ("child_room", ("bedroom",)) == (rooms["Anna's"].type, rooms["Anna's"].labels)
+
+
+def test_one_name_for_two_rooms_is_refused() -> None:
+    den = [LabelledRegion(("Room",), shapely.box(x, 0, x + 1, 3), name="den") for x in (0, 1)]
+
+    with pytest.raises(FloorPlanError, match="two rooms are named 'den'"):
+        assign_rooms(LATTICE, FREE, den)

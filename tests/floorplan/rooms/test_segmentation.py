@@ -1,0 +1,41 @@
+"""Chambers joined into rooms: what is too small to be one."""
+
+import numpy as np
+
+from fleet2d.floorplan.rooms.chambers import Chambers, Link
+from fleet2d.floorplan.rooms.segmentation import segment_rooms
+
+CELL = 0.1
+
+
+def chambers(*areas_m2: float, links: tuple[Link, ...]) -> Chambers:
+    """Return chambers of these areas, in a row of cells."""
+    cells = [round(area / CELL**2) for area in areas_m2]
+    row = np.repeat(np.arange(len(cells)), cells).astype(np.int32)
+    return Chambers(np.append(row, -1)[None].astype(np.int32), len(cells), links)
+
+
+def areas(rooms: np.ndarray) -> list[float]:
+    return (np.bincount(rooms[rooms >= 0]) * CELL**2).round(2).tolist()
+
+
+def test_rooms_are_numbered_by_decreasing_size_and_walls_have_none() -> None:
+    rooms = segment_rooms(chambers(2.0, 9.0, links=(Link(0, (0, 1)),)), [False], CELL)
+    assert [9.0, 2.0] == areas(rooms)
+    assert -1 == rooms[0, -1]
+
+
+def test_alcove_behind_an_opening_is_joined_but_a_small_room_behind_a_doorway_is_not() -> None:
+    both = chambers(9.0, 3.0, links=(Link(0, (0, 1)),))
+    assert [12.0] == areas(segment_rooms(both, [True], CELL))
+    assert [9.0, 3.0] == areas(segment_rooms(both, [False], CELL))
+
+
+def test_what_is_too_small_for_a_toilet_goes_across_an_opening_rather_than_a_doorway() -> None:
+    links = (Link(0, (0, 1)), Link(1, (1, 2)))
+    rooms = segment_rooms(chambers(9.0, 1.0, 6.0, links=links), [False, True], CELL)
+    assert [9.0, 7.0] == areas(rooms)
+
+
+def test_chamber_without_a_link_stays_a_room_however_small() -> None:
+    assert [9.0, 0.5] == areas(segment_rooms(chambers(9.0, 0.5, links=()), [], CELL))
