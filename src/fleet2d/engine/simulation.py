@@ -4,7 +4,7 @@ import io
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -14,6 +14,7 @@ from fleet2d.artifacts.reader import LEARNED_NAME, Run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.checkpoint import Checkpoint, Keeper
+from fleet2d.engine.garbage import rare_collections
 from fleet2d.engine.interventions import is_from_outside, read_intervention
 from fleet2d.engine.keeping import (
     deferred_interrupt,
@@ -82,10 +83,11 @@ class Simulation(Steering):
                 Nothing is written then.
         """
         began = time.perf_counter()
-        loaded = load_scenario(scenario, *overrides, **settings)
-        store = RunStore(out)
-        store.check()
-        self._prepare(loaded, store, interventions)
+        with rare_collections():
+            loaded = load_scenario(scenario, *overrides, **settings)
+            store = RunStore(out)
+            store.check()
+            self._prepare(loaded, store, interventions)
         open_store(self._store, self.home.plan)
         self._setup_s = time.perf_counter() - began
 
@@ -336,7 +338,10 @@ class Simulation(Steering):
         self._set_pace()
         # A few steps are over before anybody could press Ctrl-C.
         short = end - self.step < SHORT
-        with nullcontext() if short else deferred_interrupt(self._stop):
+        with ExitStack() as stack:
+            if not short:
+                stack.enter_context(rare_collections())
+                stack.enter_context(deferred_interrupt(self._stop))
             try:
                 self._spans(end, on_progress, spans)
             except BaseException:
