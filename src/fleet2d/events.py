@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
+from itertools import chain, islice
 from typing import NamedTuple, Protocol
 
 from fleet2d.errors import InputError
@@ -139,8 +140,9 @@ class EventStream:
         """Hand events to all sinks."""
         if not events:
             return
-        if len(self._recent) + len(events) > self.KEPT:
-            dropped = [*self._recent, *events][: len(self._recent) + len(events) - self.KEPT]
+        excess = len(self._recent) + len(events) - self.KEPT
+        if excess > 0:
+            dropped = islice(chain(self._recent, events), excess)
             self._dropped_until = max(self._dropped_until, *(e.step + 1 for e in dropped))
         self._recent.extend(events)
         for sink in self.sinks:

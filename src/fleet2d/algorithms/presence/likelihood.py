@@ -12,11 +12,11 @@ from pydantic import Field
 from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import Habits, Layout, Person, stretches, watched_patches
+from fleet2d.algorithms.presence.person import Habits, Layout, Person, watched_patches
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places
-from fleet2d.kernels.stays import Stretches
+from fleet2d.kernels.stays import Stretches, take_together
 from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
@@ -193,7 +193,7 @@ class Likelihood(Estimator):
         ]
         self.counts.hours = self._whole_day(places, day)
         self.hours.append(self.counts.hours)
-        self.days.append(day._replace(watched=None, seen=None))
+        self.days.append(day._replace(watched=None, sightings=None))
         for _ in range(REVISITS):
             self.turn = (self.turn - 1) % len(self.days)
             self._revisit(self.turn)
@@ -231,34 +231,81 @@ class Day(NamedTuple):
         minute: int64 (bins,), since midnight.
         unknown: bool (bins, rooms), where somebody was perceived who is no user.
         watched: uint8 (bins, patches), from `watched_patches`; None once the day is learned from.
-        seen: int64 (bins, users + 1, patches), as in Parts; None likewise.
+        sightings: Who was perceived where; None likewise.
     """
 
     number: int
     minute: I64
     unknown: NDArray[np.bool_]
     watched: NDArray[np.uint8] | None
-    seen: I64 | None
+    sightings: "Sightings | None"
 
     @classmethod
     def of(cls, bins: Bins) -> Self:
         """Return evidence of one day."""
         number, watched = int(bins.day[0]), watched_patches(bins)
-        return cls(number, bins.minute, unknown_seen(bins), watched, bins.parts.seen)
+        return cls(number, bins.minute, unknown_seen(bins), watched, Sightings.of(bins.parts.seen))
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return parts of a day that follow each other as one."""
         if len(parts) == 1:
             return parts[0]
-        number, *columns = zip(*parts, strict=True)
-        return cls(number[0], *(np.concatenate(column) for column in columns))
+        lengths = [len(part.minute) for part in parts]
+        return cls(
+            parts[0].number,
+            np.concatenate([part.minute for part in parts]),
+            np.concatenate([part.unknown for part in parts]),
+            np.concatenate([part.watched for part in parts if part.watched is not None]),
+            Sightings.joined([part.sightings for part in parts if part.sightings], lengths),
+        )
 
     def stretches(self, user: int, longest: int) -> Stretches:
         """Return the evidence of one user, bins that are alike taken together."""
         assert self.watched is not None
-        assert self.seen is not None
-        return stretches(self.minute, self.watched, self.seen, user, longest)
+        assert self.sightings is not None
+        seen = self.sightings.of_user(user, self.watched.shape)
+        return take_together(self.minute, self.watched, seen, longest)
+
+
+class Sightings(NamedTuple):
+    """Where users were perceived, which is hardly anywhere at most times: arrays of one length.
+
+    Attributes:
+        user: int64, rising.
+        bin: int64, rising for each user.
+        patch: int64.
+        steps: int64, at how many steps.
+    """
+
+    user: I64
+    bin: I64
+    patch: I64
+    steps: I64
+
+    @classmethod
+    def of(cls, seen: I64) -> Self:
+        """Return the sightings in counts (bins, users + 1, patches), as in Parts."""
+        bins, user, patch = np.nonzero(seen > 0)  # quicker than of the numbers themselves
+        return cls(user, bins, patch, seen[bins, user, patch])._by_user()
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self], lengths: Sequence[int]) -> Self:
+        """Return sightings in parts of so many bins that follow each other as one."""
+        first = np.cumsum([0, *lengths[:-1]])
+        moved = [part._replace(bin=part.bin + at) for part, at in zip(parts, first, strict=True)]
+        return cls(*(np.concatenate(column) for column in zip(*moved, strict=True)))._by_user()
+
+    def _by_user(self) -> Self:
+        order = np.argsort(self.user, kind="stable")
+        return type(self)(*(column[order] for column in self))
+
+    def of_user(self, user: int, shape: tuple[int, ...]) -> I64:
+        """Return those of a user as counts, int64 of a shape (bins, patches)."""
+        begin, end = np.searchsorted(self.user, [user, user + 1])
+        seen = np.zeros(shape, np.int64)
+        seen[self.bin[begin:end], self.patch[begin:end]] = self.steps[begin:end]
+        return seen
 
 
 def by_day(bins: Bins) -> list[Bins]:

@@ -249,19 +249,5 @@ def stretches_of(
             the same.
     """
     watched = watched_patches(bins) if watched is None else watched
-    return stretches(bins.minute, watched, bins.parts.seen, user, longest)
-
-
-def stretches(
-    minute: I64, watched: NDArray[np.uint8], seen: I64, user: int, longest: int
-) -> Stretches:
-    """Return the evidence of one user, as `stretches_of`.
-
-    Args:
-        minute: int64 (bins,), since midnight.
-        watched: uint8 (bins, patches), from `watched_patches`.
-        seen: int64 (bins, users + 1, patches), as in Parts.
-        user: Row of the user; the last is anybody.
-        longest: Most bins of a stretch.
-    """
-    return take_together(minute, watched, np.ascontiguousarray(seen[:, user]), longest)
+    seen = np.ascontiguousarray(bins.parts.seen[:, user])
+    return take_together(bins.minute, watched, seen, longest)
