@@ -8,8 +8,7 @@ import pytest
 from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Present
-from fleet2d.algorithms.evidence import count_seen, steps_of_bin
-from fleet2d.algorithms.observations import Observations
+from fleet2d.algorithms.evidence import Sightings, count_seen, steps_of_bin
 from fleet2d.errors import ComponentError
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_evidence"
@@ -46,14 +45,9 @@ class Unsaid(Algorithm):
         return {"bins": len(history.evidence)}
 
 
-def observations(rows: list[tuple[int, int, int]]) -> Observations:
-    """Return observations of (step, user, room)."""
-    step, user, room = np.array(rows, np.int64).reshape(-1, 3).T
-    none = np.zeros(len(step))
-    return Observations(
-        step, none.astype(np.int32), user.astype(np.int32), none, none, room.astype(np.int16), none,
-        none.astype(np.int8), none.astype(np.int8),
-    )  # fmt: skip
+def sightings(rows: list[tuple[int, int, int]]) -> Sightings:
+    """Return sightings of (step, user, room)."""
+    return Sightings(*np.array(rows, np.int64).reshape(-1, 3).T)
 
 
 def test_bins_last_a_minute_or_a_step() -> None:
@@ -65,14 +59,14 @@ def test_bins_last_a_minute_or_a_step() -> None:
 def test_whom_two_robots_perceive_at_once_counts_once_and_strangers_only_as_anybody() -> None:
     rows = [(60, 0, 1), (60, 0, 1), (61, 0, 1), (61, -1, 1), (119, 1, 0), (120, -1, 0), (180, 0, 0)]
 
-    seen = count_seen(observations(rows), 60, 2, 60, 2, 2)
+    seen = count_seen(sightings(rows), 60, 2, 60, 2, 2)
 
     assert [[0, 2], [1, 0], [1, 2]] == seen[0].tolist()
     assert [[0, 0], [0, 0], [1, 0]] == seen[1].tolist()
 
 
 def test_nobody_perceived_is_evidence_of_zeros() -> None:
-    assert 0 == count_seen(observations([]), 0, 3, 60, 1, 2).sum()
+    assert 0 == count_seen(sightings([]), 0, 3, 60, 1, 2).sum()
 
 
 def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:

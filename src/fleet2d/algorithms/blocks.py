@@ -35,11 +35,18 @@ class Blocks:
 
     def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
         """Return all blocks with a part in a stretch of time as one, and where they begin."""
-        here = slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
+        here = self._touching(begin, end)
         found = self._rows[here]
         if not found:
             return begin, None
         return self._begins[here.start], found[0] if len(found) == 1 else np.concatenate(found)
+
+    def each_touching(self, begin: int, end: int) -> list[NDArray[Any]]:
+        """Return each block with a part in a stretch of time."""
+        return self._rows[self._touching(begin, end)]
+
+    def _touching(self, begin: int, end: int) -> slice:
+        return slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
 
     def forget(self, before: int) -> None:
         """Drop the blocks that end by then."""

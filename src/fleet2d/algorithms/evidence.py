@@ -1,6 +1,6 @@
 """Evidence: what robots watched and whom they perceived there, in bins of time."""
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,28 +76,12 @@ def steps_of_bin(step_us: int) -> int:
     return max(1, BIN_US // step_us)
 
 
-class Sighted(Protocol):
-    """Who was perceived where, in order of time: Observations, or what is needed of them."""
-
-    @property
-    def step(self) -> NDArray[np.int64]:
-        """When."""
-
-    @property
-    def user(self) -> NDArray[np.integer[Any]]:
-        """For whom somebody was taken, below 0 for nobody known."""
-
-    @property
-    def room(self) -> NDArray[np.integer[Any]]:
-        """In which room, NOWHERE for none."""
-
-
 class Sightings(NamedTuple):
     """Who was perceived where, in order of time; arrays of one length."""
 
     step: NDArray[np.int64]
-    user: NDArray[np.int64]
-    room: NDArray[np.integer[Any]]
+    user: NDArray[np.int64]  # for whom somebody was taken, below 0 for nobody known
+    room: NDArray[np.integer[Any]]  # NOWHERE for none
 
 
 def gather(
@@ -132,7 +116,7 @@ def gather(
 
 
 def count_seen(
-    sighted: Sighted, begin: int, bins: int, bin_steps: int, users: int, rooms: int
+    sighted: Sightings, begin: int, bins: int, bin_steps: int, users: int, rooms: int
 ) -> NDArray[np.int64]:
     """Return Evidence.seen: a user perceived twice at a step in a room counts once.
 

@@ -107,7 +107,7 @@ class History:
         """
         self._check_metric("truth")
         log = self.log
-        return truth(log.home.plan, log.seen(self.first, self.end), log.activities)
+        return truth(log.home.plan, log.seen(self.first, self.end).whole, log.activities)
 
     @cached_property
     def looks(self) -> Looks:

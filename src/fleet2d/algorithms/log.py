@@ -10,11 +10,10 @@ from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.blocks import Blocks
 from fleet2d.algorithms.evidence import Evidence, Sightings, gather
 from fleet2d.algorithms.observations import (
-    OBSERVATION,
     Looks,
     NearestRooms,
     Observations,
-    perceived,
+    Rows,
 )
 from fleet2d.algorithms.patches import Patches
 from fleet2d.algorithms.poses import BodyPoses
@@ -126,16 +125,16 @@ class Log:
         if len(rows):
             self._observations.append(int(rows[0, STEP]), int(rows[-1, STEP]) + 1, rows)
 
-    def seen(self, first: int, end: int) -> NDArray[np.int64]:
+    def seen(self, first: int, end: int) -> Rows:
         """Return the rows of the observations of the steps from `first` to `end` - 1."""
-        _, rows = self._observations.touching(first, end)
-        if rows is None:
-            return np.empty((0, OBSERVATION), np.int64)
-        return rows[slice(*np.searchsorted(rows[:, STEP], (first, end)).tolist())]
+        blocks = self._observations.each_touching(first, end)
+        return Rows(
+            [rows[slice(*np.searchsorted(rows[:, STEP], (first, end)).tolist())] for rows in blocks]
+        )
 
     def perceived(self, first: int, end: int) -> Observations:
         """Return what was perceived in the steps from `first` to `end` - 1."""
-        return perceived(self.home.plan, self._rooms, self.seen(first, end), self.activities)
+        return Observations(self.home.plan, self._rooms, self.seen(first, end), self.activities)
 
     def count_looks(self, step: int, counts: Sequence[NDArray[np.int64]]) -> None:
         """Keep how often each robot's cameras have looked and noticed before `step`."""
@@ -185,8 +184,8 @@ class Log:
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         rows = self.seen(first, end)
-        patch = self._nearest_patches.of(rows[:, X], rows[:, Y])
-        sightings = Sightings(rows[:, STEP], rows[:, IDENTITY], patch)
+        patch = self._nearest_patches.of(rows.column(X), rows.column(Y))
+        sightings = Sightings(rows.column(STEP), rows.column(IDENTITY), patch)
         return gather(first, self.bin_steps, self.patches, bins, sightings, users)
 
     def exposure(self, first: int, end: int) -> NDArray[np.int64]:

@@ -1,11 +1,14 @@
 """Observations: what the robots made of what their cameras showed, and what was really there."""
 
+from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT, Activities, Names
+from fleet2d.floorplan.kept import read_only
 from fleet2d.floorplan.rooms.room import beside_rooms
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.look import (
@@ -32,24 +35,102 @@ NO_NAMES: Names = np.empty(0, object)
 OBSERVATION = ROBOT + 1  # columns of a row of observations
 
 
-class Observations(NamedTuple):
+class Rows:
+    """Rows of observations in blocks that follow on each other, joined by column when asked for."""
+
+    def __init__(self, blocks: Sequence[NDArray[np.int64]]) -> None:
+        self._blocks = blocks or [np.empty((0, OBSERVATION), np.int64)]
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return sum(map(len, self._blocks))
+
+    def column(self, number: int) -> NDArray[np.int64]:
+        """Return a column of all rows: int64 (n,)."""
+        return np.concatenate([block[:, number] for block in self._blocks])
+
+    @cached_property
+    def whole(self) -> NDArray[np.int64]:
+        """All columns of all rows: int64 (n, OBSERVATION)."""
+        return np.concatenate(self._blocks) if len(self._blocks) > 1 else self._blocks[0]
+
+
+class Observations:
     """What the robots perceived, in order of step and robot; all arrays of one length.
 
     `step` is when it became known. Users, robots and rooms are indices into the scenario's users
     and robots and the home's rooms. Nobody can tell from it what is wrong: a user may be mistaken
-    for another, or not be there at all.
+    for another, or not be there at all. Arrays are read-only, and worked out when asked for.
     """
 
-    step: NDArray[np.int64]
-    robot: NDArray[np.int32]
-    user: NDArray[np.int32]  # for whom somebody was taken, NOBODY if not recognized
-    x: NDArray[np.float64]  # perceived position [m]
-    y: NDArray[np.float64]
-    room: NDArray[np.int16]  # of that position, or the nearest room
-    heading: NDArray[np.float64]  # perceived heading [rad]
-    posture: NDArray[np.int8]  # perceived posture: 0 stands, 1 sits, 2 lies
-    camera: NDArray[np.int8]  # index among the robot's cameras
-    activity: Names = NO_NAMES  # what somebody is taken to do, str; None where that isn't perceived
+    def __init__(
+        self,
+        plan: "FloorPlan",
+        rooms: "NearestRooms",
+        rows: Rows,
+        activities: Activities,
+    ) -> None:
+        self._plan, self._rooms, self._rows, self._activities = plan, rooms, rows, activities
+
+    def __len__(self) -> int:
+        """Return the number of observations."""
+        return len(self._rows)
+
+    @cached_property
+    def step(self) -> NDArray[np.int64]:
+        """Step at which it became known: int64 (n,)."""
+        return read_only(self._rows.column(STEP))
+
+    @cached_property
+    def robot(self) -> NDArray[np.int32]:
+        """Index of the robot: int32 (n,)."""
+        return read_only(self._rows.column(ROBOT).astype(np.int32))
+
+    @cached_property
+    def user(self) -> NDArray[np.int32]:
+        """For whom somebody was taken, NOBODY if not recognized: int32 (n,)."""
+        return read_only(self._rows.column(IDENTITY).astype(np.int32))
+
+    @cached_property
+    def _xy(self) -> NDArray[np.float64]:
+        return read_only(
+            self._plan.lattice.to_metres(np.stack([self._rows.column(X), self._rows.column(Y)], 1))
+        )
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Perceived position along x [m]: float64 (n,)."""
+        return self._xy[:, 0]
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Perceived position along y [m]: float64 (n,)."""
+        return self._xy[:, 1]
+
+    @cached_property
+    def room(self) -> NDArray[np.int16]:
+        """Room of that position, or the nearest room: int16 (n,)."""
+        return read_only(self._rooms.of(self._rows.column(X), self._rows.column(Y)))
+
+    @cached_property
+    def heading(self) -> NDArray[np.float64]:
+        """Perceived heading [rad]: float64 (n,)."""
+        return read_only(in_radians(self._rows.column(HEADING)))
+
+    @cached_property
+    def posture(self) -> NDArray[np.int8]:
+        """Perceived posture, 0 stands, 1 sits, 2 lies: int8 (n,)."""
+        return read_only(self._rows.column(POSTURE).astype(np.int8))
+
+    @cached_property
+    def camera(self) -> NDArray[np.int8]:
+        """Index among the robot's cameras: int8 (n,)."""
+        return read_only(self._rows.column(CAMERA).astype(np.int8))
+
+    @cached_property
+    def activity(self) -> Names:
+        """What somebody is taken to do; None where that isn't perceived: object (n,)."""
+        return self._activities.perceived(self._rows.whole)
 
 
 class Truth(NamedTuple):
@@ -106,25 +187,6 @@ def _shared(rooms: NDArray[np.int16]) -> NDArray[np.int16]:
     rooms = np.ascontiguousarray(rooms)
     rooms.setflags(write=False)
     return rooms
-
-
-def perceived(
-    plan: "FloorPlan", rooms: NearestRooms, rows: NDArray[np.int64], activities: Activities
-) -> Observations:
-    """Return rows of observations as what was perceived."""
-    xy = plan.lattice.to_metres(rows[:, [X, Y]])
-    return Observations(
-        rows[:, STEP].copy(),
-        rows[:, ROBOT].astype(np.int32),
-        rows[:, IDENTITY].astype(np.int32),
-        xy[:, 0],
-        xy[:, 1],
-        rooms.of(rows[:, X], rows[:, Y]),
-        in_radians(rows[:, HEADING]),
-        rows[:, POSTURE].astype(np.int8),
-        rows[:, CAMERA].astype(np.int8),
-        activities.perceived(rows),
-    )
 
 
 def truth(plan: "FloorPlan", rows: NDArray[np.int64], activities: Activities) -> Truth:

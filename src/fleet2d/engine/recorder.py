@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.log import SensorRow
-from fleet2d.algorithms.observations import NearestRooms, perceived, truth
+from fleet2d.algorithms.observations import NearestRooms, Observations, Rows, truth
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
@@ -161,9 +161,8 @@ class Recorder:
     def _store_observations(self) -> None:
         if not self._observations:
             return
-        rows = np.concatenate(self._observations)
-        self._observations = []
-        o = perceived(self.home.plan, self._rooms, rows, self.activities)
+        rows, self._observations = Rows(self._observations), []
+        o = Observations(self.home.plan, self._rooms, rows, self.activities)
         columns: dict[str, Any] = {
             **self._when(o.step),
             "robot": o.robot,
@@ -173,7 +172,7 @@ class Recorder:
             "room": o.room.astype(np.int32),
         }
         if self._camera_codes:
-            t = truth(self.home.plan, rows, self.activities)
+            t = truth(self.home.plan, rows.whole, self.activities)
             real = t.user >= 0
             columns |= {
                 "heading": o.heading,

@@ -2,6 +2,11 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
+<<<<<<< HEAD
+=======
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+>>>>>>> f99cabc (Observations are worked out column by column when asked for)
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,18 +210,20 @@ class State:
 
     def _observations(self) -> NDArray[np.int64]:
         """Join what all robots perceived, in order of step and robot."""
-        blocks: list[NDArray[np.int64]] = [np.empty((0, OBSERVATION), np.int64)]
-        for cameras in self.cameras:
-            sightings = cameras.collect()
-            rows = np.empty((len(sightings), OBSERVATION), np.int64)
-            rows[:, :SIGHTING], rows[:, ROBOT] = sightings, cameras.index
-            blocks.append(rows)
+        blocks = [cameras.collect() for cameras in self.cameras]
         for gaze in self.gazes:
             gaze.collect()
-        joined = np.concatenate(blocks)
-        if len(self.cameras) > 1:
-            joined = joined[np.argsort(joined[:, STEP_COLUMN], kind="stable")]
-        return joined
+        ends = np.cumsum([0, *map(len, blocks)])
+        rows = np.empty((ends[-1], OBSERVATION), np.int64)
+        place: Any = slice(None)  # of each sighting among the rows
+        if len(blocks) > 1:
+            steps = np.concatenate([block[:, STEP_COLUMN] for block in blocks])
+            place = np.empty(len(rows), np.int64)
+            place[np.argsort(steps, kind="stable")] = np.arange(len(rows))
+        for cameras, block, (begin, end) in zip(self.cameras, blocks, pairwise(ends), strict=True):
+            here = place[begin:end] if len(blocks) > 1 else place
+            rows[here, :SIGHTING], rows[here, ROBOT] = block, cameras.index
+        return rows
 
 
 @dataclass(frozen=True)
