@@ -2,11 +2,8 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
-<<<<<<< HEAD
-=======
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
->>>>>>> f99cabc (Observations are worked out column by column when asked for)
 
 import numpy as np
 from numpy.typing import NDArray
