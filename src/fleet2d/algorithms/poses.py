@@ -83,6 +83,15 @@ class BodyPoses:
         return rooms
 
     @cached_property
+    def visits(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int16]]:
+        """Stretches of steps at one place: where each begins and ends, and its room, (stretches,).
+
+        Steps are counted from the first one on; the room of who is away is NOWHERE.
+        """
+        begin = self._runs.step - self._runs.first
+        return begin, begin + self._lengths, self._rooms
+
+    @cached_property
     def time_in_rooms(self) -> NDArray[np.int64]:
         """Number of steps in each room, and last away: int64 (rooms + 1,)."""
         counts = np.zeros(len(self._home.rooms) + 1, np.int64)

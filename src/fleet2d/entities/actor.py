@@ -179,6 +179,9 @@ class Actor:
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
+        (version, costs_version), space = self._space  # nearly always the one of before
+        if version == self.home.version and not (costs_version or self.entity.minds_costs):
+            return space
         if self._space[0] != self._arrangement:
             self._space = self._arrangement, self._present_space()
             self.part = self._present_part()
@@ -253,7 +256,9 @@ class Actor:
 
     def reachable_rooms(self) -> list[Room]:
         """Return the rooms in which it can stand, in index order."""
-        return [room for room in self.home.rooms if len(self.space.cells(room.index, self.part))]
+        space = self.space
+        reached = space.rooms_of(self.part)
+        return [room for room in self.home.rooms if room.index in reached]
 
     def rooms(self, names: RoomChoice) -> list[Room]:
         """Return the rooms that a list of names stands for: those of the first name that fits.

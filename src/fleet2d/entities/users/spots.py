@@ -85,7 +85,11 @@ class Spots:
             self._version = self._actor.home.version
             self._of_room.clear()
         if room.index not in self._of_room:
-            own = _shared(self._grid(room), self.rank, self.members)
+            space, part = self._actor.space, self._actor.part
+            grid = self._actor.home.kept(
+                ("spots", space, part, room.index, self.members), lambda: self._grid(room)
+            )
+            own = _shared(grid, self.rank, self.members)
             draws = Draws(self._actor.stream(f"spots of {room.name}"), 0)
             self._of_room[room.index] = draws.shuffled(own)[:HABITUAL]
         return self._of_room[room.index]
@@ -120,14 +124,14 @@ class Spots:
                     seats += [Seat(thing.name, i) for i in fit or usable]
             if len(seats) >= members:
                 break
-        return _shared(seats, rank, members) if seats else []
+        return list(_shared(seats, rank, members)) if seats else []
 
     def _gets_to(self, use: "UsePlace") -> bool:
         """Tell whether the body gets to a place at furniture, from nearby if that is too tight."""
         at = (use.x, use.y) if use.approach is None else use.approach
         return self._actor.space.part_about(at) == self._actor.part
 
-    def _grid(self, room: "Room") -> list[Spot]:
+    def _grid(self, room: "Room") -> tuple[Spot, ...]:
         """Return the spots of a room: a grid of cells, a tighter one in a small room."""
         actor, lattice = self._actor, self._actor.home.plan.lattice
         cells = actor.space.cells(room.index, actor.part)
@@ -136,11 +140,11 @@ class Spots:
             half = pitch // 2
             on_grid = cells[(cells[:, 0] % pitch == half) & (cells[:, 1] % pitch == half)]
             if len(on_grid) >= self.members:
-                return [Spot(*lattice.cell_centre(row, column)) for row, column in on_grid.tolist()]
+                return tuple(Spot(*lattice.cell_centre(*cell)) for cell in on_grid.tolist())
             pitch = half
-        return [Spot(*actor.middle(room))]
+        return (Spot(*actor.middle(room)),)
 
 
-def _shared(things: list[T], rank: int, members: int) -> list[T]:
+def _shared(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     """Return the part of one of several who share things, at least one."""
     return things[rank % members :: members] or [things[rank % len(things)]]

@@ -120,6 +120,7 @@ class CostedSpace(Space):
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
         self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
+        self.rooms_of = lru_cache(None)(self._find_rooms)
         # Where a body fits, cells that share a side are never of two parts.
         part = label_parts((base.part_of_cell >= 0) & (self.cost >= 0), diagonal=False)
         sizes = np.bincount(part[part >= 0])

@@ -79,6 +79,7 @@ class Space:
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
         self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
+        self.rooms_of = lru_cache(None)(self._find_rooms)
         self.radius = radius
         self.key: tuple[Any, ...] = ()  # by which a home finds it again
         lattice = plan.lattice
@@ -126,6 +127,11 @@ class Space:
         """Return the part for a body that stands where it can't be: the nearest one."""
         near = self.nearest(x, y)
         return 0 if near is None else self.part_at(*near)
+
+    def _find_rooms(self, part: int) -> frozenset[int]:
+        """Return the indices of the rooms in which a part of the space has cells."""
+        rooms = self.plan.room_of_cell[self.part_of_cell == part]
+        return frozenset(np.flatnonzero(np.bincount(rooms[rooms >= 0])).tolist())
 
     def _find_part(self, xy: tuple[float, float]) -> int:
         """Return the part of a place [m], or the nearest one."""

@@ -68,10 +68,12 @@ def hours_of_week(history: History, state: "Present") -> I64:
 
 def _anybody(history: History, state: "Present") -> NDArray[np.bool_]:
     """Return where somebody was at each step, last nobody at home: bool (steps, rooms + 1)."""
-    steps = np.arange(len(history))
-    somewhere = np.zeros((len(history), len(state.home.rooms) + 1), bool)
+    change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
     for user in state.users:
-        somewhere[steps, history.poses(user).room] = True  # -1, who is away, is the last
+        begin, end, room = history.poses(user).visits
+        np.add.at(change, (begin, room), 1)  # -1, who is away, is the last
+        np.add.at(change, (end, room), -1)
+    somewhere: NDArray[np.bool_] = np.cumsum(change[:-1], axis=0) > 0
     somewhere[:, -1] = ~somewhere[:, :-1].any(axis=1)
     return somewhere
 
