@@ -139,7 +139,11 @@ def _process(arguments: Sequence[str]) -> float:
         return usage.ru_utime + usage.ru_stime
 
     began = spent()
-    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    # With bytecode written, as it is for everybody who installs Fleet2D.
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    subprocess.run(
+        [sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL, env=environment
+    )
     return spent() - began
 
 
