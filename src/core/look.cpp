@@ -7,7 +7,6 @@ namespace fleet2d {
 namespace {
 
 constexpr i64 MINUTE_US = 60'000'000;
-constexpr i64 NEVER = -1;
 constexpr i64 UNKNOWN = -1;
 
 // Steps in which a camera has a user in view, and neither changes its pose.

@@ -105,10 +105,10 @@ Piece opposite(const Piece& p) {
 // A row that no cell of a piece is above, and at most one row more than needed. The highest point of a piece is
 // the eye, or where a border meets the wall.
 i64 highest_row(const Piece& piece, i64 eye_x, i64 eye_y, i64 centre) {
-    const auto [ux, uy] = piece.along;
-    const auto across = static_cast<f64>(ux * (piece.wall.y - eye_y) - uy * (piece.wall.x - eye_x));
+    const Point along = piece.along;
+    const auto across = static_cast<f64>(along.x * (piece.wall.y - eye_y) - along.y * (piece.wall.x - eye_x));
     const auto height_at = [&](const Point& border) {
-        return across / static_cast<f64>(ux * border.y - uy * border.x) * static_cast<f64>(border.y);
+        return across / static_cast<f64>(along.x * border.y - along.y * border.x) * static_cast<f64>(border.y);
     };
     f64 top = 0;
     if (piece.right.y > 0) top = height_at(piece.right);

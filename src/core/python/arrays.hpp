@@ -122,7 +122,7 @@ bool view_of(nb::handle source, View<T, N>& view, nb::object& copy) noexcept {
         return false;
     }
     if (!std::is_const_v<T> && !PyArray_ISWRITEABLE(array)) return false;
-    const auto fits = [size](PyArrayObject* a) {
+    const auto fits = [](PyArrayObject* a) {
         if (!PyArray_ISALIGNED(a)) return false;
         if (PyArray_SIZE(a) <= 1) return true;
         for (std::size_t k = 0; k + 1 < N; ++k) {
