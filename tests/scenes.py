@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 
 TESTS = Path(__file__).parent
 OWN = f"{TESTS.as_posix()}/own_components"

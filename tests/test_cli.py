@@ -19,8 +19,8 @@ from tests.scenes import every_step, everything, flat_path, fleet2d_process, sce
 
 import fleet2d as package
 from fleet2d import cli, component
+from fleet2d.document import read_document
 from fleet2d.scenario.compose import bundled_path
-from fleet2d.scenario.document import read_document
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]

@@ -14,7 +14,7 @@ from tests.scenes import OWN, flat_path, fleet2d_process, scenario, write_flat
 
 from fleet2d import cli
 from fleet2d.artifacts import arrow, store
-from fleet2d.artifacts.reader import open_run
+from fleet2d.runs.run import open_run
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]

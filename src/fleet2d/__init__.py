@@ -6,13 +6,13 @@ Heavy parts load when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fleet2d.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Algorithm as Algorithm
     from fleet2d.algorithms.algorithm import Present as Present
     from fleet2d.algorithms.history import History as History
     from fleet2d.algorithms.output import RoomDistribution as RoomDistribution
-    from fleet2d.artifacts.reader import Run as Run
-    from fleet2d.artifacts.reader import open_run as open_run
     from fleet2d.component import register as register
     from fleet2d.engine.reproduce import reproduce as reproduce
     from fleet2d.engine.resume import resume as resume
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan as FloorPlan
     from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion
     from fleet2d.metrics.metric import Metric as Metric
+    from fleet2d.runs.run import Run as Run
+    from fleet2d.runs.run import open_run as open_run
     from fleet2d.scenario.model import Scenario as Scenario
     from fleet2d.scenario.model import load_scenario as load_scenario
     from fleet2d.sight.fov import FieldOfView as FieldOfView
@@ -43,8 +45,6 @@ if TYPE_CHECKING:
     from fleet2d.units import Duration as Duration
     from fleet2d.units import Length as Length
     from fleet2d.units import Share as Share
-
-__version__ = "0.1.0"
 
 _HOME_OF = {
     "Actor": "entities.actor",
@@ -66,7 +66,7 @@ _HOME_OF = {
     "Plan": "entities.plan",
     "Present": "algorithms.algorithm",
     "RoomDistribution": "algorithms.output",
-    "Run": "artifacts.reader",
+    "Run": "runs.run",
     "Scenario": "scenario.model",
     "Share": "units",
     "Simulation": "engine.simulation",
@@ -76,7 +76,7 @@ _HOME_OF = {
     "load_floorplan": "floorplan.load",
     "load_scenario": "scenario.model",
     "map_runs": "studies.api",
-    "open_run": "artifacts.reader",
+    "open_run": "runs.run",
     "open_study": "studies.reader",
     "register": "component",
     "reproduce": "engine.reproduce",

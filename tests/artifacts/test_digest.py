@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet2d.artifacts.digest import digest_table, run_digest
-from fleet2d.artifacts.reader import open_run
 from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.runs.run import open_run
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
 

@@ -13,10 +13,10 @@ from fleet2d.artifacts.encoding import RAMPS, RAW, RUNS, decode, encode
 from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.lock import LOCK_NAME, RunLock
-from fleet2d.artifacts.reader import open_run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.runs.run import open_run, run_of
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
 
@@ -79,7 +79,7 @@ def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: in
     store = begun(tmp_path / "run", flush_rows=flush_rows)
     store.append("every_kind", **part(ROWS, 0, 50))
     run = open_run(killed(store))
-    whole = stored(part(ROWS, 0, 500)).run()
+    whole = run_of(stored(part(ROWS, 0, 500)))
 
     assert "running" == run.status
     assert 4 == run.manifest["steps"]

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from fleet2d.artifacts.manifest import FORMAT, Manifest
-from fleet2d.artifacts.reader import open_run
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+from fleet2d.runs.run import open_run
 
 from .tables import rows_of_every_kind, stored
 

@@ -16,7 +16,7 @@ import pytest
 from tests.scenes import digests, process, scenario, table
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 
 LEARNS = (
     "simulation.duration=1 d",

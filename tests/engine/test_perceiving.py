@@ -9,8 +9,8 @@ from tests.scenes import digests, everything, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, History, Metric, Present
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ComponentError, InputError, ScenarioError
+from fleet2d.runs.run import Run
 
 PERCEPTION: dict[str, Any] = {
     "detection": {

@@ -12,8 +12,8 @@ import pytest
 from tests.scenes import OWN, digests, every_step, everything, process, run, table
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
 from fleet2d.artifacts.store import RunStore
+from fleet2d.runs.run import Run
 
 GOLDEN = Path(__file__).parents[1] / "golden.json"
 SPANS = [None, 3600, 7, 1]

@@ -8,7 +8,7 @@ import shapely
 from tests.scenes import OWN, everything, path, run, scenario
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 
 # What rounding to the lattice (0.8 mm) and to a step may add.
 LATTICE_M = 2e-3

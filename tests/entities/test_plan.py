@@ -10,8 +10,8 @@ from tests.scenes import path, scenario, table
 
 import fleet2d
 from fleet2d import Behavior, Plan, Situation
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ComponentError, InputError
+from fleet2d.runs.run import Run
 
 Decide = Callable[[Situation], Plan | None]
 _DECIDE: dict[str, Decide] = {}

@@ -9,6 +9,7 @@ import shapely
 import fleet2d
 from fleet2d import Behavior, ComponentError, Situation
 from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 
@@ -40,7 +41,7 @@ def simulation(tmp_path: Any, **behavior: Any) -> fleet2d.Simulation:
     room = [LabelledRegion(("bedroom",), shapely.box(0, 0, 6, 4))]
     plan = FloorPlan.build("bedroom", shapely.box(0, 0, 6, 4), room, objects=[BED, RUG])
     path = tmp_path / "bedroom.json"
-    path.write_text(json.dumps(plan.to_native()))
+    path.write_text(json.dumps(native_document(plan)))
     return fleet2d.Simulation(
         {
             "simulation": {"duration": "2 min", "seed": 1},

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fleet2d import cli
+from fleet2d.document import read_document
 from fleet2d.fit.command import fit_routine
 from fleet2d.fit.compare import (
     Distances,
@@ -27,7 +28,6 @@ from fleet2d.fit.validate import Validation, validate
 from fleet2d.logs.log import ActivityLog, LogError
 from fleet2d.logs.read import read_log
 from fleet2d.routines.persona import Persona, read_persona
-from fleet2d.scenario.document import read_document
 from fleet2d.streams import Draws, stream_key
 
 FIRST = datetime(2020, 3, 2)  # a Monday

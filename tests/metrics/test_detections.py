@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.scenes import run, scenario, table
 
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 
 CONFUSION = {"ana": {"ben": 1.0}, "ben": {"ana": 0.5, "cleo": 0.5}}
 

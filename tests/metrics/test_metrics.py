@@ -7,7 +7,7 @@ import pytest
 from tests.scenes import AGENDA, path, run, scenario, table
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 
 
 def content(period: str = "17 min") -> dict[str, Any]:

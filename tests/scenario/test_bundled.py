@@ -6,8 +6,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from fleet2d.document import read_document
 from fleet2d.scenario.compose import BUNDLED, ENTRIES
-from fleet2d.scenario.document import read_document
 from fleet2d.scenario.model import load_scenario
 from fleet2d.scenario.schema import schema
 

@@ -10,8 +10,8 @@ from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, small
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ComponentError, InputError
+from fleet2d.runs.run import Run
 from fleet2d.studies.api import default_location, make_executor, map_runs
 from fleet2d.studies.local import LocalExecutor
 

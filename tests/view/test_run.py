@@ -11,8 +11,8 @@ import pytest
 
 import fleet2d
 from fleet2d import Run, Simulation, open_run
-from fleet2d.artifacts.reader import FLOORPLAN_NAME
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.runs.run import FLOORPLAN_NAME
 
 pytest.importorskip("matplotlib")
 

@@ -1,5 +1,5 @@
 /**
- * Poses at any moment, from key frames: the arithmetic of `fleet2d.engine.rebuild` and of the kernel
+ * Poses at any moment, from key frames: the arithmetic of `fleet2d.runs.trajectory` and of the kernel
  * `trace_track`, in lattice units and 1/4096 of a turn, so that a pose at a step is the run's own.
  */
 

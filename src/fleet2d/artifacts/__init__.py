@@ -1,4 +1,4 @@
-"""What a run stores, and how it is read back: tables, digests, manifest, run directory."""
+"""What a run stores: tables, digests, manifest, run directory."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.manifest import Manifest
-    from fleet2d.artifacts.reader import Run, open_run
     from fleet2d.artifacts.settings import ArtifactSettings
     from fleet2d.artifacts.store import RunStore
     from fleet2d.artifacts.table import Column, TableSpec
@@ -16,20 +15,16 @@ __all__ = [
     "ArtifactSettings",
     "Column",
     "Manifest",
-    "Run",
     "RunStore",
     "TableSpec",
-    "open_run",
 ]
 
 _HOME = {
     "ArtifactSettings": "settings",
     "Column": "table",
     "Manifest": "manifest",
-    "Run": "reader",
     "RunStore": "store",
     "TableSpec": "table",
-    "open_run": "reader",
 }
 
 

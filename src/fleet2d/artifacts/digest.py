@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words
 from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.errors import ArtifactError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -113,6 +115,21 @@ def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> s
     if digest is None:
         raise ValueError("a table needs at least one part, if only one without rows")
     return digest.hexdigest(words)
+
+
+def digest_of_file(path: Path) -> str | None:
+    """Return the digest of a stored table, None if it can't be read."""
+    from fleet2d.artifacts.arrow import read_row_groups
+
+    try:
+        return digest_tables(read_row_groups(path))
+    except ArtifactError:
+        return None
+
+
+def changed_tables(stored: Mapping[str, str], digest_of: Callable[[str], str | None]) -> list[str]:
+    """Return the tables whose digest is not the stored one."""
+    return [name for name, digest in stored.items() if digest_of(name) != digest]
 
 
 def _little_endian(values: NDArray[Any]) -> memoryview:

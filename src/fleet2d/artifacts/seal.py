@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fleet2d.artifacts.digest import changed_tables, digest_of_file, run_digest
 from fleet2d.artifacts.journal import FOLDER
 from fleet2d.artifacts.lock import LOCK_NAME
 from fleet2d.artifacts.manifest import (
@@ -175,12 +176,11 @@ def _unsealed_tables(manifest: Manifest) -> dict[str, str]:
 
 def _without_seal(root: Path, manifest: Manifest) -> Verification:
     """Compare what there is to compare in a run of format 1: the content of its tables."""
-    from fleet2d.artifacts.reader import open_run
-
-    changed = {
-        name if name == FILE_NAME else f"{name}.parquet": "was changed"
-        for name in open_run(root).verify()
-    }
+    stored = {name: table.digest or "" for name, table in manifest.tables.items()}
+    differing = changed_tables(stored, lambda name: digest_of_file(root / f"{name}.parquet"))
+    changed = {f"{name}.parquet": "was changed" for name in differing}
+    if run_digest(stored) != manifest.digest:
+        changed[FILE_NAME] = "was changed"
     own = {f"{name}.parquet" for name in manifest.tables} | {FILE_NAME, "floorplan.json"}
     learned = {f"{_LEARNED}/{name}.npz" for name in manifest.scenario.get("algorithms", {})}
     notes = [

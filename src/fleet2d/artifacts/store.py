@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from fleet2d.artifacts.arrow import ParquetTable
-    from fleet2d.artifacts.reader import Run
 
 
 @dataclass
@@ -326,15 +325,10 @@ class RunStore:
             remove_directories(self._made)
         self._is_open = False
 
-    def run(self) -> Run:
-        """Return the closed run for reading."""
-        from fleet2d.artifacts.reader import Run, open_run
-
-        if self._digests is None:
-            raise ArtifactError("the run is not closed yet: close() it before reading it")
-        if self._root is not None:
-            return open_run(self._root)
-        return Run(None, self.manifest, self.names, self.arrow)
+    @property
+    def is_closed(self) -> bool:
+        """Whether the run is closed, so that it can be read back."""
+        return self._digests is not None
 
     def _flush(self, entry: _Table) -> None:
         """Hash the rows that wait, and write or keep them."""

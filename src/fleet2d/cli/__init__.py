@@ -53,9 +53,9 @@ def about(
 ) -> None:
     """Simulate weeks of a home in a fraction of a second, exactly reproducible."""
     if version:
-        import fleet2d
+        from fleet2d.version import __version__
 
-        typer.echo(f"fleet2d {fleet2d.__version__}")
+        typer.echo(f"fleet2d {__version__}")
         raise typer.Exit
 
 

@@ -141,7 +141,7 @@ def convert(
         save_floorplan(plan, new)
         remarks = list(plan.notes)
     else:
-        from fleet2d.scenario.published import convert_file
+        from fleet2d.published import convert_file
 
         remarks = convert_file(old, new)
     for remark in remarks:

@@ -116,7 +116,7 @@ class RunPicture(NamedTuple):
 
 def _draw_run(directory: Path, out: Path | None, wanted: RunPicture) -> Path:
     """Draw a stored run in its home, one of its layers, or a reliability diagram; return where."""
-    from fleet2d.artifacts.reader import open_run
+    from fleet2d.runs.run import open_run
 
     wanted.check()
     run = open_run(directory)

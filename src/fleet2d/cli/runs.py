@@ -16,8 +16,8 @@ from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
 if TYPE_CHECKING:
-    from fleet2d.artifacts.reader import Run
     from fleet2d.engine.simulation import Simulation
+    from fleet2d.runs.run import Run
 
 Arguments = Annotated[
     list[str] | None,
@@ -74,7 +74,7 @@ def export(
     trust_dir: TrustFolders = None,
 ) -> None:
     """Write a run for others: the page as one file, or sensors in the layout of CASAS."""
-    from fleet2d.artifacts.reader import open_run
+    from fleet2d.runs.run import open_run
 
     if (out is None) == (html is None):
         raise InputError("one file at a time: --html FILE for the page, or FILE for the sensors")
@@ -82,7 +82,7 @@ def export(
         raise InputError("--from and --to are for the page: give --html FILE")
     run = open_run(directory)
     if out is not None:
-        from fleet2d.artifacts.casas import write_casas
+        from fleet2d.runs.casas import write_casas
 
         typer.echo(f"{write_casas(run, out)} readings in {out}")
     elif html is not None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
-    from fleet2d.artifacts.reader import Run
     from fleet2d.metrics.metric import Metric
+    from fleet2d.runs.run import Run
 
 SEPARATOR = " · "
 

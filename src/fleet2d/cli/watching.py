@@ -69,7 +69,7 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
 
 def _import_code(directories: list[Path]) -> None:
     """Import what is trusted of some runs now: the threads of the server trust nothing."""
-    from fleet2d.artifacts.reader import open_run
+    from fleet2d.runs.run import open_run
     from fleet2d.scenario.model import load_scenario
 
     for directory in directories:
@@ -93,7 +93,7 @@ def film(
     trust_dir: TrustFolders = None,
 ) -> None:
     """Make a film of a stretch of a stored run."""
-    from fleet2d.artifacts.reader import open_run
+    from fleet2d.runs.run import open_run
     from fleet2d.viewer.film import write_film
     from fleet2d.viewer.moments import steps_of
 
@@ -112,7 +112,7 @@ def report(
     trust_dir: TrustFolders = None,
 ) -> None:
     """Write a report of a stored run: what ran, metrics, figures, how to run it again."""
-    from fleet2d.artifacts.reader import open_run
+    from fleet2d.runs.run import open_run
     from fleet2d.viewer.report import write_report
 
     target = out or directory / "report.html"

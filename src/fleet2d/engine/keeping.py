@@ -10,13 +10,14 @@ from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import Entities, InputRecord, Manifest, file_record, versions
-from fleet2d.artifacts.reader import FLOORPLAN_NAME
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
 from fleet2d.errors import ArtifactError
+from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.runs.run import FLOORPLAN_NAME
 from fleet2d.scenario.model import Scenario
 
 SLOW = "simulation.speedup asked for"
@@ -98,7 +99,7 @@ def keep_plan(store: RunStore, plan: FloorPlan) -> None:
     Raises:
         ArtifactError: It can't be written.
     """
-    store.keep(FLOORPLAN_NAME, json.dumps(plan.to_native()))
+    store.keep(FLOORPLAN_NAME, json.dumps(native_document(plan)))
 
 
 @contextmanager

@@ -14,11 +14,8 @@ from fleet2d.entities.plan import Track
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.motion import Breakpoints
+from fleet2d.runs.key_kinds import PLANNED, TRACK, WALK
 
-# How a row of key_frames is to be read: a breakpoint that was reached, the end of a segment that
-# was broken off before it, or a state from which a random walk is drawn on.
-TRACK, PLANNED, WALK = 0, 1, 2
-KEY_KINDS = ("track", "planned", "walk")
 # A random walk is rebuilt from the last hour's key frame.
 WALK_KEY_US = 3_600_000_000
 

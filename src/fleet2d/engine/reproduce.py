@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
-from fleet2d.artifacts.reader import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.keeping import SLOW
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import Trust, refuse_untrusted, restricted
 

@@ -10,7 +10,6 @@ from typing import Any, BinaryIO, Self
 
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import Status
-from fleet2d.artifacts.reader import LEARNED_NAME, Run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.checkpoint import Checkpoint, Keeper
@@ -36,6 +35,7 @@ from fleet2d.engine.snapshot import (
 from fleet2d.engine.state import State
 from fleet2d.engine.steering import Steering
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.runs.run import LEARNED_NAME, Run, run_of
 from fleet2d.scenario.model import Scenario, load_scenario
 
 # So many steps are simulated without taking over Ctrl-C.
@@ -314,7 +314,7 @@ class Simulation(Steering):
         self._store.manifest.interventions = state.interventions.done
         describe_end(self._store.manifest, self.clock, self.step, results, wall_s, self._pace)
         self._store.close(status)
-        self._run = self._store.run()
+        self._run = run_of(self._store)
         self._run.plan = self.home.plan
         return self._run
 

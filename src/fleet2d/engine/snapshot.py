@@ -14,7 +14,6 @@ from pathlib import Path
 from types import BuiltinFunctionType, FunctionType
 from typing import Any, BinaryIO
 
-from fleet2d import __version__
 from fleet2d.artifacts.chunk import ColumnChunk
 from fleet2d.artifacts.manifest import plain
 from fleet2d.engine import arrays
@@ -29,6 +28,7 @@ from fleet2d.kernels.mesh import Mesh
 from fleet2d.outside import is_scenario_module, public_name
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
+from fleet2d.version import __version__
 
 _HASH = type(hashlib.sha256())
 
@@ -73,10 +73,11 @@ _NO_STATE = (
     "fleet2d.artifacts.journal",
     "fleet2d.artifacts.ledger",
     "fleet2d.artifacts.lock",
-    "fleet2d.artifacts.reader",
+    "fleet2d.runs",
     "fleet2d.calibrate",
     "fleet2d.cli",
     "fleet2d.component",
+    "fleet2d.document",
     "fleet2d.engine.checkpoint",
     "fleet2d.engine.resume",
     "fleet2d.engine.run",
@@ -86,6 +87,7 @@ _NO_STATE = (
     "fleet2d.leaves",
     "fleet2d.outside",
     "fleet2d.paper",
+    "fleet2d.published",
     "fleet2d.scenario",
     "fleet2d.studies",
     "fleet2d.testing",

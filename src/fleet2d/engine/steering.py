@@ -9,7 +9,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.artifacts.reader import Run
 from fleet2d.clock import Clock, next_time
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
@@ -25,6 +24,7 @@ from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.verbs import Verbs
 from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
+from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 from fleet2d.units import parse_duration
 

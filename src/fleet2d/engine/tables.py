@@ -6,8 +6,8 @@ from dataclasses import replace
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.engine.cameras import Cameras
-from fleet2d.engine.key_frames import KEY_KINDS
 from fleet2d.engine.sensors import Sensors
+from fleet2d.runs.key_kinds import KEY_KINDS
 from fleet2d.sight.perception import POSTURES
 
 STEP = Column("step", "step", description="step at which the row takes effect")

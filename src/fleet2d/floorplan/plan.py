@@ -343,12 +343,6 @@ class FloorPlan:
         png: bytes | None = leaf("viewer.notebook").plan_png(self)
         return png
 
-    def to_native(self) -> dict[str, Any]:
-        """Return the plan in Fleet2D's own file format; reading it back gives an equal plan."""
-        from fleet2d.floorplan.formats.native import native_document
-
-        return native_document(self)
-
     def _check_entrance(self) -> None:
         if self.entrance is None:
             return

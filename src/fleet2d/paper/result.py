@@ -50,10 +50,10 @@ class Result:
         Raises:
             InputError: It can't be written.
         """
-        import fleet2d
+        from fleet2d.version import __version__
 
         path = directory / f"{self.name}.json"
-        content = {"result": self.title, "fleet2d": fleet2d.__version__, **self.numbers}
+        content = {"result": self.title, "fleet2d": __version__, **self.numbers}
         try:
             path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
         except OSError as error:

@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.document import read_document
 from fleet2d.problems import did_you_mean, problem
 from fleet2d.routines import laws
 from fleet2d.routines.written import OrWritten
-from fleet2d.scenario.document import read_document
 from fleet2d.units import Duration, PositiveDuration, format_duration
 
 HERE = Path(__file__).parent

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.document import read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import Location, did_you_mean, problem, problem_at, shown
@@ -40,7 +41,6 @@ from fleet2d.routines.planner import (
 )
 from fleet2d.routines.templates import starts
 from fleet2d.routines.written import OrWritten
-from fleet2d.scenario.document import read_document
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import Share
 from fleet2d.weekdays import OnDays, weekdays_of

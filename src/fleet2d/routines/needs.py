@@ -9,10 +9,10 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.document import read_document
 from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyTakes, seconds
 from fleet2d.routines.written import OrWritten
-from fleet2d.scenario.document import read_document
 from fleet2d.units import Duration, Share, TimeOfDay
 
 HERE = Path(__file__).parent

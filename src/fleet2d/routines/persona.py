@@ -15,6 +15,7 @@ from pydantic import (
 )
 
 from fleet2d.component import Settings
+from fleet2d.document import read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at, shown
@@ -33,7 +34,6 @@ from fleet2d.routines.planner import REST, SLEEP, DayPlan
 from fleet2d.routines.recorded import AnyRecordedDay
 from fleet2d.routines.templates import check, day_plans
 from fleet2d.routines.written import OrWritten
-from fleet2d.scenario.document import read_document
 from fleet2d.units import Duration, Share, TimeOfDay, format_time_of_day
 from fleet2d.weekdays import WEEKDAYS, OnDays, weekdays_of
 

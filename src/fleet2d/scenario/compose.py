@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.component import base_of, lookup
+from fleet2d.document import Document, Keys, parse_yaml, read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.problems import did_you_mean
-from fleet2d.scenario.document import Document, Keys, parse_yaml, read_document
 
 BUNDLED = Path(__file__).parent / "bundled"
 ENTRIES = ("users", "robots", "objects", "algorithms", "metrics")

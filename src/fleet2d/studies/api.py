@@ -19,7 +19,7 @@ from fleet2d.studies.schedule import Schedule
 from fleet2d.studies.specification import read_specification
 
 if TYPE_CHECKING:
-    from fleet2d.artifacts.reader import Run
+    from fleet2d.runs.run import Run
     from fleet2d.scenario.model import Scenario
 
 Result = TypeVar("Result")

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from fleet2d.document import Keys
 from fleet2d.errors import ScenarioError
-from fleet2d.scenario.document import Keys
 
 Label = str | int | float | bool | None
 """What a variant is called along one axis; None where the axis does not apply."""

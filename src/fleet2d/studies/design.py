@@ -6,10 +6,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fleet2d.document import Document
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.compose import assignment, changed, merge
-from fleet2d.scenario.document import Document
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.choice import Choice, Label, key_path
 from fleet2d.studies.specification import SEED, Specification

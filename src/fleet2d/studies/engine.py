@@ -20,7 +20,7 @@ from fleet2d.scenario.model import Scenario
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from fleet2d.artifacts.reader import Run
+    from fleet2d.runs.run import Run
 
 Status = Literal["complete", "failed"]
 SEPARATOR = "."

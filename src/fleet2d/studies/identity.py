@@ -8,14 +8,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import fleet2d
+from fleet2d import version
 from fleet2d.errors import InputError
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.engine import files_of
 
 DIGITS = 32  # of the hexadecimal text of a hash
 # What runs, shows or sums up simulations has no part in what they compute.
-_LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate")
+_LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate", "published")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 
@@ -26,7 +26,7 @@ def code_version() -> str:
 
     A release always has the same; where Fleet2D is developed, it changes with every edit.
     """
-    root = Path(fleet2d.__file__).parent
+    root = Path(version.__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
         name = path.relative_to(root)
@@ -34,7 +34,7 @@ def code_version() -> str:
             digest.update(name.as_posix().encode() + b"\0")
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     python = ".".join(platform.python_version_tuple()[:2])
-    return f"fleet2d {fleet2d.__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
+    return f"fleet2d {version.__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
 
 
 class FileHashes:

@@ -13,7 +13,7 @@ from fleet2d.studies.record import Task, record_of
 from fleet2d.trust import Trust, current_trust, under
 
 if TYPE_CHECKING:
-    from fleet2d.artifacts.reader import Run
+    from fleet2d.runs.run import Run
 
 
 class Job(Protocol):

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import pyarrow.dataset as pads
 
-    from fleet2d.artifacts.reader import Run
+    from fleet2d.runs.run import Run
 
 
 class Study:

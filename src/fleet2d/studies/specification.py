@@ -9,11 +9,11 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.document import Document, read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at
 from fleet2d.scenario.compose import compose
-from fleet2d.scenario.document import Document, read_document
 from fleet2d.scenario.explain import explain
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis

@@ -12,10 +12,11 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.layers import PREFIX, layer_steps, read_layer
-from fleet2d.artifacts.reader import Run
+from fleet2d.artifacts.layers import PREFIX
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
+from fleet2d.runs.layers import layer_steps, read_layer
+from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import (
     DPI,
     check_picture,

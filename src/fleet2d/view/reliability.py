@@ -10,8 +10,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.belief import ANYONE
-from fleet2d.artifacts.reader import Run
-from fleet2d.engine.rebuild import rebuild_path
 from fleet2d.errors import ArtifactError
 from fleet2d.metrics.presence.scores import (
     calibration_error,
@@ -19,6 +17,8 @@ from fleet2d.metrics.presence.scores import (
     reliability_curve,
     top_k,
 )
+from fleet2d.runs.run import Run
+from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.view.floorplan import DPI, check_picture, drawing_style, save_figure
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.palette import ACCENT_COLOR
+from fleet2d.runs.run import Run
 from fleet2d.view.actogram import (
     MARKS,
     draw_actogram,

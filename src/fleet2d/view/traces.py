@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.colors import is_color_like
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
-from fleet2d.engine.rebuild import rebuild_path
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import body_color
+from fleet2d.runs.run import Run
+from fleet2d.runs.trajectory import rebuild_path
 
 SAMPLES = 40_000  # a short run is sampled more often than once a minute, up to about so many times
 SAMPLE_US = 60_000_000

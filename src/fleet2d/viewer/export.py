@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import RunFacts, SightingFacts
 from fleet2d.viewer.files import write_whole
 from fleet2d.viewer.part import KEY_FRAMES, key_frame_rows

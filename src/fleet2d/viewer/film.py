@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import drawing_style, figure_size
 from fleet2d.viewer.stage import Stage
 from fleet2d.viewer.words import Words

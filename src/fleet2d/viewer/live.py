@@ -13,9 +13,9 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import LiveFrame, LiveOrder
 from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.live_engine import LiveEngine

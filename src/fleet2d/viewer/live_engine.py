@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.plan import Track
 from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import Mesh
+from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveOrder
 
 AHEAD_US = 120_000_000

@@ -1,9 +1,9 @@
 """What the page is told about a running simulation before its first frame."""
 
-import fleet2d
 from fleet2d.artifacts.manifest import plain
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.objects.door import Door
+from fleet2d.version import __version__
 from fleet2d.viewer.contract import DoorFacts, RunFacts, WallsChange
 from fleet2d.viewer.home_facts import home_facts
 from fleet2d.viewer.run_facts import bodies_of
@@ -28,7 +28,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         end_step=clock.steps,
         seed=simulation.seed,
         digest=None,
-        version=fleet2d.__version__,
+        version=__version__,
         home=home_facts(simulation.home.plan, _doors(simulation)),
         bodies=bodies_of(scenario, entities),
         tables=[],

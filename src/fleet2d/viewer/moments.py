@@ -5,9 +5,9 @@ from datetime import datetime, timedelta
 
 from pydantic_core import PydanticCustomError
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.clock import Clock
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 from fleet2d.units import parse_duration
 
 _DAY = re.compile(r"day (\d+)(?:[ ,]+(\d{1,2}):(\d{2})(?::(\d{2}))?)?", re.IGNORECASE)

@@ -6,9 +6,9 @@ import io
 from contextlib import suppress
 from typing import Any
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.runs.run import Run
 from fleet2d.viewer.moments import clock_of, step_of
 from fleet2d.viewer.run_facts import run_title
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import Manifest
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ArtifactError
+from fleet2d.runs.run import Run
 from fleet2d.viewer.moments import clock_of
 
 KEY_FRAMES = "key_frames"

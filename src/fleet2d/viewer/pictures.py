@@ -12,10 +12,10 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
+from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import (
     DPI,
     check_picture,

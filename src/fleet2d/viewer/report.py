@@ -11,8 +11,8 @@ from typing import Any
 
 import yaml
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.runs.run import Run
 from fleet2d.units import format_duration
 from fleet2d.viewer.files import write_whole
 from fleet2d.viewer.moments import clock_of

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-import fleet2d
 from fleet2d.artifacts.layers import PREFIX
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
+from fleet2d.runs.run import Run
 from fleet2d.units import parse_duration
+from fleet2d.version import __version__
 from fleet2d.viewer.contract import (
     BodyFacts,
     CameraFacts,
@@ -44,7 +44,7 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
         end_step=manifest["steps"],
         seed=manifest["seed"],
         digest=run.digest,
-        version=fleet2d.__version__,
+        version=__version__,
         home=home_facts(run.plan, doors.facts),
         bodies=bodies_of(scenario, manifest["entities"]),
         tables=[_table_facts(run, name) for name in run.tables],

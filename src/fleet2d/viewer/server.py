@@ -12,9 +12,9 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-import fleet2d
-from fleet2d.artifacts.reader import open_run
 from fleet2d.errors import ArtifactError, Fleet2DError
+from fleet2d.runs.run import open_run
+from fleet2d.version import __version__
 from fleet2d.viewer.contract import SessionFacts
 from fleet2d.viewer.guard import Guard
 from fleet2d.viewer.responses import json_answer, problem
@@ -94,7 +94,7 @@ def page_app(
     """
 
     async def session(_: Request) -> Response:
-        facts = SessionFacts(runs=shelf.titles, live=live is not None, version=fleet2d.__version__)
+        facts = SessionFacts(runs=shelf.titles, live=live is not None, version=__version__)
         return json_answer(compact_json(facts))
 
     async def file(request: Request) -> Response:

@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import ArtifactError
+from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
 from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.part import positions

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import SightingFacts
 
 I64 = NDArray[np.int64]

@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
-from fleet2d.engine.rebuild import Trajectory
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
+from fleet2d.runs.run import Run
+from fleet2d.runs.trajectory import Trajectory
 from fleet2d.view.floorplan import floorplan_axes
 from fleet2d.view.life import field_of_view
 from fleet2d.view.page import QUIET_COLOR

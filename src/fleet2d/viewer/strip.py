@@ -11,9 +11,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR, deep_color
+from fleet2d.runs.run import Run
 from fleet2d.view.page import HATCH_COLOR, QUIET_COLOR
 from fleet2d.viewer.sightings import sightings_of
 

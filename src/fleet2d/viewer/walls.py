@@ -4,13 +4,13 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.arrangement import moved
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels.mesh import Mesh
+from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import DoorFacts, WallsChange
 
 _MOVED = re.compile(r"(.+) to \((\S+), (\S+)\)")

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 from fleet2d.viewer.export import embedded_run, html_of
 from fleet2d.viewer.shown_run import ShownRun
 

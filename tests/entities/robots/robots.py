@@ -5,7 +5,7 @@ from typing import Any
 
 from tests.scenes import digests, path, run, scenario, table
 
-from fleet2d.artifacts.reader import Run
+from fleet2d.runs.run import Run
 
 CAMERA = {"range": [0.2, 4.5], "angle_deg": 108, "lost_after": "5 s"}
 SIT = {"days": [{"items": [{"at": "00:00", "place": [7.0, 6.0]}]}]}

@@ -8,8 +8,8 @@ import pytest
 from tests.scenes import path, run, scenario
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 
 REACHABLE = ["living_room_0", "kitchen_0", "bedroom_0", "bathroom_0"]
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from tests.scenes import ROOMS, each_step, path, run, scenario, table
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 
 # 2020-03-02, and the run of scenario() begins at 07:00 of a day.
 DAY = "2020-03-02"

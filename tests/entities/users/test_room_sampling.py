@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tests.scenes import path, run, scenario
 
-from fleet2d.artifacts.reader import Run
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 
 SHARES = {"living_room": 0.45, "bedroom": 0.3, "kitchen": 0.15, "bathroom": 0.05, "away": 0.05}
 

@@ -8,8 +8,8 @@ import pytest
 from tests.scenes import ENTRANCE, OWN, each_step, path, run, scenario, table
 
 import fleet2d
-from fleet2d.artifacts.reader import Run
 from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
 
 START = datetime(2026, 1, 5, 7)  # a Monday
 

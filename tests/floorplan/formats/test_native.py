@@ -10,7 +10,7 @@ from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import Bundled, bundled_names
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
-from fleet2d.floorplan.formats.native import Native, read_native
+from fleet2d.floorplan.formats.native import Native, native_document, read_native
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
@@ -58,7 +58,7 @@ def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: fl
             continue  # the largest takes seconds
         plan = read_houseexpo(path, cell)
 
-        again = read_native(written(tmp_path, plan.to_native()), cell)
+        again = read_native(written(tmp_path, native_document(plan)), cell)
 
         assert plan.digest == again.digest, path.name
         assert plan.rooms == again.rooms
@@ -70,7 +70,7 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
     den = LabelledRegion(("office", "bedroom"), shapely.box(0, 0, 4, 7), "Ben's den", "office")
     plan = FloorPlan.build("ring", ring, [den], entrance=(0.1 + 0.2, 1 / 3))
 
-    again = read_native(written(tmp_path, plan.to_native()))
+    again = read_native(written(tmp_path, native_document(plan)))
 
     assert plan == again
     assert ("Ben's den", "office", ("office", "bedroom")) == (
@@ -78,7 +78,7 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
         again.rooms[0].type,
         again.rooms[0].labels,
     )
-    assert again.to_native() == plan.to_native()
+    assert native_document(again) == native_document(plan)
 
 
 @pytest.mark.parametrize(
@@ -164,8 +164,8 @@ def test_doorways_that_a_file_leaves_out_are_looked_for(tmp_path: Path) -> None:
 
     assert [0.9] == [pytest.approx(door.width_m) for door in found.doorways]
     assert () == none.doorways
-    assert found == read_native(written(tmp_path, found.to_native()))
-    assert none == read_native(written(tmp_path, none.to_native()))
+    assert found == read_native(written(tmp_path, native_document(found)))
+    assert none == read_native(written(tmp_path, native_document(none)))
 
 
 def test_native_and_bundled_are_found_by_name(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.native import read_native
+from fleet2d.floorplan.formats.native import native_document, read_native
 from fleet2d.floorplan.formats.valetudo import (
     Valetudo,
     read_valetudo,
@@ -219,7 +219,7 @@ def test_real_map_comes_back_from_our_own_format(
 ) -> None:
     plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
 
-    assert plan == read_native(written(tmp_path, plan.to_native()))
+    assert plan == read_native(written(tmp_path, native_document(plan)))
 
 
 # --- Free space ---------------------------------------------------------------------------------
@@ -347,7 +347,7 @@ def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path: Path) -> 
     assert_box((0.5, -2.0, 2.5, -0.5), plan)
     assert [(1.01, -1.5, 1.14, -1.0), (0.5, -1.025, 2.5, -0.975)] == [a.bounds for a in plan.no_go]
     assert "no-go areas in the map: 1, robots keep out of them" in plan.notes
-    assert plan == read_native(written(tmp_path, plan.to_native()))
+    assert plan == read_native(written(tmp_path, native_document(plan)))
 
 
 def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) -> None:
@@ -472,7 +472,7 @@ def test_charger_far_from_all_floor_has_no_place_to_stand(tmp_path: Path) -> Non
     plan = home(tmp_path, entities=[entity("charger_location", 5000, 5000)])
 
     assert [()] == [thing.uses for thing in plan.objects]
-    assert plan == read_native(written(tmp_path, plan.to_native()))
+    assert plan == read_native(written(tmp_path, native_document(plan)))
 
 
 def test_map_without_path_and_charger_says_so(tmp_path: Path) -> None:

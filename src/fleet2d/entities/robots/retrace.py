@@ -8,10 +8,10 @@ from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.nearest import Nearest
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
-from fleet2d.logs.nearest import Nearest
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 

@@ -10,12 +10,12 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.logs.follow_fixes import FixFollower, place_fixes
-from fleet2d.logs.follow_rooms import RoomFollower
+from fleet2d.entities.users.follow_fixes import FixFollower, place_fixes
+from fleet2d.entities.users.follow_rooms import RoomFollower
+from fleet2d.entities.users.replay_report import report_fixes, report_rooms
 from fleet2d.logs.frame import Frame
 from fleet2d.logs.log import DAY_US, ActivityLog, LogError, PositionLog
 from fleet2d.logs.read import Layout, read_log
-from fleet2d.logs.report import report_fixes, report_rooms
 from fleet2d.logs.rooms import map_rooms
 from fleet2d.logs.visits import Rule, Visit, visits_of
 from fleet2d.paths import folder_of

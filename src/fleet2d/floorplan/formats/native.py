@@ -1,6 +1,6 @@
 """This project's own floor plan format: outlines, rooms, doors and objects, as JSON or YAML.
 
-A plan written by `FloorPlan.to_native` and read again at the same cell size is equal to the first::
+A plan written by `native_document` and read again at the same cell size is equal to the first::
 
     {"format": "fleet2d-floorplan", "version": 1, "name": "flat",
      "free": [{"outline": [[0, 0], [5, 0], [5, 3], [0, 3]], "holes": []}],

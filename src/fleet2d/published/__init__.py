@@ -1,5 +1,5 @@
 """Turn a configuration of the published Fleet2D into a scenario, and say what changes by it."""
 
-from fleet2d.scenario.published.convert import convert_file
+from fleet2d.published.convert import convert_file
 
 __all__ = ["convert_file"]

@@ -11,12 +11,12 @@ import pytest
 
 import fleet2d
 from fleet2d.cli import app
+from fleet2d.document import read_document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError, FloorPlanError, InputError, ScenarioError
-from fleet2d.scenario.document import read_document
+from fleet2d.published import convert_file
 from fleet2d.scenario.model import Scenario, load_scenario
-from fleet2d.scenario.published import convert_file
 
 PLAN = "658e5214673c7a4e25b458e56bdb6144.json"
 OLD = """\

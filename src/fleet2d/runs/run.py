@@ -8,7 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.digest import digest_table, digest_tables, run_digest
+from fleet2d.artifacts.digest import changed_tables, digest_of_file, digest_table, run_digest
 from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.prefix import Prefix
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
 
-    from fleet2d.engine.rebuild import Trajectory
+    from fleet2d.artifacts.store import RunStore
     from fleet2d.floorplan.plan import FloorPlan
+    from fleet2d.runs.trajectory import Trajectory
 
 
 FLOORPLAN_NAME = "floorplan.json"
@@ -86,7 +87,7 @@ class Run:
         read: Callable[[str], pa.Table],
         notes: Sequence[str] = (),
     ) -> None:
-        """Read nothing yet; `open_run` and `RunStore.run` make runs."""
+        """Read nothing yet; `open_run` and `run_of` make runs."""
         self.directory = directory
         self.manifest: dict[str, Any] = manifest.content()
         self.tables = Tables(names, read)
@@ -152,7 +153,7 @@ class Run:
             ArtifactError: The run stored no key frames, there is no such body, or `every` doesn't
                 fit.
         """
-        from fleet2d.engine.rebuild import rebuild_path
+        from fleet2d.runs.trajectory import rebuild_path
 
         return rebuild_path(self, self.plan, entity, every)
 
@@ -242,19 +243,15 @@ class Run:
                 "there is nothing to compare with"
             )
         stored = {name: table["digest"] for name, table in self.manifest["tables"].items()}
-        differing = [name for name in stored if self._digest_of(name) != stored[name]]
-        if run_digest(stored) != self.digest:
-            differing.append(FILE_NAME)
-        return differing
+        differing = changed_tables(stored, self._digest_of)
+        return differing if run_digest(stored) == self.digest else [*differing, FILE_NAME]
 
     def _digest_of(self, name: str) -> str | None:
         """Return the digest of a table as it is now, None if it can't be read."""
-        from fleet2d.artifacts.arrow import read_row_groups
-
+        if self.directory is not None:
+            return digest_of_file(self.directory / f"{name}.parquet")
         try:
-            if self.directory is None:
-                return digest_table(self.tables[name])
-            return digest_tables(read_row_groups(self.directory / f"{name}.parquet"))
+            return digest_table(self.tables[name])
         except (ArtifactError, KeyError):
             return None
 
@@ -300,6 +297,19 @@ def open_run(directory: Path | str) -> Run:
                 notes.append(f"table {name!r} has {rows} rows, but {stored} were stored")
         readable.append(name)
     return Run(root, manifest, readable, lambda name: read_parquet(root / f"{name}.parquet"), notes)
+
+
+def run_of(store: RunStore) -> Run:
+    """Return the run that a store holds, for reading.
+
+    Raises:
+        ArtifactError: The store is not closed yet.
+    """
+    if not store.is_closed:
+        raise ArtifactError("the run is not closed yet: close() it before reading it")
+    if store.directory is not None:
+        return open_run(store.directory)
+    return Run(None, store.manifest, store.names, store.arrow)
 
 
 def _open_prefix(root: Path, manifest: Manifest, prefix: Prefix) -> Run:

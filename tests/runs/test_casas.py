@@ -7,9 +7,9 @@ import pytest
 from tests.engine.test_sensors import household, plan  # noqa: F401  (a fixture)
 from tests.scenes import run, scenario
 
-from fleet2d.artifacts.casas import write_casas
 from fleet2d.errors import RunDirectoryError
 from fleet2d.logs.casas import read_casas
+from fleet2d.runs.casas import write_casas
 
 
 def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path: Path) -> None:  # noqa: F811

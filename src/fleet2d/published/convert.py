@@ -10,20 +10,20 @@ from typing import Any
 import yaml
 
 from fleet2d.artifacts.directory import is_disk_full
+from fleet2d.document import Document, Keys, read_document
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.home.home import Home
-from fleet2d.scenario.document import Document, Keys, read_document
-from fleet2d.scenario.model import Scenario, load_scenario
-from fleet2d.scenario.published.entities import body_keys, convert_robot, convert_users, free_name
-from fleet2d.scenario.published.reader import Reader
-from fleet2d.scenario.published.sections import (
+from fleet2d.published.entities import body_keys, convert_robot, convert_users, free_name
+from fleet2d.published.reader import Reader
+from fleet2d.published.sections import (
     convert_floorplan,
     convert_outputs,
     convert_sight,
     convert_simulation,
     read_step,
 )
+from fleet2d.scenario.model import Scenario, load_scenario
 
 
 def convert_file(old: Path, new: Path) -> list[str]:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.nearest import Nearest
 from fleet2d.entities.plan import Note
 from fleet2d.floorplan.home.space import straight_way
 from fleet2d.kernels.motion import time_route
 from fleet2d.logs.log import AWAY
-from fleet2d.logs.nearest import Nearest
 from fleet2d.logs.rooms import DOOR
 from fleet2d.logs.visits import UNKNOWN, Visit
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from fleet2d.document import Document, parse_yaml, read_document
 from fleet2d.errors import ScenarioError
-from fleet2d.scenario.document import Document, parse_yaml, read_document
 from fleet2d.units import Text
 
 

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from tests.artifacts.tables import EVERY_KIND, rows_of_every_kind, stored
 
-from fleet2d.artifacts.reader import Run, open_run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.errors import ArtifactError, RunDirectoryError
-
-from .tables import EVERY_KIND, rows_of_every_kind, stored
+from fleet2d.runs.run import Run, open_run, run_of
 
 ROWS = rows_of_every_kind(300)
 
@@ -25,7 +24,7 @@ def directory(tmp_path: Path) -> Path:
 
 
 def test_run_in_memory_reads_like_a_stored_one(directory: Path) -> None:
-    for run in (open_run(directory), stored(ROWS).run()):
+    for run in (open_run(directory), run_of(stored(ROWS))):
         assert "complete" == run.status
         assert ["every_kind"] == list(run.tables)
         assert "every_kind" in run.tables
@@ -148,7 +147,7 @@ def test_crashed_run_opens_with_what_is_whole(tmp_path: Path) -> None:
 
 def test_run_before_close_is_refused() -> None:
     with pytest.raises(ArtifactError, match="not closed yet"):
-        RunStore(None, [EVERY_KIND]).run()
+        run_of(RunStore(None, [EVERY_KIND]))
 
 
 def test_run_says_where_and_how(directory: Path) -> None:

@@ -12,9 +12,9 @@ from fractions import Fraction
 from itertools import chain, count
 from typing import Any
 
+from fleet2d.document import Keys
 from fleet2d.problems import shown
-from fleet2d.scenario.document import Keys
-from fleet2d.scenario.published.reader import Reader, tidy
+from fleet2d.published.reader import Reader, tidy
 from fleet2d.sight.camera import Camera
 from fleet2d.units import micros
 

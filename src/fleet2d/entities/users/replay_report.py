@@ -9,8 +9,8 @@ from fleet2d.logs.rooms import RoomChoice
 from fleet2d.logs.visits import UNKNOWN, Rule, Told
 
 if TYPE_CHECKING:
-    from fleet2d.logs.follow_fixes import Fixes, FixFollower
-    from fleet2d.logs.follow_rooms import Paces
+    from fleet2d.entities.users.follow_fixes import Fixes, FixFollower
+    from fleet2d.entities.users.follow_rooms import Paces
 
 
 def report_rooms(

@@ -8,10 +8,10 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from fleet2d.document import Keys
 from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.problems import shown
-from fleet2d.scenario.document import Keys
-from fleet2d.scenario.published.reader import Reader, tidy
+from fleet2d.published.reader import Reader, tidy
 from fleet2d.units import format_duration, parse_duration
 
 _NOTHING_STORED = {

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.clock import Clock
-from fleet2d.engine.key_frames import KEY_KINDS, PLANNED, WALK
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander
 from fleet2d.entities.plan import Pose
@@ -25,12 +24,13 @@ from fleet2d.kernels.motion import (
     trace_meander,
     trace_track,
 )
+from fleet2d.runs.key_kinds import KEY_KINDS, PLANNED, WALK
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import of_others
 from fleet2d.units import micros
 
 if TYPE_CHECKING:
-    from fleet2d.artifacts.reader import Run
+    from fleet2d.runs.run import Run
 
 # Sections of a scenario that say how bodies move; code of the others isn't needed, nor imported.
 _BODIES = ("simulation", "floorplan", "users", "robots")

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from fleet2d.document import Document, Keys
 from fleet2d.errors import ScenarioError
 from fleet2d.problems import shown
-from fleet2d.scenario.document import Document, Keys
 from fleet2d.units import parse_duration
 
 _HUGE = 1e300

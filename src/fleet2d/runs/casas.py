@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from fleet2d.errors import RunDirectoryError
 
 if TYPE_CHECKING:
-    from fleet2d.artifacts.reader import Run
+    from fleet2d.runs.run import Run
 
 # What CASAS writes where nobody said what the person was doing.
 OTHER = "Other_Activity"

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.nearest import Nearest
 from fleet2d.floorplan.home.space import straight_way
 from fleet2d.kernels.headings import TURN, heading_of
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import time_route
 from fleet2d.kernels.sight import line_of_sight
-from fleet2d.logs.nearest import Nearest
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor

@@ -1,0 +1,73 @@
+"""Layers of cells, read back from a run."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.artifacts.layers import EVERYWHERE, PREFIX
+from fleet2d.errors import ArtifactError
+from fleet2d.problems import did_you_mean
+from fleet2d.runs.run import Run
+
+
+def layer_names(run: Run) -> list[str]:
+    """Return the layers that a run stored."""
+    return [name.removeprefix(PREFIX) for name in run.tables if name.startswith(PREFIX)]
+
+
+def layer_steps(run: Run, name: str) -> list[int]:
+    """Return the steps after which a layer was stored, in order.
+
+    Raises:
+        ArtifactError: The run stored no such layer.
+    """
+    table = _table(run, name)
+    whole = table["row"].to_numpy() == EVERYWHERE
+    return [int(step) for step in table["step"].to_numpy()[whole]]
+
+
+def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
+    """Return a stored layer: (rows, columns), NaN where a float has no value.
+
+    Args:
+        run: The run.
+        name: The layer's name.
+        step: One of `layer_steps`; None for the last.
+
+    Raises:
+        ArtifactError: The run stored no such layer, or not at that step, or it is damaged.
+    """
+    steps = layer_steps(run, name)
+    if not steps:
+        raise ArtifactError(f"the layer {name!r} was never stored")
+    if step is None:
+        step = steps[-1]
+    if step not in steps:
+        shown = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
+        raise ArtifactError(f"the layer {name!r} was not stored after step {step}, but: {shown}")
+    table = _table(run, name)
+    here = table["step"].to_numpy() == step
+    row, column, value = (
+        table[key].to_numpy(zero_copy_only=False)[here]
+        if key == "value"
+        else table[key].to_numpy()[here]
+        for key in ("row", "column", "value")
+    )
+    lattice = run.plan.lattice
+    inside = (row < lattice.rows) & (column < lattice.columns) & (row >= 0) & (column >= 0)
+    if not inside[1:].all() or row[0] != EVERYWHERE:
+        raise ArtifactError(f"the layer {name!r} doesn't fit the floor plan of the run")
+    values = np.full((lattice.rows, lattice.columns), value[0])
+    values[row[1:], column[1:]] = value[1:]
+    return values
+
+
+def _table(run: Run, name: str) -> Any:
+    if f"{PREFIX}{name}" not in run.tables:
+        known = layer_names(run)
+        raise ArtifactError(
+            f"the run stored no layer {name!r}{did_you_mean(name, known)} It has:"
+            f" {', '.join(known) or 'none'}"
+        )
+    return run.tables[f"{PREFIX}{name}"]
