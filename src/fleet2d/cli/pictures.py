@@ -18,7 +18,7 @@ Figure = Annotated[
 ]
 
 
-def show(
+def show(  # noqa: PLR0913 - options of the command line
     what: Annotated[
         Path | None,
         typer.Argument(metavar="[FLOORPLAN|RUN_DIR|PERSONA]", help="Left out: the bundled home."),

@@ -50,7 +50,7 @@ class Recorder:
         wall_s: Time spent on storing [s].
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the parts of a run that it records, by name
         self,
         store: RunStore,
         settings: ArtifactSettings,

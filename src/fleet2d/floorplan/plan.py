@@ -77,7 +77,7 @@ class FloorPlan:
     lost_doorways: tuple[DoorLine, ...] = ()
 
     @classmethod
-    def build(
+    def build(  # noqa: PLR0913 - what a file says of a home, by name
         cls,
         name: str,
         free: Polygon | MultiPolygon,

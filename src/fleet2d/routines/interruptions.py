@@ -253,21 +253,26 @@ class _Interruptions:
                 self._meet(i, self.now)
             if self.doing.activity in urge.met_by:
                 self.due[i] = self.end + self._time(urge.every)
+        self._meet_those_due(after)
+        if after in body.away:
+            for i, urge in enumerate(urges):
+                if self._happens(urge.before_leaving):
+                    self._meet(i, self.end)
+
+    def _meet_those_due(self, after: str) -> None:
+        """Meet the needs that come up before one is done, or put them off until then."""
+        urges, body = self.body.urges, self.body
         kept = self.doing.activity in body.kept
         while urges:
             i = min(range(len(urges)), key=self.due.__getitem__)
             at = max(self.due[i], self.now)
             if at >= self.end:
-                break
+                return
             waits = kept or (not self.waited[i] and self.end - at <= urges[i].patience)
             if waits and after not in body.away:
                 self.due[i], self.waited[i] = self.end, True
             else:
                 self._meet(i, self.end if waits else at)
-        if after in body.away:
-            for i, urge in enumerate(urges):
-                if self._happens(urge.before_leaving):
-                    self._meet(i, self.end)
 
     def _happens(self, chance: int) -> bool:
         return chance > 0 and (chance >= CERTAIN or self.bits.take(CHANCE_BITS) < chance)

@@ -32,7 +32,7 @@ IDENTITY_START = 6
 
 
 @studying.command()
-def run(
+def run(  # noqa: PLR0913 - options of the command line
     source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="The study.")],
     out: Annotated[
         str | None, typer.Option(help="A folder or s3://…; left out: studies/NAME.")
