@@ -6,11 +6,14 @@ it again.
 """
 
 from bisect import insort
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fleet2d.clock import Clock
+from fleet2d.events import Event
 from fleet2d.interventions.intervention import Intervention, dump_intervention, parse_intervention
+from fleet2d.interventions.when import Trigger
 from fleet2d.units import micros
 
 # The order of what is due at one step.
@@ -23,7 +26,7 @@ class Due(NamedTuple):
     Attributes:
         step: The step.
         rank: First what is over ends, then comes the scenario's script, then what is outside.
-        number: Of those, in the order in which they were asked for.
+        number: Among those of a rank: the place in the script, or the order of asking.
         act: What is done, or ends.
         by: Where in the scenario it stands, like "script.0"; empty for what comes from outside.
     """
@@ -52,23 +55,65 @@ class Due(NamedTuple):
         return {"do": fields.pop("do"), "step": self.step, **fields, **by}
 
 
+@dataclass
+class Waiting:
+    """An intervention that waits for an event.
+
+    Attributes:
+        trigger: The event.
+        each: Whether it is done every time that it happens.
+        delay_us: How long after it [us].
+        act: What is done.
+        rank, number, by: See `Due`.
+        last: The step for which it was put into the queue last; -1: never.
+    """
+
+    trigger: Trigger
+    each: bool
+    delay_us: int
+    act: Intervention
+    rank: int
+    number: int
+    by: str
+    last: int = -1
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it waits no longer."""
+        return self.last >= 0 and not self.each
+
+
 class Interventions:
     """What is done to a run.
 
     Attributes:
         done: What was done, in order, as the manifest keeps it.
+        waiting: What waits for an event.
     """
 
     def __init__(self, clock: Clock) -> None:
         self.done: list[dict[str, Any]] = []
+        self.waiting: list[Waiting] = []
         self._clock = clock
         self._queue: list[Due] = []
         self._count = 0
 
-    def add(self, act: Intervention, step: int, rank: int = OUTSIDE, by: str = "") -> None:
-        """Let something be done at a step, after all of its rank that was added before."""
-        insort(self._queue, Due(step, rank, self._count, act, by), key=lambda due: due[:3])
+    def next_number(self) -> int:
+        """Return a number that is above all before."""
         self._count += 1
+        return self._count
+
+    def add(
+        self,
+        act: Intervention,
+        step: int,
+        rank: int = OUTSIDE,
+        number: int | None = None,
+        by: str = "",
+    ) -> None:
+        """Let something be done at a step, after all of its rank that was added before."""
+        number = self.next_number() if number is None else number
+        insort(self._queue, Due(step, rank, number, act, by), key=lambda due: due[:3])
 
     def next_due(self) -> int | None:
         """Return the step at which something is done next."""
@@ -85,6 +130,26 @@ class Interventions:
             if due.act.lasts is not None:
                 ends = due.step * self._clock.step_us + micros(due.act.lasts)
                 self.add(due.act, max(self._clock.step_at_or_after(ends), due.step + 1), ENDS)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """The kinds of events that something waits for."""
+        return frozenset(w.trigger.event for w in self.waiting if not w.is_over)
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Put what waits for one of these events into the queue: for the step after it, or later.
+
+        Of several such events at one step, only the first counts.
+        """
+        for event in events:
+            for waiting in self.waiting:
+                if waiting.is_over or not waiting.trigger.fits(event):
+                    continue
+                after = event.step * self._clock.step_us + waiting.delay_us
+                step = max(self._clock.step_at_or_after(after), event.step + 1)
+                if step != waiting.last:
+                    self.add(waiting.act, step, waiting.rank, waiting.number, waiting.by)
+                    waiting.last = step
 
     @property
     def records(self) -> list[dict[str, Any]]:

@@ -42,6 +42,8 @@ def intervene(state: State, span: Span) -> None:
             each.act.end(world)
         else:
             each.act.begin(world)
+    if state.interventions.waiting:  # for fewer events, maybe
+        state.wait_for(state.wanted)
 
 
 def change_home(state: State, span: Span) -> None:

@@ -109,6 +109,14 @@ class Sensors:
         rows, self._rows = self._rows, []
         return rows
 
+    def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
+        """Return readings as events: of which sensor, and its state in the words of the table."""
+        names, words = self.names, self.words
+        return [
+            Event(row.step, names[row.sensor], EventKind.SENSOR, words[row.sensor][not row.on])
+            for row in rows
+        ]
+
     def take_events(self, events: Sequence[Event]) -> None:
         """Note what users do, for the readings to say."""
         for event in events:

@@ -16,6 +16,7 @@ from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of
+from fleet2d.engine.script import take_up
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
 from fleet2d.engine.tables import camera_names, sensor_table, table_specs
@@ -24,6 +25,7 @@ from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
+from fleet2d.interventions.home import OfHome
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 
@@ -92,6 +94,10 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     )
     for those in [*gazes, *cameras]:
         those.owner.in_view = InView(state, those)
+    for index, entry in enumerate(scenario.script):
+        path = f"script.{index}"
+        with _placing(scenario, path), _named(path):
+            take_up(state, entry, 0, index)
     return state
 
 
@@ -127,6 +133,15 @@ def _placing(scenario: Scenario, path: str) -> Iterator[None]:
         raise type(error)(f"{where}: {error}") from error
 
 
+@contextmanager
+def _named(path: str) -> Iterator[None]:
+    """Say which entry of the scenario can't be."""
+    try:
+        yield
+    except (PlacementError, ScenarioError) as error:
+        raise type(error)(f"{path}: {error}") from error
+
+
 def _actors(scenario: Scenario, bucket: str, home: Home, clock: Clock, seed: int) -> list[Actor]:
     entities: Mapping[str, Any] = getattr(scenario, bucket)
     actors = []
@@ -151,7 +166,8 @@ def _check_reads(scenario: Scenario, actors: list[Actor]) -> None:
 
 def _may_change(scenario: Scenario) -> bool:
     """Tell whether the home may change during the run."""
-    return bool(scenario.objects or scenario.changes)
+    moves = any(isinstance(entry.act, OfHome) for entry in scenario.script)
+    return bool(scenario.objects or scenario.changes or moves)
 
 
 def _add_tables(

@@ -59,7 +59,8 @@ class State:
         pending: Events that interrupted the plan of a body, by its row, until it decides.
         interventions: What is done to the run from outside, and what was.
         driven: Rows of the bodies that are driven from outside.
-        awaited: Kinds of events at which a script wants the span to end.
+        wanted: Kinds of events at which somebody outside wants the span to end.
+        awaited: Those, and the kinds that interventions wait for.
         notes_emitted: How many of the notes of each body's present plan have happened.
     """
 
@@ -84,6 +85,7 @@ class State:
     settled: int = 0
     pending: dict[int, list[SightEvent]] = field(default_factory=dict)
     driven: set[int] = field(default_factory=set)
+    wanted: frozenset[str] = frozenset()
     awaited: frozenset[str] = frozenset()
     notes_emitted: list[int] = field(init=False)
 
@@ -107,9 +109,9 @@ class State:
     # Decisions of scripts
 
     def wait_for(self, kinds: frozenset[str]) -> None:
-        """Let spans end at events of these kinds, besides those that algorithms wait for."""
-        self.awaited = kinds
-        awaited = kinds | self.learners.awaited
+        """Let spans end at events of these kinds, besides those that others wait for."""
+        self.wanted, self.awaited = kinds, kinds | self.interventions.kinds
+        awaited = self.awaited | self.learners.awaited
         for cameras in [*self.gazes, *self.cameras]:
             cameras.awaited = awaited
         self.sensors.awaited = EventKind.SENSOR in awaited
@@ -185,6 +187,8 @@ class State:
         for watcher in self.watchers:
             self.take(watcher, end)
         observations, readings = self._observations(), self.sensors.collect()
+        if EventKind.SENSOR in self.awaited:
+            self.interventions.take_events(self.sensors.events_of(readings))
         self.recorder.take(first, end, observations, readings)
         if self.log is not None:
             self.log.observe(observations)

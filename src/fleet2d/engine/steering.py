@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.clock import Clock, next_time
+from fleet2d.engine.script import take_up
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.actor import Actor
@@ -21,6 +22,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.bodies import Decide, Drive
 from fleet2d.interventions.home import Change
 from fleet2d.interventions.intervention import Intervention, parse_intervention
+from fleet2d.interventions.script import WHEN, parse_entry
 from fleet2d.interventions.verbs import Verbs
 from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import did_you_mean
@@ -232,10 +234,14 @@ class Steering(Verbs):
     # Interventions: each is kept in the manifest, and done again by `reproduce`.
 
     def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
-        """Do something at the present step: an intervention, or one as a script has it.
+        """Do something at the present step, or later: an intervention, or an entry of a script.
+
+        Args:
+            act: The intervention, or a mapping as a scenario's `script` has it; with `at` or `on`,
+                it is done then.
 
         Raises:
-            ScenarioError: It is none, or there is nothing of that name.
+            ScenarioError: It is none, there is nothing of that name, or it can never happen.
             PlacementError: There is no such place, or nobody gets there.
             InputError: The run is finished.
 
@@ -245,9 +251,17 @@ class Steering(Verbs):
             >>> simulation.intervene({"put": "ana", "to": "kitchen"})
             >>> simulation.run().manifest["interventions"]
             [{'do': 'put', 'step': 0, 'entity': 'ana', 'to': 'kitchen'}]
+
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.intervene({"on": ["activity", "ana", "dinner"], "hold": "astro"})
+            >>> [act["do"] for act in simulation.run().manifest["interventions"]]
+            ['hold']
         """
         if self._run is not None:
             raise InputError("the run is finished: nothing can be done to it any more")
+        if isinstance(act, Mapping) and not act.keys().isdisjoint(WHEN):
+            take_up(self._state, parse_entry(act), self.step)
+            return
         if isinstance(act, Mapping):
             act = parse_intervention(act)
         act.check(EngineWorld(self._state, self.step))

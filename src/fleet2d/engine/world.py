@@ -1,5 +1,6 @@
 """A run as interventions see it, at the step at which something is done to it."""
 
+from collections.abc import Sequence
 from functools import cached_property
 
 from fleet2d.clock import Clock
@@ -37,6 +38,16 @@ class EngineWorld:
     def robots(self) -> dict[str, Actor]:
         """The robots, by name."""
         return {actor.name: actor for actor in self._state.actors[self._state.bodies.users :]}
+
+    @property
+    def doors(self) -> Sequence[str]:
+        """The names of the doors."""
+        return self._state.changes.names
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """The names of the sensors."""
+        return self._state.sensors.names
 
     def move(self, actor: Actor, pose: Pose, part: int) -> None:
         """Put a body elsewhere, in a part of its space; it decides anew there."""

@@ -171,7 +171,8 @@ class Behavior(Component):
     resumes: ClassVar[bool] = False
     # Layers of what its robot has seen that it goes by: explored, first_seen, last_seen …
     needs: ClassVar[frozenset[str]] = frozenset()
-    # Kinds of events that its plans record, besides those of EventKind.
+    # Kinds of events that its plans record: all of its own, and of those of EventKind the ones that
+    # a script may wait for.
     records: ClassVar[frozenset[str]] = frozenset()
     # Events of its cameras at which it may break in on those behind it.
     listens: ClassVar[frozenset[str]] = frozenset()

@@ -8,7 +8,7 @@ from fleet2d.component import register
 from fleet2d.entities import orders
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.furniture import furniture_of
-from fleet2d.entities.place import Place, is_point
+from fleet2d.entities.place import Place, Point, RoomChoice, is_point, matching_rooms
 from fleet2d.entities.plan import Plan, Pose
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
@@ -152,13 +152,22 @@ def heading_of(heading_deg: float | None) -> int | None:
     return None if heading_deg is None else round(heading_deg / 360 * TURN) % TURN
 
 
-def check_reach(actor: Actor, place: Any) -> None:
-    """Refuse a place that there isn't, or that a body can't get to while all doors are open.
+def check_reach(actor: Actor, place: RoomChoice | Point) -> None:
+    """Refuse a place that there isn't, or that a body never gets to.
+
+    While doors are shut it is only asked for by name: they may be open by then.
 
     Raises:
         PlacementError: Says what there is.
     """
+    home = actor.home
     if is_point(place):
-        actor.point(place)
+        x, y = home.plan.lattice.to_lattice(place).tolist()
+        if not home.hinders or actor.space.part_at(x, y) < 0:
+            actor.point(place)  # type: ignore[arg-type]
+    elif home.hinders:
+        things = {name for thing in home.objects if thing.uses for name in (thing.name, thing.type)}
+        if not things & set(place):
+            matching_rooms(place, home.rooms, home.rooms, home.objects)  # type: ignore[arg-type]
     elif furniture_of(actor, place) is None:
-        actor.rooms(place)
+        actor.rooms(place)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from fleet2d.component import Component, components, lookup
+from fleet2d.component import Component, components
 from fleet2d.entities.actor import Actor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
@@ -122,11 +122,11 @@ class Verb:
         fields = dict(value)
         if "do" in fields:
             return _of_name(fields.pop("do")).model_validate(fields, context=info.context)
-        known = components("intervention")
-        verbs = [key for key in fields if key in known]
-        if len(verbs) != 1:
-            raise _not_one_verb(verbs, fields, known)
-        return _short(verbs[0], known[verbs[0]], fields, info)
+        known = verbs()
+        said = [key for key in fields if key in known]
+        if len(said) != 1:
+            raise _not_one_verb(said, fields, known)
+        return _short(said[0], known[said[0]], fields, info)
 
     def dump(self, value: Intervention, info: SerializationInfo) -> dict[str, Any]:
         """Write the intervention in the long form."""
@@ -149,15 +149,21 @@ class Verb:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Leave a mark that `fleet2d.scenario.schema` replaces by all verbs."""
-        return {"x-verbs": True}
+        """Leave it to `fleet2d.scenario.schema`, which knows all verbs."""
+        return {"type": "object", "x-quantity": "intervention"}
+
+
+def verbs() -> dict[str, type[Intervention]]:
+    """Return all interventions by their verbs."""
+    return components("intervention")  # type: ignore[return-value]
 
 
 def _of_name(name: object) -> type[Intervention]:
-    try:
-        return lookup("intervention", str(name))  # type: ignore[return-value]
-    except ScenarioError as error:
-        raise problem_at(("do",), str(error), name) from error
+    known = verbs()
+    if name not in known:
+        text = f"there is no intervention {name!r}{did_you_mean(name, known)}"
+        raise problem_at(("do",), f"{text} There are: {', '.join(known)}", name)
+    return known[str(name)]
 
 
 def _short(verb: str, cls: Any, fields: dict[str, Any], info: ValidationInfo) -> Intervention:
@@ -178,10 +184,10 @@ def _short(verb: str, cls: Any, fields: dict[str, Any], info: ValidationInfo) ->
 
 
 def _not_one_verb(
-    verbs: list[str], fields: Mapping[str, Any], known: Mapping[str, type[Component]]
+    said: list[str], fields: Mapping[str, Any], known: Mapping[str, type[Component]]
 ) -> Exception:
-    if verbs:
-        return problem(f"{' and '.join(verbs)} are given: one a line is wanted")
+    if said:
+        return problem(f"{' and '.join(said)} are given: one in each entry is wanted")
     near = [did_you_mean(key, known) for key in fields]
     hint = next((text for text in near if text.endswith("?")), ".")
     return problem(f"it doesn't say what is done{hint} There are: {', '.join(known)}")

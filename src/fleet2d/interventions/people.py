@@ -60,7 +60,7 @@ class CallHome(OfPerson):
 class Activity(OfPerson):
     """Let a person do something: where it is done, sitting or lying as one does."""
 
-    activity: str = Field(min_length=1, description="what, by its name in the persona or agenda")
+    what: str = Field(min_length=1, description="its name in the persona or agenda")
     to: Place | None = Field(
         default=None, description="where; left out: where the person does it by its own behavior"
     )
@@ -75,14 +75,14 @@ class Activity(OfPerson):
             check_reach(actor, self.to)
             return
         known = [name for behavior in actor.behaviors for name in behavior.activities()]
-        if self.activity not in known:
+        if self.what not in known:
             raise ScenarioError(
-                f"{self.entity} has no activity {self.activity!r}"
-                f"{did_you_mean(self.activity, known)} There are: {', '.join(known) or 'none'};"
+                f"{self.entity} has no activity {self.what!r}"
+                f"{did_you_mean(self.what, known)} There are: {', '.join(known) or 'none'};"
                 " or say where it is done, as to: kitchen"
             )
 
     def begin(self, world: World) -> None:
         """Set out."""
-        order = DoActivity(self.activity, self.to, self.duration)
+        order = DoActivity(self.what, self.to, self.duration)
         user(world, self.entity).obey(order, world.step)

@@ -134,13 +134,13 @@ class Verbs(ABC):
         self._do(people.CallHome, entity=name, to=to, duration=duration)
 
     def activity(
-        self, name: str, activity: str, to: Any = None, *, duration: Time | None = None
+        self, name: str, what: str, to: Any = None, *, duration: Time | None = None
     ) -> None:
         """Let a person do something, for so long, or until released.
 
         Args:
             name: The person.
-            activity: What, by its name in the persona or agenda.
+            what: Its name in the persona or agenda.
             to: Where; None: where the person does it by its own behavior.
             duration: For how long; None: until released.
 
@@ -148,7 +148,7 @@ class Verbs(ABC):
             ScenarioError: There is no such person, or it has no place for that activity.
             PlacementError: There is no such place, or nobody gets there.
         """
-        self._do(people.Activity, entity=name, activity=activity, to=to, duration=duration)
+        self._do(people.Activity, entity=name, what=what, to=to, duration=duration)
 
     # Robots
 

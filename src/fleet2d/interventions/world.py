@@ -1,6 +1,6 @@
 """What interventions act upon: the part of a run that they may see and touch."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from fleet2d.clock import Clock
@@ -33,6 +33,14 @@ class World(Protocol):
     @property
     def robots(self) -> Mapping[str, Actor]:
         """The robots, by name."""
+
+    @property
+    def doors(self) -> Sequence[str]:
+        """The names of the doors."""
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """The names of the sensors."""
 
     def move(self, actor: Actor, pose: Pose, part: int) -> None:
         """Put a body elsewhere, in a part of its space; it decides anew there."""

@@ -23,6 +23,7 @@ from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.interventions.script import Entry
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean, problem, problem_at
 from fleet2d.scenario.compose import compose
@@ -154,6 +155,10 @@ class Scenario(Settings):
     )
     changes: tuple[HomeChange, ...] = Field(
         default=(), description="What changes in the home during the run, and when."
+    )
+    script: tuple[Entry, ...] = Field(
+        default=(),
+        description="What is done to people, robots and the home from outside, and when.",
     )
     sight: SightSettings = Field(
         default=SightSettings(), description="How it is worked out what is in view."

@@ -10,6 +10,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_jso
 from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
 
 from fleet2d.component import PACKAGES, Component, Settings, aliases, components
+from fleet2d.interventions.intervention import verbs
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
 
@@ -66,6 +67,15 @@ def schema() -> dict[str, Any]:
         }
         for kind, classes in found.items()
     }
+    acts = kinds.pop("intervention")
+    for cls in verbs().values():
+        definitions.pop(_key(references[cls, "validation"]))
+    definitions["Entry"] = {
+        "anyOf": [
+            _by_verb(definitions["Entry"], verb, cls.subject, acts[verb])
+            for verb, cls in verbs().items()
+        ]
+    }
     for kind, types in kinds.items():
         for name, definition in types.items():
             properties = definition.get("properties", {})
@@ -82,6 +92,24 @@ def schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **result,
         "$defs": definitions,
+    }
+
+
+def _by_verb(
+    entry: Mapping[str, Any], verb: str, subject: str, act: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return an entry of a script as it is written: its verb, then the rest of what is done."""
+    when = {key: value for key, value in entry["properties"].items() if key != "act"}
+    rest = {key: value for key, value in act["properties"].items() if key != subject}
+    required = [key for key in act.get("required", ()) if key != subject]
+    return {
+        "title": verb,
+        "description": act.get("description", ""),
+        "type": "object",
+        "properties": {verb: act["properties"][subject], **when, **rest},
+        "required": [verb, *required],
+        "oneOf": [{"required": ["at"]}, {"required": ["on"]}],
+        "additionalProperties": False,
     }
 
 

@@ -24,6 +24,7 @@ class Come(Behavior):
     Event: `visits`, with the place.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset({"visits"})
     answers: ClassVar[frozenset[str]] = frozenset({"come"})
     resumes: ClassVar[bool] = True
 

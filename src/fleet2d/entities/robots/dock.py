@@ -28,6 +28,7 @@ class Dock(Behavior):
     and `charged`, with the charge.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset({"charged", "docks"})
     answers: ClassVar[frozenset[str]] = frozenset({"dock"})
 
     threshold: Share = Field(default=0.2, description="charge at which it goes to the charger")

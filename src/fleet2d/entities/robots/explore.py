@@ -44,6 +44,7 @@ class Explore(Behavior):
     end.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset({"explored", "explores"})
     needs: ClassVar[frozenset[str]] = frozenset({"explored"})
 
     enough: Share = Field(default=0.98, description="share of the floor to be seen")

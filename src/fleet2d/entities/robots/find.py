@@ -58,6 +58,9 @@ class Find(Behavior):
     name: `find_begins`, and one of `found`, `not_at_home` and `gave_up`.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset(
+        {"find_begins", "found", "gave_up", "not_at_home"}
+    )
     answers: ClassVar[frozenset[str]] = frozenset({"find"})
 
     user: str = Field(default=ANYONE, min_length=1, description="whom it looks for, or anyone")

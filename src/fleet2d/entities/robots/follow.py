@@ -32,6 +32,7 @@ class Follow(Behavior):
     the person's name.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset({"follows", "lost"})
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
     user: str = Field(

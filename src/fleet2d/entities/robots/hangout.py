@@ -1,7 +1,7 @@
 """Hangout: stand near people without being in the way, and move rarely."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,8 @@ class Hangout(Behavior):
 
     Events: `relocates`, with the room it goes to, and `explores`, with the room it looks over.
     """
+
+    records: ClassVar[frozenset[str]] = frozenset({"explores", "relocates"})
 
     source: str | None = Field(
         default=None,

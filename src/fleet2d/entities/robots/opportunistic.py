@@ -24,6 +24,7 @@ class Opportunistic(Behavior):
     name of the person as perceived, and `interaction_over`.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset({"approaches", "interaction_over", "interacts"})
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
     users: tuple[str, ...] = Field(

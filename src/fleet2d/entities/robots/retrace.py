@@ -33,6 +33,7 @@ class Retrace(Behavior):
     how long. Events: `retraces`, with the number of points, and `retraced`.
     """
 
+    records: ClassVar[frozenset[str]] = frozenset({"retraced", "retraces"})
     resumes: ClassVar[bool] = True
 
     path: InputPath = Field(description="the map's JSON file")

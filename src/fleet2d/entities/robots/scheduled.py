@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
@@ -42,6 +42,8 @@ class Scheduled(Behavior):
     door, as soon as the door is open. In a room the robot stops at the point farthest from its
     walls. Events: `visits`, with the task, else the room, and `way_blocked`, with the room.
     """
+
+    records: ClassVar[frozenset[str]] = frozenset({"visits", "way_blocked"})
 
     visits: tuple[Visit, ...] = Field(min_length=1, description="the visits")
     late: Duration = Field(

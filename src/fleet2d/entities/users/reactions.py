@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
@@ -43,6 +43,8 @@ class Reactions(Behavior):
     How likely one reacts, and how near a robot has to be, are one's manners: those given here, else
     those of the persona of a `routine` behind it, else the usual ones.
     """
+
+    records: ClassVar[frozenset[str]] = frozenset({"reacts"})
 
     manners: Manners | None = Field(
         default=None, description="how one reacts; left out: as the persona does"

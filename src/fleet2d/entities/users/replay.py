@@ -2,7 +2,7 @@
 
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
@@ -86,6 +86,8 @@ class Replay(Behavior):
     What the log doesn't tell isn't made up: the body is away then, and events say `unknown` and
     `known`.
     """
+
+    records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
 
     path: LogPath = Field(description="the log, or the folder of a home's logs")
     format: Layout = Field(default="auto", description="its layout; auto looks")

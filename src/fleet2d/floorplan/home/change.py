@@ -16,7 +16,8 @@ VERBS = ("open", "shut", "lock", "unlock", "move", "room")
 Point = tuple[float, float]
 
 
-def _moment(value: Any) -> datetime | timedelta:
+def parse_moment(value: Any) -> datetime | timedelta:
+    """Read a local time, or the time since the start."""
     moment = _local_time(value)
     if moment is None:
         return parse_duration(value)
@@ -37,14 +38,15 @@ def _local_time(value: Any) -> datetime | None:
         return None
 
 
-def _written(moment: datetime | timedelta) -> str:
+def written_moment(moment: datetime | timedelta) -> str:
+    """Write a moment as `parse_moment` reads it."""
     return moment.isoformat() if isinstance(moment, datetime) else format_duration(moment)
 
 
 Moment = Annotated[
     datetime | timedelta,
-    BeforeValidator(_moment),
-    PlainSerializer(_written),
+    BeforeValidator(parse_moment),
+    PlainSerializer(written_moment),
     WithJsonSchema(
         {
             "description": "a local time like 2026-01-07T14:00, or the time since the start like"

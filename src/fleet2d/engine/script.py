@@ -1,0 +1,70 @@
+"""Scripts in a run: what a scenario or somebody outside wants to be done later, taken up."""
+
+from datetime import datetime
+
+from fleet2d.clock import Clock
+from fleet2d.engine.interventions import OUTSIDE, SCRIPT, Waiting
+from fleet2d.engine.state import State
+from fleet2d.engine.world import EngineWorld
+from fleet2d.errors import ScenarioError
+from fleet2d.interventions.happenings import check_trigger
+from fleet2d.interventions.script import Entry
+from fleet2d.interventions.when import ClockTime
+from fleet2d.units import format_duration, micros
+
+
+def take_up(state: State, entry: Entry, first: int, index: int | None = None) -> None:
+    """Let an entry of a script be done when it is time, or when its event happens.
+
+    Args:
+        state: The run.
+        entry: The entry.
+        first: The present step: it is done from then on.
+        index: Its place in the scenario's script; None: it comes from outside.
+
+    Raises:
+        ScenarioError: It names what there isn't, its event can never happen, or its time isn't in
+            the run.
+        PlacementError: There is no such place, or nobody gets there.
+    """
+    interventions, world = state.interventions, EngineWorld(state, first)
+    entry.act.check(world)
+    outside = index is None
+    rank, by = (OUTSIDE, "") if outside else (SCRIPT, f"script.{index}")
+    number = interventions.next_number() if index is None else index
+    if entry.on is None:
+        for step in steps_of(entry, world.clock, first):
+            interventions.add(entry.act, step, rank, number, by)
+        return
+    check_trigger(world, entry.on)
+    delay = micros(entry.delay)
+    interventions.waiting.append(Waiting(entry.on, entry.each, delay, entry.act, rank, number, by))
+    if interventions not in state.events.sinks:
+        state.events.sinks.append(interventions)
+    state.wait_for(state.wanted)
+
+
+def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
+    """Return the steps at which an entry is done: from `first` on, within the run.
+
+    Raises:
+        ScenarioError: There are none.
+    """
+    at = entry.at
+    if isinstance(at, ClockTime):
+        moments = [clock.elapsed(moment) for moment in at.moments(clock)]
+        steps = [clock.step_at_or_after(moment) for moment in moments]
+        steps = [step for step in steps if first <= step < clock.steps]
+        steps, text = steps if entry.each else steps[:1], at.text
+    elif isinstance(at, datetime):
+        steps, text = [clock.step_at_or_after(clock.elapsed(at))], f"{at:%Y-%m-%d %H:%M:%S}"
+    else:
+        assert at is not None
+        steps, text = [clock.step_at_or_after(micros(at))], format_duration(at)
+    if not steps or not first <= steps[0] < clock.steps:
+        begins, ends = clock.time(first), clock.time(clock.steps)
+        raise ScenarioError(
+            f"at: {text} is not within the run, which goes from {begins:%A %Y-%m-%d %H:%M:%S}"
+            f" to {ends:%Y-%m-%d %H:%M:%S}"
+        )
+    return steps

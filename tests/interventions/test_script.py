@@ -1,0 +1,70 @@
+"""Entries of a script: an intervention, written by its verb, and when it is done."""
+
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import ScenarioError
+from fleet2d.interventions.intervention import (
+    dump_intervention,
+    parse_intervention,
+    verbs,
+)
+from fleet2d.interventions.script import WHEN, Entry, parse_entry
+
+EACH = [
+    {"put": "ana", "to": "kitchen", "heading_deg": 90},
+    {"send": "ana", "to": [1, 2], "duration": "1 h"},
+    {"hold": "astro"},
+    {"release": "astro"},
+    {"activity": "ana", "what": "dinner", "to": "sofa"},
+    {"call": "astro", "find": "ana"},
+    {"call": "astro", "dock": True},
+    {"shut": "bath_door"},
+    {"move": "sofa_0", "to": [1, 2], "turn_deg": 90},
+    {"room": "office_0", "type": "bedroom"},
+]
+
+
+@pytest.mark.parametrize("content", EACH, ids=lambda content: next(iter(content)))
+def test_an_entry_is_read_as_it_is_written_in_short_and_in_long(content: dict[str, Any]) -> None:
+    entry = Entry.model_validate({"at": "19:00", **content})
+    verb, subject = next(iter(content.items()))
+    assert verb == entry.act.type_name
+    assert subject == getattr(entry.act, entry.act.subject)
+    assert entry == Entry.model_validate(entry.model_dump(mode="json"))
+    assert entry.act == parse_intervention(dump_intervention(entry.act))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"at": "1 h"}, "doesn't say what is done"),
+        ({"at": "1 h", "holdd": "ana"}, "did you mean 'hold'"),
+        ({"at": "1 h", "hold": "ana", "put": "ana"}, "hold and put are given"),
+        ({"at": "1 h", "do": "holdd", "entity": "ana"}, "do: there is no intervention 'holdd'"),
+        ({"at": "1 h", "do": "os:system"}, "no intervention 'os:system'"),
+        ({"at": "1 h", "hold": "ana", "entity": "ben"}, "leave out 'entity'"),
+        ({"at": "1 h", "hold": 3}, "^hold: "),
+        ({"at": "1 h", "put": "ana"}, "^to: "),
+        ({"at": "1 h", "put": "ana", "to": "k", "too": 3}, "too: unknown key"),
+        ({"at": "1 h", "call": "astro"}, "one of 'to', 'find'"),
+        ({"at": "1 h", "call": "astro", "to": "kitchen", "dock": True}, "one of 'to', 'find'"),
+        ({"hold": "ana", "each": True}, "'at' a time or 'on' an event"),
+        ({"at": "1 h", "on": "docks", "hold": "ana"}, "'at' a time or 'on' an event"),
+        ({"at": "1 h", "each": True, "hold": "ana"}, "'each' goes with"),
+        ({"at": "1 h", "delay": "5 s", "hold": "ana"}, "'delay' is the time after"),
+    ],
+)
+def test_a_wrong_entry_is_refused_and_says_what_is_wrong(
+    content: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        parse_entry(content)
+
+
+def test_no_key_of_an_intervention_is_a_verb_or_has_a_meaning_beside_it() -> None:
+    taken = {*verbs(), *WHEN, "do", "step", "by"}
+    for verb, cls in verbs().items():
+        assert cls.subject in cls.model_fields
+        assert not taken & (cls.model_fields.keys() - {cls.subject}), verb
