@@ -201,3 +201,17 @@ class Fidget(Behavior):
         plan = now.plan().go_to("hall").take(draws.choice(["stand", "sit", "lie"]))
         plan.turn_by(draws.uniform()).note("activity", draws.choice(["cook", "read", "sleep"]))
         return plan.stay(timedelta(seconds=30 + draws.below(60)))
+
+
+class Lounge(Behavior):
+    """Sit down on the first seat of the home for a minute, once."""
+
+    def start(self, actor: Any) -> None:
+        self.done = False
+
+    def decide(self, now: Situation) -> Plan | None:
+        if self.done:
+            return None
+        self.done = True
+        seat = next(t for t in now.home.objects if any(u.posture == "sit" for u in t.uses))
+        return now.plan().use(seat).stay(timedelta(minutes=1))

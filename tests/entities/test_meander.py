@@ -1,5 +1,6 @@
 """Meander: the random walk."""
 
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,10 @@ import pytest
 from numpy.typing import NDArray
 from tests.scenes import OWN, path, run, scenario
 
+from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.plan import Walk
 from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.objects import POSTURES
 
 
 def walker(duration: str = "30 min", step: str = "1 s", **fields: Any) -> dict[str, Any]:
@@ -111,3 +115,17 @@ def test_who_stays_at_walls_walks_less_and_is_near_them_for_most_of_the_time() -
         near[rule] = float(np.mean([space.part_at(x, y) < 0 for x, y in points]))
     assert metres["stay"] < 0.7 * metres["turn"]
     assert near["stay"] > near["turn"]
+
+
+def test_who_sat_stands_for_as_long_as_it_walks() -> None:
+    """The walk's plan said that it sat, so whatever followed the walk began sitting."""
+    ana = {"behaviors": [{"type": f"{OWN}:Lounge"}, {"type": "meander"}]}
+    furnished = {"type": "bundled", "furnish": True}
+    now = Simulation(scenario("10 min", users={"ana": ana}, floorplan=furnished))
+    postures = []
+    for minute in (1, 5):
+        now.run_until(timedelta(minutes=minute))
+        ana_now = now._state.actors[0]
+        postures.append(POSTURES[ana_now.posture_code(minute * 60 * 10**6)])
+    assert ["sit", "stand"] == postures
+    assert isinstance(ana_now.motion, Walk)

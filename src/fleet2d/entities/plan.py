@@ -288,6 +288,7 @@ class Plan:
         self._check_goes_on()
         if len(self._legs) > 2 or self.time_us != self.began[0] * self._actor.clock.step_us:
             raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
+        self.take("stand")
         home, actor = self._actor.home, self._actor
         # Who wanders about takes a shut door for a wall.
         self._motion = Walk(home.walls, home.space(actor.entity.radius).mesh, rule)
