@@ -39,3 +39,22 @@ def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
         assert len(shares) >= 2, path
         assert run.metrics["distance"]["ana"] > 1, path
         assert run.metrics["distance"]["astro"] > 10 or len(run.plan.rooms) == 1, path
+
+
+@pytest.mark.parametrize(("seed", "area"), [(5, 110), (11, 30), (12, 60), (13, 150)])
+def test_a_furnished_synthetic_home_is_lived_in_for_a_day(seed: int, area: int) -> None:
+    """In the first one a chair stands in a gap that its sitter fits into, but can't walk out of."""
+    floorplan = {"type": "synthetic", "seed": seed, "area_m2": area, "furnish": True}
+    personas = {"ana": "night_shift", "ben": "works_outside"}
+    users = {name: {"type": "routine", "persona": kind} for name, kind in personas.items()}
+    simulation = {"duration": "1 d", "start": "2026-01-05", "seed": seed}
+    content = {
+        "extends": "bundled:base",
+        "simulation": simulation,
+        "floorplan": floorplan,
+        "users": users,
+        "artifacts": {"trajectories": "off"},
+    }
+    run = fleet2d.run(content)
+    assert run.metrics["distance"]["ana"] > 1
+    assert run.metrics["distance"]["astro"] > 10

@@ -15,7 +15,7 @@ from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.giving_way import TOUCHING
+from fleet2d.entities.giving_way import TOUCHING, Crowd
 from fleet2d.events import Event
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import Poses
@@ -55,7 +55,28 @@ class Clearance:
             met = self._first(robot, poses_of(block, row), xs, ys, away, first, begin=1)
             if met is not None:
                 end = min(end, first + met[0])
+            end = min(end, self._next_look(robot, xs, ys, away, first, end))
         return end
+
+    def _next_look(
+        self, robot: Actor, xs: I64, ys: I64, away: NDArray[np.uint8], first: int, end: int
+    ) -> int:
+        """Return the step at which a robot that waits looks whether its way is clear."""
+        waiting = robot.waiting
+        if waiting is None:
+            return end
+        x, y, out = waiting.crowd.everybody.T[:, :, None]
+        moved = ((xs != x) | (ys != y) | (away != out)).any(axis=0)
+        moved |= waiting.crowd.arrangement != robot.arrangement
+        column = int(moved.argmax())
+        return waiting.look_from(max(first + column, first + 1)) if moved[column] else end
+
+    def looks(self, row: int, step: int) -> bool:
+        """Tell whether a robot that waits looks again at a step, for somebody has moved."""
+        waiting = self.robots[row].waiting if row in self.robots else None
+        if waiting is None or waiting.look_from(step) != step:
+            return False
+        return not waiting.crowd.is_as(self.crowd(self.robots[row]))
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Go on to a step."""
@@ -81,15 +102,17 @@ class Clearance:
         met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], step, begin=0)
         return None if met is None else self._users[met[1]]
 
-    def people(self, robot: Actor) -> I64:
-        """Return where people at home are, and at which distance the bodies touch: int64 (n, 3)."""
+    def crowd(self, robot: Actor) -> Crowd:
+        """Return where people are at present."""
         units = robot.home.plan.lattice.units_per_m
         rows = [
             (u.state.x, u.state.y, int((u.entity.radius + robot.entity.radius) * units))
             for u in self._users
             if not u.state.away
         ]
-        return np.array(rows, np.int64).reshape(-1, 3)
+        everybody = [(u.state.x, u.state.y, u.state.away) for u in self._users]
+        people = np.array(rows, np.int64).reshape(-1, 3)
+        return Crowd(people, np.array(everybody, np.int64), robot.arrangement)
 
     def _first(
         self,

@@ -61,6 +61,8 @@ def decide(state: State, span: Span) -> None:
     rows = set(state.bodies.due(step)) | clearance.robots.keys()
     for row in sorted(rows):
         actor = state.actors[row]
+        if clearance.looks(row, step):
+            state.bodies.ask_at[row] = step
         due, in_way = bool(state.bodies.ask_at[row] <= step), None
         if due:
             situation = Situation(actor, step, state.take_pending(row), state.learners.readable)
@@ -75,7 +77,7 @@ def decide(state: State, span: Span) -> None:
             if not due:
                 state.end_plan(row, step)
             situation = Situation(actor, step, (), state.learners.readable)
-            actor.give_way(situation, in_way.name, clearance.people(actor))
+            actor.give_way(situation, in_way.name, clearance.crowd(actor))
             state.bodies.follow(row, actor.plan)
         if due or in_way is not None:
             state.changes.expect(row, actor)

@@ -15,7 +15,7 @@ from fleet2d.entities.battery import Charge
 from fleet2d.entities.behavior import Attention, Behavior, Command, SightEvent, Situation
 from fleet2d.entities.entity import Entity
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
-from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Waiting
+from fleet2d.entities.giving_way import JUST_WAITED, Crowd, GivesWay, Waiting
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.orders import Order
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
@@ -95,7 +95,7 @@ class Actor:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self._space: tuple[tuple[int, int], Space] = self._arrangement, self._present_space()
+        self._space: tuple[tuple[int, int], Space] = self.arrangement, self._present_space()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
@@ -182,13 +182,13 @@ class Actor:
         (version, costs_version), space = self._space  # nearly always the one of before
         if version == self.home.version and not (costs_version or self.entity.minds_costs):
             return space
-        if self._space[0] != self._arrangement:
-            self._space = self._arrangement, self._present_space()
+        if self._space[0] != self.arrangement:
+            self._space = self.arrangement, self._present_space()
             self.part = self._present_part()
         return self._space[1]
 
     @property
-    def _arrangement(self) -> tuple[int, int]:
+    def arrangement(self) -> tuple[int, int]:
         """What its space depends on: it is another whenever that is."""
         return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
 
@@ -199,7 +199,8 @@ class Actor:
 
     def _present_part(self) -> int:
         """Return the part of a changed space that it is in, or nearest to."""
-        space, x, y = self._space[1], self.state.x, self.state.y
+        space, here = self._space[1], (self.state.x, self.state.y)
+        x, y = self.home.approach_of(here) or here
         part = space.part_at(x, y)
         return part if part >= 0 else space.part_near(x, y)
 
@@ -391,6 +392,8 @@ class Actor:
         if self.charge is not None and self.charge.is_empty:
             plan = now.plan().stay()
         waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            self._waited = waiting.since, waiting.look_before(step) + self._just
         if plan is None and waiting is not None and not now.events:
             plan = waiting.go_on(now)
         with blame(self.path, step):
@@ -416,18 +419,27 @@ class Actor:
         with blame(self.path, step):
             self._watch(now, fresh=True)
 
-    def give_way(self, now: Situation, whom: str, people: NDArray[np.int64]) -> None:
+    @property
+    def _just(self) -> int:
+        """For how many steps after it has waited it goes on counting."""
+        return micros(JUST_WAITED) // self.clock.step_us + 1
+
+    @property
+    def waiting(self) -> Waiting | None:
+        """What it waits for, if it has stopped before somebody."""
+        return self._waiting
+
+    def give_way(self, now: Situation, whom: str, crowd: Crowd) -> None:
         """Stop before somebody at whom the plan would drive now; in the end go round, or give up.
 
         Args:
             now: The situation.
             whom: Who is in the way.
-            people: Where people are, and at which distance the bodies touch [lattice], int64
-                (n, 3).
+            crowd: Where people are.
         """
-        step, just = now.step, micros(JUST_WAITED) // self.clock.step_us + 1
+        step, just = now.step, self._just
         since = self._waited[0] if step <= self._waited[1] else step
-        waits = Waiting(self.plan, step, since, self.arbiter.own)
+        waits, people = Waiting(self.plan, step, since, self.arbiter.own, crowd), crowd.people
         self._waited, self.passes_until = (since, step + just), step
         gives_way: GivesWay = self.entity.gives_way  # type: ignore[attr-defined]
         waited, plan = (step - since) * self.clock.step_us, None
@@ -443,7 +455,7 @@ class Actor:
                 if self.order is None:
                     self.arbiter.give_up(now)
         if plan is None:
-            plan, self._waiting = waits.wait(now, whom), waits
+            plan, self._waiting = waits.wait(now, whom, gives_way), waits
         if self.plan.began[0] == step:  # it has begun, and is over at once
             begun = [n for n in self.plan.notes if n.time_us <= step * self.clock.step_us]
             plan.notes[:0] = begun

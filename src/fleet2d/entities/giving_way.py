@@ -1,7 +1,7 @@
 """Giving way: a robot that stops before people, waits, and goes round them or gives up."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from fleet2d.component import Settings
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed, without_next_stop
 from fleet2d.floorplan.home.costmap import NO_WAY, route_by_cost
-from fleet2d.units import Length, PositiveDuration
+from fleet2d.units import Length, PositiveDuration, micros
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -46,27 +46,81 @@ class GivesWay(Settings):
     )
 
 
+class Crowd(NamedTuple):
+    """What a robot that waits has before it: while it stays the same, waiting goes on.
+
+    Attributes:
+        people: Where people at home are, and at which distance the bodies touch [lattice], int64
+            (n, 3).
+        everybody: Where everybody is, and whether away, int64 (users, 3).
+        arrangement: Of doors and furniture.
+    """
+
+    people: I64
+    everybody: I64
+    arrangement: tuple[int, int]
+
+    def is_as(self, other: "Crowd") -> bool:
+        """Tell whether nobody and nothing has moved."""
+        same = np.array_equal(self.everybody, other.everybody)
+        return same and self.arrangement == other.arrangement
+
+
 class Waiting:
     """A robot that has stopped before somebody.
+
+    It looks at steps that are fixed beforehand. A look at which nothing has moved since the last
+    one finds what that found, so it isn't made: the plan to wait reaches up to the first look that
+    matters even so, and `Clearance` ends it at an earlier one if somebody moves.
 
     Attributes:
         broken: The plan that it was following.
         step: The step at which it stopped following it.
         since: The step at which it first stopped before somebody.
         interrupts: What that plan wants to hear of.
+        crowd: What it has seen at its last look.
     """
 
-    def __init__(self, broken: Plan, step: int, since: int, interrupts: frozenset[str]) -> None:
+    def __init__(
+        self, broken: Plan, step: int, since: int, interrupts: frozenset[str], crowd: Crowd
+    ) -> None:
         self.broken, self.step, self.since = broken, step, since
-        self.interrupts = interrupts
+        self.interrupts, self.crowd = interrupts, crowd
+        self._step_us = broken.step_us
 
-    def wait(self, now: "Situation", whom: str) -> Plan:
-        """Stand still a moment, the longer the longer it has waited."""
-        plan, waited = now.plan(), (now.step - self.since) * now.actor.clock.step_us
+    def look_from(self, step: int) -> int:
+        """Return the first step from `step` on at which it looks."""
+        look = self.step
+        while look < step:
+            look = self._look_after(look)
+        return look
+
+    def look_before(self, step: int) -> int:
+        """Return the last step before `step` at which it looked."""
+        look = self.step
+        while (after := self._look_after(look)) < step:
+            look = after
+        return look
+
+    def _look_after(self, look: int) -> int:
+        often, seldom = (micros(moment) for moment in LOOKS_EVERY)
+        moment = min(max(often, self._waited(look) // 10), seldom)
+        return look + max(-(-moment // self._step_us), 1)
+
+    def _waited(self, step: int) -> int:
+        return (step - self.since) * self._step_us
+
+    def wait(self, now: "Situation", whom: str, gives_way: GivesWay) -> Plan:
+        """Stand still until it is time to do something else, if nobody moves."""
+        plan, look, patience = now.plan(), self._look_after(now.step), micros(gives_way.patience)
         if now.step == self.since:
             plan.note("gives_way", whom)
-        often, seldom = LOOKS_EVERY
-        plan.stay(min(max(often, timedelta(microseconds=waited // 10)), seldom))
+        if self._waited(now.step) >= patience:  # it has looked for a way round
+            patience = max(patience, micros(gives_way.gives_up))
+        # At its first look it may turn to where it would go on.
+        while self.broken.began[0] == now.step and self._waited(look) < patience:
+            look = self._look_after(look)
+        plan.stay_until(look * self._step_us)
         plan.interrupts = self.interrupts
         return plan
 

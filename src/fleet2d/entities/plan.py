@@ -196,9 +196,14 @@ class Plan:
     def _get_up(self) -> None:
         """Stand, and step off the object that one sits or lies on."""
         self.take("stand")
-        approach = self._actor.home.approach_of((self.x, self.y))
-        if approach is not None and self._actor.space.part_at(self.x, self.y) < 0:
-            self._step_to(*approach)
+        actor, space = self._actor, self._actor.space
+        approach = actor.home.approach_of((self.x, self.y))
+        # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
+        if approach is None or space.part_at(self.x, self.y) == actor.part:
+            return
+        if space.part_at(*approach) != actor.part:
+            approach = space.nearest(*approach, actor.part) or approach
+        self._step_to(*approach)
 
     def _step_to(self, x: int, y: int) -> None:
         """Go straight to a point, whatever is in the way."""

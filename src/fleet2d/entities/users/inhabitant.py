@@ -33,6 +33,8 @@ DOINGS_A_DAY = 1024
 GOING_ON = DOINGS_A_DAY // 2
 # Nobody sets out for another spot when what they do is over sooner than that.
 NEARLY_OVER_US = 90 * SECOND_US
+# Who may be interrupted any time plans what begins within that.
+AHEAD_US = 1800 * SECOND_US
 # One turns to the side by up to half of two to the power of that: an eighth of a turn.
 SIDEWAYS_BITS = 10
 
@@ -150,13 +152,17 @@ class Inhabitant(Behavior):
         """Plan the rest of the date.
 
         All plans end at midnight, so that many bodies decide at the same step: the engine then has
-        few spans to take.
+        few spans to take. Who reacts to robots plans less far ahead: it may all be for nothing.
         """
         plan, clock = now.plan(), now.actor.clock
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
+        far_us = plan.time_us + AHEAD_US if now.actor.attention else midnight_us
         for ordinal, i, doing in self._doings(now.time):
             day_us = clock.elapsed(datetime.fromordinal(ordinal))
-            if plan.time_us >= midnight_us or day_us + doing.begin * SECOND_US >= midnight_us:
+            if (
+                plan.time_us >= min(far_us, midnight_us)
+                or day_us + doing.begin * SECOND_US >= midnight_us
+            ):
                 break
             end_us = min(day_us + doing.end * SECOND_US, midnight_us)
             if plan.time_us >= end_us:  # the way to it took longer than it lasts
