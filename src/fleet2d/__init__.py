@@ -6,6 +6,7 @@ Heavy parts load when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fleet2d.leaves import Views, register_views
 from fleet2d.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -95,6 +96,15 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"fleet2d.{_HOME_OF[name]}"), name)
     globals()[name] = value
     return value
+
+
+def _notebook() -> Views:
+    from fleet2d.viewer import notebook
+
+    return notebook
+
+
+register_views(_notebook)
 
 
 def __dir__() -> list[str]:

@@ -1,22 +1,54 @@
-"""Leaves: packages that show and send what runs hold, and that nothing else builds on.
+"""What shows runs and homes: named from above, so that what is shown knows nothing of it.
 
-A few methods of central classes hand over to them for convenience. What is not there, or lacks a
-library, is said in a message; everything else works without.
+A few methods of `Run` and `FloorPlan` hand over to it. Everything else works without.
 """
 
-from importlib import import_module
-from types import ModuleType
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from fleet2d.errors import InputError
 
 
-def leaf(name: str) -> ModuleType:
-    """Return a module of a leaf, such as ``viewer.notebook``.
+class Views(Protocol):
+    """What draws and shows runs and floor plans; `fleet2d.viewer.notebook` does."""
+
+    def draw_run(self, run: Any, at: str | int | None, axes: Any, theme: str) -> Any:
+        """Return a figure of a run, or of a moment of it."""
+
+    def draw_plan(self, plan: Any, axes: Any, theme: str) -> Any:
+        """Return a figure of a floor plan."""
+
+    def plan_png(self, plan: Any) -> bytes | None:
+        """Return a picture of a floor plan, if one can be drawn."""
+
+    def run_html(self, run: Any) -> str:
+        """Return a run as a notebook shows it."""
+
+    def run_widget(self, run: Any, height: int) -> Any:
+        """Return the page of a run as a widget of a height [pixels]."""
+
+
+_load: list[Callable[[], Views]] = []
+
+
+def register_views(load: Callable[[], Views]) -> None:
+    """Name what shows runs and homes from now on.
+
+    Args:
+        load: Returns it; called when something is shown.
+    """
+    _load[:] = [load]
+
+
+def views() -> Views:
+    """Return what shows runs and homes.
 
     Raises:
-        InputError: It is not installed.
+        InputError: There is none, or it needs a library that isn't installed.
     """
+    if not _load:
+        raise InputError("nothing is registered that could show this")
     try:
-        return import_module(f"fleet2d.{name}")
+        return _load[0]()
     except ModuleNotFoundError as error:
-        raise InputError(f"fleet2d.{name} needs {error.name}, which is not installed") from None
+        raise InputError(f"showing this needs {error.name}, which is not installed") from None

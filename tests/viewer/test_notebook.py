@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import pytest
+from matplotlib.colors import to_rgb
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.leaves import leaf
+from fleet2d.leaves import Views, register_views, views
 
 
 def test_run_draws_itself_and_its_moments(run_dir: Path) -> None:
@@ -36,6 +37,29 @@ def test_run_is_a_widget(run_dir: Path) -> None:
     assert "fleet2d-runs" in widget.content
 
 
-def test_leaf_that_is_not_there_is_named() -> None:
-    with pytest.raises(InputError, match=r"fleet2d\.viewer\.nothing"):
-        leaf("viewer.nothing")
+def test_missing_library_is_named(run_dir: Path) -> None:
+    shown = views()
+
+    def load() -> Views:
+        raise ModuleNotFoundError("No module named 'nothing'", name="nothing")
+
+    register_views(load)
+    try:
+        with pytest.raises(InputError, match="nothing, which is not installed"):
+            fleet2d.open_run(run_dir).draw()
+    finally:
+        register_views(lambda: shown)
+
+
+def test_dark_figure_has_a_dark_ground_and_bright_words(run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    for figure in (
+        run.draw(theme="dark"),
+        run.draw(at=9, theme="dark"),
+        run.plan.draw(theme="dark"),
+    ):
+        assert max(figure.get_facecolor()[:3]) < 0.15
+        words = [text for axes in figure.axes for text in axes.texts if text.get_text()]
+        assert all(max(to_rgb(text.get_color())) > 0.4 for text in words)
+    with pytest.raises(InputError, match="no theme 'blue'"):
+        run.draw(theme="blue")

@@ -1,13 +1,17 @@
 """Arguments that several commands take."""
 
 import re
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 Resolution = Annotated[
     float | None,
     typer.Option(help="Metres per pixel, of a floor plan that is a mere picture."),
+]
+
+ThemeChoice = Annotated[
+    Literal["light", "dark"], typer.Option(help="Of pictures: a light or a dark ground.")
 ]
 
 

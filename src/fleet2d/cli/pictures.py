@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from fleet2d.cli.arguments import Resolution, file_name
+from fleet2d.cli.arguments import Resolution, ThemeChoice, file_name
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
@@ -55,38 +55,22 @@ def show(  # noqa: PLR0913 - options of the command line
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Of a run: where it ends.")] = None,
     figure: Figure = "life",
+    theme: ThemeChoice = "light",
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
     """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
-    if diary:
-        from fleet2d.cli.diaries import show_diary
+    from fleet2d.view.theme import themed
 
-        for line in show_diary(None if what is None else str(what), out, days, seed):
-            typer.echo(line)
-        return
-    if step is not None and layer is None:
-        raise InputError("--step goes with --layer: it says as of which step a layer is drawn")
-    is_run = what is not None and (what / "manifest.json").exists()
-    stretch = RunPicture(layer, step, reliability, at, begin, end, figure)
-    if fov is not None if is_run else stretch != RunPicture():
-        raise InputError(
-            "--layer, --step, --reliability, --at, --from, --to and --figure are for a run's"
-            " directory, --fov for a floor plan"
-        )
-    if what is not None and is_run:
-        with restricting(trust, trust_dir):
-            target = _draw_run(what, out, stretch)
-    elif what is not None and what.is_dir():
-        raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
-    elif what is not None and not what.exists() and what.parent != Path():
-        raise RunDirectoryError(
-            f"there is no {what}: give the directory of a run (what --out named), a floor plan's"
-            " file, synthetic:SEED, or family_home"
-        )
-    else:
-        target = _draw_floorplan(what, out, fov, resolution)
-    typer.echo(target)
+    wanted = RunPicture(layer, step, reliability, at, begin, end, figure)
+    with themed(theme), restricting(trust, trust_dir):
+        if diary:
+            from fleet2d.cli.diaries import show_diary
+
+            for line in show_diary(None if what is None else str(what), out, days, seed):
+                typer.echo(line)
+        else:
+            typer.echo(_draw(what, out, wanted, fov, resolution))
 
 
 class RunPicture(NamedTuple):
@@ -112,6 +96,34 @@ class RunPicture(NamedTuple):
             raise InputError(
                 "one picture at a time: --layer, --reliability, --at, or --from, --to and --figure"
             )
+
+
+def _draw(
+    what: Path | None,
+    out: Path | None,
+    wanted: RunPicture,
+    fov: str | None,
+    resolution: float | None,
+) -> Path:
+    """Draw a run or a floor plan; return where."""
+    if wanted.step is not None and wanted.layer is None:
+        raise InputError("--step goes with --layer: it says as of which step a layer is drawn")
+    is_run = what is not None and (what / "manifest.json").exists()
+    if fov is not None if is_run else wanted != RunPicture():
+        raise InputError(
+            "--layer, --step, --reliability, --at, --from, --to and --figure are for a run's"
+            " directory, --fov for a floor plan"
+        )
+    if what is not None and is_run:
+        return _draw_run(what, out, wanted)
+    if what is not None and what.is_dir():
+        raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
+    if what is not None and not what.exists() and what.parent != Path():
+        raise RunDirectoryError(
+            f"there is no {what}: give the directory of a run (what --out named), a floor plan's"
+            " file, synthetic:SEED, or family_home"
+        )
+    return _draw_floorplan(what, out, fov, resolution)
 
 
 def _draw_run(directory: Path, out: Path | None, wanted: RunPicture) -> Path:

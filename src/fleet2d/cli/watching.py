@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.cli.arguments import split
+from fleet2d.cli.arguments import ThemeChoice, split
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
@@ -80,7 +80,7 @@ def _announce(address: str) -> None:
     typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")
 
 
-def film(
+def film(  # noqa: PLR0913 - options of the command line
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
     out: Annotated[Path | None, typer.Option(help="Film to write: .mp4, .gif or .webp.")] = None,
     begin: Annotated[
@@ -89,18 +89,20 @@ def film(
     end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
     speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
     height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
+    theme: ThemeChoice = "light",
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
     """Make a film of a stretch of a stored run."""
     from fleet2d.runs.run import open_run
+    from fleet2d.view.theme import themed
     from fleet2d.viewer.film import write_film
     from fleet2d.viewer.moments import steps_of
 
     run = open_run(directory)
     first, last = steps_of(run, begin, end)
     target = out or directory / "film.mp4"
-    with restricting(trust, trust_dir):
+    with themed(theme), restricting(trust, trust_dir):
         frames = write_film(run, target, first, last, speed=speed, height=height)
     typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
 

@@ -24,7 +24,7 @@ from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway, fit_lines, name_
 from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, beside_rooms
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
-from fleet2d.leaves import leaf
+from fleet2d.leaves import views
 from fleet2d.problems import did_you_mean
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
@@ -327,21 +327,21 @@ class FloorPlan:
         near_x, near_y = self.lattice.to_metres(centre).tolist()
         return near_x, near_y
 
-    def draw(self, ax: Any = None) -> Any:
+    def draw(self, ax: Any = None, theme: str = "light") -> Any:
         """Draw the plan; needs the extra `viz`.
 
         Args:
             ax: Matplotlib axes to draw on, in metres; None for a new figure.
+            theme: Of a new figure: light or dark.
 
         Returns:
             A matplotlib figure, or `ax`.
         """
-        return leaf("viewer.notebook").draw_plan(self, ax)
+        return views().draw_plan(self, ax, theme)
 
     def _repr_png_(self) -> bytes | None:
         """Show the plan in a notebook, where matplotlib is installed."""
-        png: bytes | None = leaf("viewer.notebook").plan_png(self)
-        return png
+        return views().plan_png(self)
 
     def _check_entrance(self) -> None:
         if self.entrance is None:

@@ -13,7 +13,7 @@ from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.prefix import Prefix
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.leaves import leaf
+from fleet2d.leaves import views
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,21 +157,22 @@ class Run:
 
         return rebuild_path(self, self.plan, entity, every)
 
-    def draw(self, at: str | int | None = None, ax: Any = None) -> Any:
+    def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
         """Draw the run, or a moment of it; needs the extra `viz`.
 
         Args:
             at: A moment, such as "day 3 18:30", or a step; None for the whole run.
             ax: Matplotlib axes to draw the moment on (the last one, if `at` is None).
+            theme: Of a new figure: light or dark.
 
         Returns:
             A matplotlib figure, or `ax`.
 
         Raises:
-            InputError: `at` names no moment of the run, or matplotlib is not installed.
+            InputError: `at` names no moment, there is no such theme, or matplotlib is missing.
             ArtifactError: The run stored no floor plan or no key frames.
         """
-        return leaf("viewer.notebook").draw_run(self, at, ax)
+        return views().draw_run(self, at, ax, theme)
 
     def view(self, height: int = 720) -> Any:
         """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
@@ -183,11 +184,11 @@ class Run:
             InputError: anywidget is not installed.
             ArtifactError: The run stored no floor plan.
         """
-        return leaf("viewer.widget").run_widget(self, height)
+        return views().run_widget(self, height)
 
     def _repr_html_(self) -> str:
         """Show the run in a notebook."""
-        return str(leaf("viewer.notebook").run_html(self))
+        return views().run_html(self)
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as Arrow has it.

@@ -13,6 +13,7 @@ from fleet2d.routines.interruptions import uninterrupted
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Doing
+from fleet2d.view.theme import finished
 from fleet2d.weekdays import WEEKDAYS
 
 MONDAY = date(2026, 1, 5)
@@ -93,7 +94,7 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
     shown = [Patch(color=color, label=label.replace("_", " ")) for label, color in colors.items()]
     shown.append(Patch(color=NEED_COLOR, label="needs and errands"))
     figure.legend(handles=shown, loc="outside lower center", ncols=8, fontsize=7, frameon=False)
-    figure.savefig(target, dpi=130)
+    finished(figure).savefig(target, dpi=130)
 
 
 def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:

@@ -35,6 +35,7 @@ from fleet2d.palette import (
     WALL_COLOR,
 )
 from fleet2d.view.objects import draw_objects, label_objects
+from fleet2d.view.theme import finished
 
 # Kinds of pictures, and what each would say of when or by what it was made.
 STAMPS = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
@@ -90,14 +91,14 @@ def drawing_style() -> AbstractContextManager[Any]:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure without a date or version in it, whole or not at all.
+    """Write a figure in the theme of the moment, without a date in it, whole or not at all.
 
     Raises:
         InputError: The file can't be written.
     """
     unstamped = {STAMPS[path.suffix.lower()]: None}
     picture = io.BytesIO()
-    figure.savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
+    finished(figure).savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
     unfinished = path.with_name(f".{path.name}.unfinished")
     try:
         unfinished.write_bytes(picture.getvalue())

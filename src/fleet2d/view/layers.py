@@ -25,6 +25,7 @@ from fleet2d.view.floorplan import (
     floorplan_axes,
     save_figure,
 )
+from fleet2d.view.theme import SCALE
 
 # The brighter part of viridis: names of rooms are written over it.
 COLORS = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.35, 1.0, 256)))
@@ -96,5 +97,7 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
     left, bottom = plan.lattice.origin
     width, height = (n * plan.lattice.cell for n in (plan.lattice.columns, plan.lattice.rows))
     extent = (left, left + width, bottom, bottom + height)
-    axes.imshow(image, extent=extent, origin="lower", interpolation="nearest", zorder=2.1)
+    axes.imshow(
+        image, extent=extent, origin="lower", interpolation="nearest", zorder=2.1, label=SCALE
+    )
     return shown

@@ -31,6 +31,7 @@ CANDIDATES = 60  # moments looked at to find one that shows what a robot sees
 SPOTS = 260  # places of sightings that are drawn; more would cover the plan and tell nothing
 CLEAR_M = 0.5  # twice the space between a name and a robot
 FAR_ENOUGH_M = 2.0
+RIM_COLOR = "#ffffffb0"  # around names
 
 F64 = NDArray[np.float64]
 
@@ -152,7 +153,7 @@ def clear_names(plan: FloorPlan, views: Sequence[View], axes: Axes) -> None:
     canvas: Any = axes.figure.canvas
     pixels = axes.transData.inverted()
     for text in axes.texts:
-        text.set_path_effects([withStroke(linewidth=2.0, foreground="#ffffffb0")])
+        text.set_path_effects([withStroke(linewidth=2.0, foreground=RIM_COLOR)])
         box = text.get_window_extent(canvas.get_renderer())
         (x0, y0), (x1, y1) = pixels.transform(box.get_points()).tolist()
         x, y = text.get_position()

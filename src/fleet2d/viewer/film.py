@@ -3,13 +3,15 @@
 A frame is drawn only where something changed, and shown until the next: most of a day nobody moves.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import drawing_style, figure_size
+from fleet2d.view.theme import finished
 from fleet2d.viewer.stage import Stage
 from fleet2d.viewer.words import Words
 
@@ -65,6 +68,7 @@ def write_film(
     with drawing_style():
         figure = _figure(run, height)
         stage = Stage(run, first, end, figure=figure, every=stride)
+        finished(figure)
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
         frames = _frames(stage, first, moments, on_progress)
@@ -117,25 +121,33 @@ def _frames(
 ) -> Iterator[tuple[int, Pixels]]:
     """Yield the number and the picture of each frame that differs from the one before."""
     canvas: Any = stage.figure.canvas
-    moving = stage.moving
-    for _, artist in moving:
+    for _, artist in (*stage.moving, *stage.ticking):
         artist.set_animated(True)
     canvas.draw()
     ground = canvas.copy_from_bbox(stage.figure.bbox)
+    scene = ground
     width, height = canvas.get_width_height()
     words = Words(width, height, stage.figure.dpi)
-    for done, moment in enumerate(moments.tolist()):
-        stage.show(first + moment * stage.every)
-        canvas.restore_region(ground)
+
+    def draw(artists: Sequence[tuple[Axes | None, Artist]]) -> None:
         pixels = np.asarray(canvas.buffer_rgba())
-        for axes, artist in moving:
+        for axes, artist in artists:
             if isinstance(artist, Text):
                 words.paste(artist, pixels)
             elif axes is not None:
                 axes.draw_artist(artist)
+
+    for done, moment in enumerate(moments.tolist()):
+        if stage.show(first + moment * stage.every):
+            canvas.restore_region(ground)
+            draw(stage.moving)
+            scene = canvas.copy_from_bbox(stage.figure.bbox)
+        else:
+            canvas.restore_region(scene)
+        draw(stage.ticking)
         if on_progress and done % 50 == 0:
             on_progress(done, len(moments))
-        yield moment, pixels
+        yield moment, np.asarray(canvas.buffer_rgba())
 
 
 def _write_mp4(

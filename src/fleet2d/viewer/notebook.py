@@ -15,9 +15,10 @@ from fleet2d.viewer.run_facts import run_title
 NOTEBOOK_DPI = 100
 
 
-def draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
+def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") -> Any:
     """Draw a run, or a moment of it; see `Run.draw`."""
     from fleet2d.view.run import run_figure
+    from fleet2d.view.theme import check_theme, finished, themed
     from fleet2d.viewer.pictures import moment_figure, moment_on_axes
 
     last = run.manifest["steps"] - 1
@@ -25,22 +26,24 @@ def draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
     if axes is not None:
         moment_on_axes(run, min(step, last), axes)
         return axes
-    return run_figure(run) if at is None else moment_figure(run, step)
+    with themed(check_theme(theme)):
+        return finished(run_figure(run) if at is None else moment_figure(run, step))
 
 
-def draw_plan(plan: FloorPlan, axes: Any) -> Any:
+def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
     """Draw a floor plan; see `FloorPlan.draw`."""
     from matplotlib.figure import Figure
 
     from fleet2d.view.floorplan import drawing_style, figure_size, floorplan_axes
+    from fleet2d.view.theme import check_theme, finished, themed
 
     if axes is not None:
         floorplan_axes(plan, axes, title=False)
         return axes
-    with drawing_style():
+    with drawing_style(), themed(check_theme(theme)):
         figure = Figure(figsize=figure_size(plan))
         floorplan_axes(plan, figure.add_axes((0, 0, 1, 1)))
-    return figure
+        return finished(figure)
 
 
 def plan_png(plan: FloorPlan) -> bytes | None:
@@ -48,6 +51,13 @@ def plan_png(plan: FloorPlan) -> bytes | None:
     with suppress(Fleet2DError, ImportError):
         return _png(draw_plan(plan, None))
     return None
+
+
+def run_widget(run: Run, height: int) -> Any:
+    """Return the page of a run as a widget; see `Run.view`."""
+    from fleet2d.viewer import widget
+
+    return widget.run_widget(run, height)
 
 
 def run_html(run: Run) -> str:

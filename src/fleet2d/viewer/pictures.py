@@ -27,6 +27,7 @@ from fleet2d.view.floorplan import (
 from fleet2d.view.layers import COLORS
 from fleet2d.view.life import blurred
 from fleet2d.view.run import draw_run
+from fleet2d.view.theme import SCALE
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.part import part_of_run
 from fleet2d.viewer.run_facts import bodies_of
@@ -160,7 +161,9 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
     right = left + plan.lattice.columns * plan.lattice.cell
     top = bottom + plan.lattice.rows * plan.lattice.cell
     extent = (left, right, bottom, top)
-    axes.imshow(image, extent=extent, origin="lower", interpolation="bilinear", zorder=2.1)
+    axes.imshow(
+        image, extent=extent, origin="lower", interpolation="bilinear", zorder=2.1, label=SCALE
+    )
     return scaled
 
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.geometry.lattice import Lattice
@@ -20,7 +21,7 @@ from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 from fleet2d.view.floorplan import floorplan_axes
-from fleet2d.view.life import field_of_view
+from fleet2d.view.life import RIM_COLOR, field_of_view
 from fleet2d.view.page import QUIET_COLOR
 from fleet2d.viewer.contract import BodyFacts
 from fleet2d.viewer.part import part_of_run
@@ -111,27 +112,31 @@ class Stage:
         self._clock, self._aside = self._write_head(axes)
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
         self._seen = _Observations(self._part)
+        self._scene: object = None
 
     @property
-    def moving(self) -> list[tuple[Axes | None, Artist]]:
-        """What changes from step to step, each with its axes, in the order of drawing."""
-        parts: list[tuple[Axes | None, Artist]] = []
+    def moving(self) -> list[tuple[Axes, Artist]]:
+        """What bodies, their ways and their sight are drawn with, in the order of drawing."""
+        parts: list[Artist] = [view for player in self.players for view in player.views]
+        parts += [self._ways, self._sightings]
         for player in self.players:
-            parts += [(self._axes, view) for view in player.views]
-        parts += [(self._axes, self._ways), (self._axes, self._sightings)]
-        for player in self.players:
-            parts += [(self._axes, part) for part in (player.spot, player.nose, player.name)]
-        if self._cursor is not None:
-            parts.append((self._strip, self._cursor))
-        return [*parts, (None, self._clock), (None, self._aside)]
+            parts += [player.spot, player.nose, player.name]
+        return [(self._axes, part) for part in parts]
 
-    def show(self, step: int) -> None:
-        """Move everything to where it was at a step of the run."""
+    @property
+    def ticking(self) -> list[tuple[Axes | None, Artist]]:
+        """What goes on while everybody rests: the cursor of the strip, and the words above."""
+        cursor = [] if self._cursor is None else [(self._strip, self._cursor)]
+        return [*cursor, (None, self._clock), (None, self._aside)]
+
+    def show(self, step: int) -> bool:
+        """Move everything to where it was at a step of the run; return whether anybody moved."""
         index = (step - self._first) // self.every
-        for player in self.players:
-            self._place(player, index, step)
-        self._draw_ways(index)
-        self._draw_sightings(step, index)
+        before = self._scene
+        poses = [self._place(player, index, step) for player in self.players]
+        views = [player.view_key for player in self.players]
+        lines = [way.tobytes() for way in self._draw_ways(index)]
+        self._scene = (poses, views, lines, self._draw_sightings(step, index))
         path = self.players[0].path if self.players else None
         if path is not None:
             when = path.time[index]
@@ -141,6 +146,7 @@ class Stage:
             self._clock.set_text(f"{moment:%a} {moment.day} {moment:%b %H:%M}")
         away = [p.facts["name"] for p in self.players if p.path.away[index]]
         self._aside.set_text(f"away: {', '.join(away)}" if away else "")
+        return self._scene != before
 
     def changes(self) -> NDArray[np.bool_]:
         """Return at which moments anything is other than at the one before, bool (moments,)."""
@@ -191,20 +197,22 @@ class Stage:
         (nose,) = self._axes.plot([], [], color=color, lw=2.2, zorder=4.2, solid_capstyle="round")
         name = self._axes.text(0, 0, facts["name"], fontsize=8.5, weight="bold", color=color)
         name.set(ha="center", va="bottom", zorder=5, clip_on=True)
+        name.set_path_effects([withStroke(linewidth=2.0, foreground=RIM_COLOR)])
         views = [PolyCollection([], facecolors=VIEW_COLOR, alpha=0.4, zorder=2.2) for _ in range(2)]
         views[1].set(facecolor="none", edgecolor=VIEW_EDGE, lw=0.8, alpha=1.0, zorder=3.2)
         for view in views if facts["cameras"] else ():
             self._axes.add_collection(view, autolim=False)
         return Player(facts, path, spot, nose, name, views if facts["cameras"] else [])
 
-    def _place(self, player: Player, index: int, step: int) -> None:
+    def _place(self, player: Player, index: int, step: int) -> tuple[float, float, float] | None:
+        """Move a body to where it is; return its pose, None while it is away."""
         path = player.path
         x, y, heading = float(path.x[index]), float(path.y[index]), float(path.heading[index])
         there = not bool(path.away[index])
         for part in (player.spot, player.nose, player.name, *player.views):
             part.set_visible(there)
         if not there:
-            return
+            return None
         radius = player.spot.get_radius()
         player.spot.center = (x, y)
         player.nose.set_data(
@@ -213,6 +221,7 @@ class Stage:
         player.name.set_position((x, y + 1.5 * radius))
         if player.views:
             self._look(player, (x, y, heading), step)
+        return x, y, heading
 
     def _look(self, player: Player, pose: tuple[float, float, float], step: int) -> None:
         """Draw what the cameras of a body have in view, if that changed."""
@@ -256,8 +265,8 @@ class Stage:
             for part in shapely.get_parts(seen):
                 yield shapely.get_coordinates(part.exterior)
 
-    def _draw_ways(self, index: int) -> None:
-        """Draw the way of the last minute."""
+    def _draw_ways(self, index: int) -> list[NDArray[np.float64]]:
+        """Draw the ways of the last minute; return them."""
         back = max(1, BEFORE // timedelta(microseconds=self._step_us * self.every))
         begin = max(0, index - back)
         ways, colors = [], []
@@ -267,16 +276,18 @@ class Stage:
             xy = np.stack([path.x[begin : index + 1], path.y[begin : index + 1]], axis=1)[here]
             if len(xy) > 1 and (xy != xy[0]).any():
                 ways.append(xy)
-                colors.append(player.facts["color"])
+                colors.append(player.spot.get_facecolor())
         self._ways.set_segments(ways)
         self._ways.set_color(colors or "none")
+        return ways
 
-    def _draw_sightings(self, step: int, index: int) -> None:
-        """Draw lines from robots to whom they notice."""
+    def _draw_sightings(self, step: int, index: int) -> list[Any]:
+        """Draw lines from robots to whom they notice; return them."""
         at = {p.facts["name"]: (p.path.x[index], p.path.y[index]) for p in self.players}
         seen = self._seen.between(step - self._first, step - self._first + self.every)
         lines = [[at[robot], xy] for robot, xy in seen if robot in at]
         self._sightings.set_segments(lines)
+        return lines
 
 
 class _Observations:

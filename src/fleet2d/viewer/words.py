@@ -1,5 +1,6 @@
 """Words on the frames of a film: each is drawn once, and pasted wherever it comes again."""
 
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+_NUMBERS = re.compile(r"\d+|\D+")
 EDGE = 2  # pixels around a word that its smoothed rim may reach
 
 
@@ -26,6 +28,7 @@ class Words:
         self._renderer: Any = RendererAgg(width, height, dpi)
         self._height = height
         self._stamps: dict[tuple[str, object, float], Stamp | None] = {}
+        self._advances: dict[tuple[str, float], float] = {}
 
     def paste(self, text: Text, pixels: NDArray[np.uint8]) -> None:
         """Paste a text where it is on a picture.
@@ -36,10 +39,20 @@ class Words:
         """
         if not text.get_visible() or not text.get_text():
             return
-        x, y = text.get_transform().transform(text.get_position()).tolist()
+        x, y = self._place(text)
+        words = text.get_text()
+        # A clock has more times than it has hours and minutes.
+        parts = _NUMBERS.findall(words) if text.get_horizontalalignment() == "left" else [words]
+        for part in parts:
+            text.set_text(part)
+            self._paste_part(text, x, y, pixels)
+            x += self._advance(text) if len(parts) > 1 else 0
+        text.set_text(words)
+
+    def _paste_part(self, text: Text, x: float, y: float, pixels: NDArray[np.uint8]) -> None:
         key = (text.get_text(), text.get_color(), float(text.get_fontsize()))
         if key not in self._stamps:
-            self._stamps[key] = self._drawn(text, x, y)
+            self._stamps[key] = self._drawn(text)
         stamp = self._stamps[key]
         if stamp is None:
             return
@@ -54,8 +67,27 @@ class Words:
         opacity = part[..., 3:]
         target[...] = target * (1 - opacity) + 255 * part[..., :3] * opacity + 0.5
 
-    def _drawn(self, text: Text, x: float, y: float) -> Stamp | None:
+    @staticmethod
+    def _place(text: Text) -> tuple[float, float]:
+        x, y = text.get_transform().transform(text.get_position()).tolist()
+        return x, y
+
+    def _advance(self, text: Text) -> float:
+        """Return how far right of a text another goes on [pixels]."""
+        words, font = text.get_text(), text.get_fontproperties()
+        key = (words, float(text.get_fontsize()))
+        if key not in self._advances:
+            # Between bars, for blanks at an end have no width of their own.
+            with_words, without = (
+                self._renderer.get_text_width_height_descent(f"|{part}|", font, False)[0]
+                for part in (words, "")
+            )
+            self._advances[key] = with_words - without
+        return self._advances[key]
+
+    def _drawn(self, text: Text) -> Stamp | None:
         """Draw a text alone, and cut out where it is."""
+        x, y = self._place(text)
         self._renderer.clear()
         text.draw(self._renderer)
         box = text.get_window_extent(self._renderer)
