@@ -10,7 +10,7 @@ from tests.scenes import everything
 import fleet2d
 from fleet2d.engine import state
 from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.entities.actor import NEVER
+from fleet2d.entities.body import NEVER
 from fleet2d.entities.plan import Pose, Track
 from fleet2d.kernels.motion import Breakpoints
 

@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d import Algorithm, Behavior, Metric, Plan, Situation
 from fleet2d.engine import phases
 from fleet2d.engine.phases import PHASES, Span
-from fleet2d.entities.actor import NEVER
+from fleet2d.entities.body import NEVER
 
 STORY: list[tuple[int, str]] = []
 """What happened, as it happened: the step, and to whom."""

@@ -1,32 +1,24 @@
-"""An entity in a run: its body, its place in the home, and the plan that it follows."""
+"""An entity in a run: a body with behaviors, and the plan that it follows."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.blame import blame
-from fleet2d.clock import Clock
 from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.battery import Charge
 from fleet2d.entities.behavior import Attention, Behavior, Command, SightEvent, Situation
-from fleet2d.entities.entity import Entity
-from fleet2d.entities.furniture import furniture_of, room_of_furniture
+from fleet2d.entities.body import NEVER, Body
 from fleet2d.entities.giving_way import JUST_WAITED, Crowd, GivesWay, Waiting
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.orders import Order
-from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
+from fleet2d.entities.place import ANY, Point, is_point
 from fleet2d.entities.plan import Motion, Plan, Pose
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
-from fleet2d.floorplan.home.home import Home
-from fleet2d.floorplan.home.space import Space
-from fleet2d.floorplan.objects import PlacedObject, Posture
-from fleet2d.floorplan.plan import Room
 from fleet2d.kernels.headings import TURN
-from fleet2d.streams import Draws, stream_key
+from fleet2d.streams import Draws
 from fleet2d.units import micros
 
 # Nobody has a plan: stand still this long, then ask again.
@@ -35,76 +27,26 @@ PAUSE = timedelta(minutes=1)
 AT_A_DOOR = timedelta(seconds=10)
 
 
-NEVER = 1 << 62
-"""The step of what never happens."""
-
-
-class Bodies(Protocol):
-    """All bodies of a run.
-
-    Attributes:
-        step: The present step.
-        ask_at: int64 (bodies,), the step at which each decides next; NEVER for never.
-    """
-
-    step: int
-    ask_at: NDArray[np.int64]
-
-    def pose(self, row: int) -> Pose:
-        """Return where a body is at the present step."""
-
-    def hold(self, row: int, pose: Pose) -> None:
-        """Let a body rest at a pose from the present step on."""
-
-
-class PlaceAt(NamedTuple):
-    """A place to use an object from, on the lattice."""
-
-    thing: PlacedObject
-    name: str
-    x: int
-    y: int
-    heading: int
-    posture: Posture
-    approach: tuple[int, int]
-
-
 @dataclass(eq=False)
-class Actor:
+class Actor(Body):
     """An entity in a run.
 
     Attributes:
-        name: Its name in the scenario.
-        path: Its path there, "users.ana"; names its random streams and errors.
-        entity: Its configuration.
         plan: What it follows.
         motion: The motion of the plan.
         planned_at: The step at which it was last asked.
         notes: What of its scenario this home lacks, and what was left out for it.
-        row: Its row among the bodies of the run.
     """
 
-    name: str
-    path: str
-    entity: Entity
-    home: Home
-    clock: Clock
-    seed: int
     behaviors: list[Behavior] = field(init=False)
     notes: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
-        lattice = self.home.plan.lattice
-        self._space: tuple[tuple[int, int], Space] = self.arrangement, self._present_space()
-        self.speed = self.entity.speed * lattice.units_per_m  # units per second
-        self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
-        self.part = 0
-        self._places: tuple[Space, dict[tuple[str, int], PlaceAt]] = self._space[1], {}
+        super().__post_init__()
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set where it has cameras
         self.behaviors = [behavior.model_copy(deep=True) for behavior in self.entity.behaviors]
         with blame(self.path, None):
-            self._bodies: Bodies | None = None
-            self._state, self._state_step = self._begin(), 0
+            self._state = self._begin()
             battery = getattr(self.entity, "battery", None)
             self.charge = None if battery is None else Charge(battery, self)
             for behavior in self.behaviors:
@@ -123,26 +65,6 @@ class Actor:
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
-        self.row = 0
-
-    def join(self, bodies: Bodies, row: int) -> None:
-        """Take part in a run."""
-        self._bodies, self.row = bodies, row
-
-    @property
-    def state(self) -> Pose:
-        """Where it is at the present step."""
-        bodies = self._bodies
-        if bodies is not None and self._state_step != bodies.step:
-            self._state, self._state_step = bodies.pose(self.row), bodies.step
-        return self._state
-
-    @state.setter
-    def state(self, pose: Pose) -> None:
-        self._state = pose
-        if self._bodies is not None:
-            self._state_step = self._bodies.step
-            self._bodies.hold(self.row, pose)
 
     def ask(self, step: int | None) -> None:
         """Set the step at which it decides next; None: never."""
@@ -177,34 +99,6 @@ class Actor:
         return now
 
     @property
-    def space(self) -> Space:
-        """Where its body can be at present."""
-        (version, costs_version), space = self._space  # nearly always the one of before
-        if version == self.home.version and not (costs_version or self.entity.minds_costs):
-            return space
-        if self._space[0] != self.arrangement:
-            self._space = self.arrangement, self._present_space()
-            self.part = self._present_part()
-        return self._space[1]
-
-    @property
-    def arrangement(self) -> tuple[int, int]:
-        """What its space depends on: it is another whenever that is."""
-        return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
-
-    def _present_space(self) -> Space:
-        entity = self.entity
-        space = self.home.space(entity.radius, opens_doors=entity.opens_doors)
-        return self.home.costed(space) if entity.minds_costs else space
-
-    def _present_part(self) -> int:
-        """Return the part of a changed space that it is in, or nearest to."""
-        space, here = self._space[1], (self.state.x, self.state.y)
-        x, y = self.home.approach_of(here) or here
-        part = space.part_at(x, y)
-        return part if part >= 0 else space.part_near(x, y)
-
-    @property
     def attention(self) -> Attention | None:
         """What of robots interrupts its plans: that of the first behavior that pays any."""
         return self._attentive[1] if self._attentive else None
@@ -215,157 +109,12 @@ class Actor:
             return False
         return self._attentive is not None and self._attentive[0].heeds(self, event, step)
 
-    @property
-    def way_out(self) -> tuple[int, int]:
-        """The lattice point where it leaves the home."""
-        return self.home.way_out(self.space, self.part)
-
     def posture_code(self, time_us: int) -> int:
         """Return the posture at a moment, by its number in POSTURES."""
         plan: Plan | None = getattr(self, "plan", None)  # none yet when the first is made
         if plan is None or not (plan.postures or plan.posture != "stand"):
             return 0
         return int(plan.posture_at(np.array([time_us]))[0])
-
-    def place_at(self, thing: PlacedObject | str, place: int) -> PlaceAt:
-        """Return a place to use an object from, and remember it while the home stays as it is.
-
-        Raises:
-            PlacementError: There is no such object, or no place to use it from.
-        """
-        if self._places[0] is not self.space:
-            self._places = self.space, {}
-        name = thing if isinstance(thing, str) else thing.name
-        known = self._places[1].get((name, place))
-        if known is not None and (isinstance(thing, str) or known.thing is thing):
-            return known
-        home, lattice = self.home, self.home.plan.lattice
-        thing = home.object(thing) if isinstance(thing, str) else thing
-        if not thing.uses:
-            raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")
-        use = thing.uses[place % len(thing.uses)]
-        x, y = lattice.point_at((use.x, use.y))
-        heading = round(use.heading / (2 * np.pi) * TURN) % TURN
-        approach = home.approach(use, self.space, self.part)
-        found = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
-        self._places[1][name, place] = found
-        return found
-
-    def stream(self, purpose: str) -> np.uint64:
-        """Return the key of its random stream for a purpose."""
-        return stream_key(self.seed, self.path, purpose)
-
-    def reachable_rooms(self) -> list[Room]:
-        """Return the rooms in which it can stand, in index order."""
-        space = self.space
-        reached = space.rooms_of(self.part)
-        return [room for room in self.home.rooms if room.index in reached]
-
-    def rooms(self, names: RoomChoice) -> list[Room]:
-        """Return the rooms that a list of names stands for: those of the first name that fits.
-
-        Raises:
-            PlacementError: It names no room, or none that can be reached.
-        """
-        return room_of_furniture(self, names) or self._match(names)[1]
-
-    def _match(self, names: RoomChoice) -> tuple[str, list[Room]]:
-        try:
-            home = self.home
-            return matching_rooms(names, home.rooms, self.reachable_rooms(), home.objects)
-        except PlacementError as error:
-            raise PlacementError(f"{self.path}: {error}") from None
-
-    def find(
-        self, place: RoomChoice | Point | str | Iterable[object], time_us: int, purpose: str
-    ) -> tuple[int, int]:
-        """Return the lattice point of a place: the point itself, or a spot drawn in the room.
-
-        Of several rooms of a kind, a body has its own for the whole run; of ``any`` room, it draws
-        one.
-
-        Raises:
-            PlacementError: There is no such room, or it can't be reached.
-        """
-        where = parse_place(place)
-        if is_point(where):
-            return self.point(where)  # type: ignore[arg-type]
-        thing = furniture_of(self, where)
-        if thing is not None:
-            return self.place_at(thing, 0).approach
-        draws = Draws(self.stream(purpose), time_us)
-        name, rooms = self._match(where)  # type: ignore[arg-type]
-        habit = Draws(self.stream(f"room of {name}"), 0)
-        room = (draws if name == ANY else habit).choice(rooms)
-        cells = self.space.cells(room.index, self.part)
-        row, column = cells[draws.below(len(cells))].tolist()
-        return self.home.plan.lattice.cell_centre(row, column)
-
-    def find_anywhere(self, place: Any, time_us: int, purpose: str) -> tuple[int, int]:
-        """Return the lattice point of a place that it may be carried to: also one without a way.
-
-        Raises:
-            PlacementError: There is no such room, or its body fits nowhere there.
-        """
-        where = parse_place(place)
-        if not is_point(where):
-            names = where
-            rooms = matching_rooms(names, self.home.rooms, self.home.rooms)[1]  # type: ignore[arg-type]
-            draws = Draws(self.stream(purpose), time_us)
-            for part in range(self.space.parts):
-                cells = self.space.cells(rooms[0].index, part)
-                if len(cells):
-                    row, column = cells[draws.below(len(cells))].tolist()
-                    return self.home.plan.lattice.cell_centre(row, column)
-            raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
-        x, y = self.home.plan.lattice.point_at(where)  # type: ignore[arg-type]
-        if self.space.part_at(x, y) < 0:
-            near = self.space.nearest(x, y)
-            there = None if near is None else self._shown(near)
-            raise PlacementError(
-                f"{self.path}: the point {list(where)} is in a wall or nearer to one than its"
-                f" radius of {self.entity.radius:g} m; the nearest free point is {there}"
-            )
-        return x, y
-
-    def middle(self, room: Room) -> tuple[int, int]:
-        """Return the point of a room that it can reach, nearest to the room's deepest inside."""
-        x, y = self.home.plan.lattice.point_at(room.anchor_xy)
-        found = self.space.nearest(x, y, self.part, room.index)
-        if found is None:
-            raise PlacementError(f"{self.path}: {room.name} can't be reached from where it starts")
-        return found
-
-    def point(self, xy: Point) -> tuple[int, int]:
-        """Return a point [m] on the lattice.
-
-        Raises:
-            PlacementError: Its body can't stand there, or can't get there; says what is near.
-        """
-        lattice = self.home.plan.lattice
-        x, y = lattice.point_at(xy)
-        part = self.space.part_at(x, y)
-        if part == self.part:
-            return x, y
-        near = self.space.nearest(x, y, self.part)
-        there = None if near is None else self._shown(near)
-        why = f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
-        if part >= 0:
-            why = "can't be reached from where it starts"
-        elif self.home.space(self.entity.radius).part_at(x, y) >= 0:
-            why = "is where the costmap lets no way lead"
-        raise PlacementError(
-            f"{self.path}: the point {list(xy)} {why}; the nearest free point is {there}"
-        )
-
-    def _shown(self, point: tuple[int, int]) -> list[float]:
-        """Return a free lattice point in metres, with as few decimals as leave it free."""
-        lattice = self.home.plan.lattice
-        short: list[float] = lattice.to_metres(point).round(2).tolist()
-        if self.space.part_at(*lattice.point_at(short)) == self.part:
-            return short
-        exact: list[float] = lattice.to_metres(point).round(4).tolist()
-        return exact
 
     def goes_on(self, now: Situation) -> bool:
         """Tell whether, of those who want to be asked at a step, nobody has anything better to do.
@@ -512,15 +261,3 @@ class Actor:
         if heading is None:
             return Pose(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
         return Pose(x, y, round(heading / 360 * TURN) % TURN, away)
-
-    def _has_any(self, names: RoomChoice | Point) -> bool:
-        """Tell whether the largest part of its space has a room of these kinds."""
-        return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
-
-    def _first_part(self, names: RoomChoice) -> int:
-        """Return the largest part of its space with one of these rooms; else the largest."""
-        for part in range(self.space.parts):
-            reachable = [r for r in self.home.rooms if len(self.space.cells(r.index, part))]
-            if {ANY, *(r.name for r in reachable), *(r.type for r in reachable)} & set(names):
-                return part
-        return 0

@@ -6,48 +6,48 @@ from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, parse_place
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.body import Body
     from fleet2d.floorplan.objects import PlacedObject
     from fleet2d.floorplan.plan import Room
 
 
-def furniture_of(actor: "Actor", place: RoomChoice | Point) -> "PlacedObject | None":
+def furniture_of(body: "Body", place: RoomChoice | Point) -> "PlacedObject | None":
     """Return the piece of furniture that a place names, if it names one and no room before it.
 
     Of several of a kind, a body has its own for the whole run, among those that it gets to.
     """
     if is_point(place):
         return None
-    rooms = {name for room in actor.reachable_rooms() for name in (room.name, room.type)}
+    rooms = {name for room in body.reachable_rooms() for name in (room.name, room.type)}
     for name in place:
         if name == ANY or name in rooms:
             return None
         pieces = [
             thing
-            for thing in actor.home.objects
-            if name in (thing.name, thing.type) and _gets_to(actor, thing)
+            for thing in body.home.objects
+            if name in (thing.name, thing.type) and _gets_to(body, thing)
         ]
         if pieces:
-            return Draws(actor.stream(f"object of {name}"), 0).choice(pieces)
+            return Draws(body.stream(f"object of {name}"), 0).choice(pieces)
     return None
 
 
-def room_of_furniture(actor: "Actor", place: RoomChoice | Point) -> "list[Room]":
+def room_of_furniture(body: "Body", place: RoomChoice | Point) -> "list[Room]":
     """Return the room from which the furniture of a place is used; none if it names none."""
-    thing = furniture_of(actor, place)
+    thing = furniture_of(body, place)
     if thing is None:
         return []
-    plan = actor.home.plan
-    room = plan.room_at(*plan.lattice.to_metres(actor.place_at(thing, 0).approach).tolist())
-    return [] if room is None else [actor.home.rooms[room.index]]
+    plan = body.home.plan
+    room = plan.room_at(*plan.lattice.to_metres(body.place_at(thing, 0).approach).tolist())
+    return [] if room is None else [body.home.rooms[room.index]]
 
 
-def seat_at(actor: "Actor", place: object) -> "PlacedObject | None":
+def seat_at(body: "Body", place: object) -> "PlacedObject | None":
     """Return the furniture that a person sits on, lies on or stands at for a place, if any."""
-    return furniture_of(actor, parse_place(place)) if actor.entity.uses_furniture else None
+    return furniture_of(body, parse_place(place)) if body.entity.uses_furniture else None
 
 
-def stop_at(actor: "Actor", place: RoomChoice | Point) -> tuple[int, int]:
+def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
     """Return the lattice point at which a body stops for a place.
 
     A point is that itself, a room the middle of it, furniture where one steps up to it.
@@ -56,27 +56,27 @@ def stop_at(actor: "Actor", place: RoomChoice | Point) -> tuple[int, int]:
         PlacementError: There is no such place, or it can't be reached.
     """
     if is_point(place):
-        return actor.point(place)  # type: ignore[arg-type]
-    thing = furniture_of(actor, place)
+        return body.point(place)  # type: ignore[arg-type]
+    thing = furniture_of(body, place)
     if thing is not None:
-        return actor.place_at(thing, 0).approach
-    return actor.middle(actor.rooms(place)[0])  # type: ignore[arg-type]
+        return body.place_at(thing, 0).approach
+    return body.middle(body.rooms(place)[0])  # type: ignore[arg-type]
 
 
-def stops_at(actor: "Actor", place: RoomChoice | Point) -> list[tuple[int, int]]:
+def stops_at(body: "Body", place: RoomChoice | Point) -> list[tuple[int, int]]:
     """Return all lattice points at which a body stops for a place: one in each room of a kind."""
-    if is_point(place) or furniture_of(actor, place) is not None:
-        return [stop_at(actor, place)]
-    return [actor.middle(room) for room in actor.rooms(place)]  # type: ignore[arg-type]
+    if is_point(place) or furniture_of(body, place) is not None:
+        return [stop_at(body, place)]
+    return [body.middle(room) for room in body.rooms(place)]  # type: ignore[arg-type]
 
 
-def _gets_to(actor: "Actor", thing: "PlacedObject") -> bool:
+def _gets_to(body: "Body", thing: "PlacedObject") -> bool:
     """Tell whether a body gets to the first place at which a piece of furniture is used."""
     if not thing.uses:
         return False
-    x, y = actor.place_at(thing, 0).approach
+    x, y = body.place_at(thing, 0).approach
     use = thing.uses[0]
-    at = actor.home.plan.lattice.point_at(use.approach or (use.x, use.y))
+    at = body.home.plan.lattice.point_at(use.approach or (use.x, use.y))
     # From nearby if that is too tight, but not from another room behind a wall.
-    far = actor.home.plan.lattice.units_per_m
+    far = body.home.plan.lattice.units_per_m
     return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= far * far)
