@@ -101,8 +101,9 @@ export interface WallsFacts {
   neighbors: number[];
 }
 
-/** Something to mark on the timeline: an intervention, or how an expectation came out. */
+/** Something to mark on the timeline: an intervention, or how an expectation came out. It lasts from `step` to before `end`; those of a `lane` don't overlap but for interventions. */
 export interface MarkFacts {
+  lane: string;
   step: number;
   end: number;
   kind: "intervention" | "held" | "violated" | "open";
@@ -185,6 +186,7 @@ export interface LiveFrame {
   doors: Record<string, boolean>;
   beliefs: Record<string, number[]>;
   events: LiveEvent[];
+  marks: MarkFacts[];
   walls: number;
   message: string;
 }

@@ -71,6 +71,19 @@ def test_frames_have_every_event_once() -> None:
     assert sorted((r["step"], r["entity"], r["event"]) for r in rows) == sorted(events)
 
 
+def test_frames_have_every_intervention_once(live: LiveRun) -> None:
+    frames = live.frames()
+    next(frames)
+    live.ask(order("step", value=300))
+    for wish in (order("door", "bath_door", value=0), order("replan", "astro")):
+        assert "" == live.ask(wish)
+    live.ask(order("step", value=5))
+    marks = [mark for frame in next(frames) for mark in frame["marks"]]
+    assert [(300, "shut bath_door"), (300, "replan astro")] == [
+        (mark["step"], mark["label"]) for mark in marks
+    ]
+
+
 def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
     assert "" == live.ask(order("step", value=1))
     assert "" == live.ask(order("step", value=60))

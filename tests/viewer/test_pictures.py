@@ -100,6 +100,8 @@ def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, tmp_path: P
     text = target.read_text(encoding="utf-8")
     for words in (str(run.digest), "fleet2d reproduce", "bath_door", "sightings · ana", "<img"):
         assert words in text
+    assert text.count('prefers-color-scheme: dark)" srcset') == text.count("<img") == 3
+    assert '<iframe title="Timeline" sandbox="allow-scripts"' in text
 
 
 def test_report_escapes_what_a_scenario_names(run_dir: Path) -> None:

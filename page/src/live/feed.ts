@@ -96,6 +96,7 @@ export class Feed {
       const at = event.step * this.run.clock.stepUs;
       this.run.events.add(event.step, at, event.entity, event.event, event.user, event.detail);
     }
+    this.run.facts.marks.push(...frame.marks);
     const { walls } = this.run.facts;
     if (walls[walls.length - 1]!.walls !== frame.walls) walls.push({ step: frame.step, walls: frame.walls });
     for (const body of frame.bodies) {

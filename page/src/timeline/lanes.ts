@@ -1,6 +1,7 @@
 /** The lanes of a timeline: what each shows, in which colours. */
 
 import type { Run } from "../data/run";
+import { lastAtMost } from "../data/search";
 import { differences, type Stretches } from "../data/stretches";
 import { bodyColor, colors, dark, mix } from "../theme";
 import { type Series, readSeries } from "../data/metrics";
@@ -148,24 +149,37 @@ function outputLanes(run: Run, prefix: string): Lane[] {
   );
 }
 
+const MARK_KINDS = ["intervention", "held", "violated", "open"] as const;
+const MARK_WORDS = { intervention: "done", held: "held", violated: "violated", open: "not decided" };
+
+/** Interventions as ticks, and a lane for each expectation: held, violated, or not decided. */
 function markLanes(run: Run, prefix: string): Lane[] {
-  const { marks } = run.facts;
-  if (marks.length === 0) return [];
   const step = run.clock.stepUs;
-  const kinds = ["intervention", "held", "violated", "open"];
-  const shades = [colors.value.text, "#009988", colors.value.alarm, colors.value.quiet];
-  const stretches: Stretches = {
-    from: marks.map((mark) => mark.step * step),
-    to: marks.map((mark) => Math.max(mark.end, mark.step + 1) * step),
-    value: marks.map((mark) => kinds.indexOf(mark.kind)),
-  };
-  const lane = stretchLane(`${prefix}marks`, "interventions", "", stretches, (value) => shades[value]!, (value) => kinds[value]!);
-  lane.words = (us) =>
-    marks
-      .filter((mark) => mark.step * step <= us && us < Math.max(mark.end, mark.step + 1) * step)
-      .map((mark) => `${mark.kind}: ${mark.label}`)
-      .join("; ");
-  return [lane];
+  const names = [...new Set(run.facts.marks.map((mark) => mark.lane))];
+  return names.map((name) => {
+    const marks = run.facts.marks.filter((mark) => mark.lane === name);
+    const us = marks.map((mark) => mark.step * step);
+    const words = (at: number): string => {
+      const last = lastAtMost(us, at);
+      const mark = marks[last];
+      if (!mark) return "";
+      // An intervention is a moment: it is named as long as nothing else was done.
+      if (mark.kind !== "intervention" && at >= mark.end * step) return "";
+      return `${MARK_WORDS[mark.kind]}: ${mark.label}`;
+    };
+    if (marks.every((mark) => mark.kind === "intervention")) {
+      return { ...tickLane(`${prefix}${name}/marks`, name, "", us, colors.value.text), words };
+    }
+    const shades = [colors.value.text, dark.value ? "#2fb6a3" : "#009988", colors.value.alarm, colors.value.quiet];
+    const stretches: Stretches = {
+      from: us,
+      to: marks.map((mark) => mark.end * step),
+      value: marks.map((mark) => MARK_KINDS.indexOf(mark.kind)),
+    };
+    const paint = (value: number): string => shades[value]!;
+    const lane = stretchLane(`${prefix}${name}/marks`, `${name}: expected`, "", stretches, paint, (value) => MARK_WORDS[MARK_KINDS[value]!], 12);
+    return { ...lane, words };
+  });
 }
 
 function doorLanes(run: Run, prefix: string): Lane[] {

@@ -227,6 +227,11 @@ class Steering(Verbs):
         self._state.settle(self.step)
         return self._state.events.since(since)
 
+    @property
+    def interventions(self) -> list[dict[str, Any]]:
+        """What was done to the run so far, by its script or from outside, as in a manifest."""
+        return list(self._state.interventions.done)
+
     def listen(self, function: Callable[[Sequence[Event]], None]) -> None:
         """Call a function with what happens, as it becomes known: not always in order of step."""
         self._state.events.sinks.append(Listener(function))

@@ -126,8 +126,12 @@ class WallsFacts(TypedDict):
 
 
 class MarkFacts(TypedDict):
-    """Something to mark on the timeline: an intervention, or how an expectation came out."""
+    """Something to mark on the timeline: an intervention, or how an expectation came out.
 
+    It lasts from `step` to before `end`; those of a `lane` don't overlap but for interventions.
+    """
+
+    lane: str
     step: int
     end: int
     kind: Literal["intervention", "held", "violated", "open"]
@@ -220,6 +224,7 @@ class LiveFrame(TypedDict):
     doors: dict[str, bool]
     beliefs: dict[str, list[float]]
     events: list[LiveEvent]
+    marks: list[MarkFacts]
     walls: int
     message: str
 

@@ -173,6 +173,7 @@ class LiveRun:
             doors=engine.doors(),
             beliefs=engine.beliefs(),
             events=engine.events(),
+            marks=engine.marks(),
             walls=engine.walls(),
             message="",
         )
@@ -189,7 +190,7 @@ class LiveRun:
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)
-            watcher.put({**self._frame, "events": []})
+            watcher.put({**self._frame, "events": [], "marks": []})
         try:
             while not self._ending:
                 frames = []

@@ -15,7 +15,8 @@ from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveOrder
+from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveOrder, MarkFacts
+from fleet2d.viewer.marks import intervention_marks
 
 AHEAD_US = 120_000_000
 MOST_CORNERS = 60
@@ -34,6 +35,7 @@ class LiveEngine:
         self._meshes: dict[int, int] = {}
         self._walls: list[Mesh] = []
         self._driven: set[str] = set()
+        self._marked = 0
 
     @property
     def step(self) -> int:
@@ -121,6 +123,12 @@ class LiveEngine:
             for event in recorded
             if event.step < self._heard_until
         ]
+
+    def marks(self) -> list[MarkFacts]:
+        """Return what was done to the run since this was last asked."""
+        done = self.simulation.interventions[self._marked :]
+        self._marked += len(done)
+        return intervention_marks(done)
 
     def walls(self) -> int:
         """Return the number of what ends sight at present, for `mesh`."""

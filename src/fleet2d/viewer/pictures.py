@@ -26,7 +26,7 @@ from fleet2d.view.floorplan import (
 )
 from fleet2d.view.layers import COLORS
 from fleet2d.view.life import blurred
-from fleet2d.view.run import draw_run
+from fleet2d.view.run import run_figure
 from fleet2d.view.theme import SCALE
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.part import part_of_run
@@ -97,12 +97,16 @@ def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = 
         ArtifactError: The run stored no key frames or no floor plan.
     """
     check_picture(path)
+    with drawing_style():
+        save_figure(stretch_figure(run, first, end, kind), path)
+
+
+def stretch_figure(run: Run, first: int, end: int, kind: FigureKind = "life") -> Figure:
+    """Return a figure of a stretch of a run; see `draw_stretch`."""
     part = part_of_run(run, first, end)
     if kind == "life":
-        draw_run(part, path)
-        return
-    with drawing_style():
-        save_figure(_heat_figure(part) if kind == "heat" else strip_figure(part), path)
+        return run_figure(part)
+    return _heat_figure(part) if kind == "heat" else strip_figure(part)
 
 
 def strip_figure(part: Run) -> Figure:

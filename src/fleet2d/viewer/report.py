@@ -1,9 +1,10 @@
-"""A report of a run: one HTML page with what ran, metrics, figures, and how to run it again."""
+"""A report of a run as one HTML page: what ran, metrics, figures, timeline, how to run it again."""
 
 import base64
 import html
-import tempfile
+import io
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -14,12 +15,15 @@ import yaml
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.units import format_duration
+from fleet2d.viewer.export import POLICY, embedded_run, html_of
 from fleet2d.viewer.files import write_whole
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.run_facts import run_title
+from fleet2d.viewer.shown_run import ShownRun
 
 DAY = timedelta(days=1)
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+MOST_TIMELINE = 20_000_000
+"""Characters of the page of a run that a report still holds."""
 STYLE = """
 :root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
 body { max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
@@ -30,6 +34,8 @@ table { border-collapse: collapse; }
 th, td { text-align: left; padding: .15rem 1rem .15rem 0; border-bottom: 1px solid #8884; }
 td { font-variant-numeric: tabular-nums; }
 pre { overflow: auto; background: #8881; padding: .8rem; border-radius: 6px; }
+iframe { width: 100%; height: 48rem; border: 1px solid #8884; border-radius: 6px; }
+@media (prefers-color-scheme: dark) { figure { background: #181818; } figcaption { color: #aaa; } }
 """
 
 
@@ -52,7 +58,7 @@ def report_html(run: Run) -> str:
     parts = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',  # the frame's, too
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}: report</title><style>{STYLE}</style></head><body>",
         f"<h1>{title}</h1>",
@@ -62,6 +68,8 @@ def report_html(run: Run) -> str:
         _table(list(flat_metrics(run.metrics))) if run.metrics else "<p>The run has none.</p>",
         "<h2>Figures</h2>",
         *_figures(run),
+        "<h2>Timeline</h2>",
+        _timeline(run),
         "<h2>Run it again</h2>",
         _again(run),
         "</body></html>\n",
@@ -116,29 +124,54 @@ def _table(rows: list[tuple[str, str]]) -> str:
 
 def _figures(run: Run) -> list[str]:
     """Return the pictures of a run, inside the page."""
-    from fleet2d.view.run import draw_run
-    from fleet2d.viewer.pictures import draw_stretch
+    from fleet2d.view.floorplan import drawing_style
+    from fleet2d.view.run import run_figure
+    from fleet2d.viewer.pictures import stretch_figure
 
     steps = run.manifest["steps"]
     day = min(steps, max(1, DAY // timedelta(microseconds=run.manifest["step_us"])))
-    kinds: tuple[tuple[str, Callable[..., None]], ...] = (
-        ("The run in its home, and who was where by day", partial(draw_run, run)),
-        ("The first day", partial(draw_stretch, run, 0, day, kind="strip")),
-        ("Where time was spent", partial(draw_stretch, run, 0, steps, kind="heat")),
+    kinds: tuple[tuple[str, Callable[[], Any]], ...] = (
+        ("The run in its home, and who was where by day", partial(run_figure, run)),
+        ("The first day", partial(stretch_figure, run, 0, day, "strip")),
+        ("Where time was spent", partial(stretch_figure, run, 0, steps, "heat")),
     )
     figures = []
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "figure.png"
-        for words, draw in kinds:
-            try:
-                draw(path=target)
-            except (ArtifactError, InputError) as error:
-                figures.append(f"<p>{html.escape(words)}: {html.escape(str(error))}</p>")
-                continue
-            picture = base64.b64encode(target.read_bytes()).decode()
-            image = f'<img alt="{words}" src="data:image/png;base64,{picture}">'
-            figures.append(f"<figure>{image}<figcaption>{words}</figcaption></figure>")
+    for words, draw in kinds:
+        try:
+            with drawing_style():
+                picture = _both_themes(draw(), words)
+        except (ArtifactError, InputError) as error:
+            figures.append(f"<p>{html.escape(words)}: {html.escape(str(error))}</p>")
+        else:
+            figures.append(f"<figure>{picture}<figcaption>{words}</figcaption></figure>")
     return figures
+
+
+def _both_themes(figure: Any, words: str) -> str:
+    """Return a figure as a picture that is dark where the page is; the figure is darkened."""
+    from fleet2d.view.theme import darken
+
+    light = _png(figure)
+    darken(figure)
+    dark = f'<source media="(prefers-color-scheme: dark)" srcset="{_png(figure)}">'
+    return f'<picture>{dark}<img alt="{words}" src="{light}"></picture>'
+
+
+def _png(figure: Any) -> str:
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", metadata={"Software": None})
+    return f"data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}"
+
+
+def _timeline(run: Run) -> str:
+    """Return the page of a run in a frame that reaches nothing of the report."""
+    with suppress(ArtifactError):  # without a plan or key frames there is nothing to scrub
+        page = html_of([embedded_run(ShownRun(run), 0, run.manifest["steps"])])
+        if len(page) <= MOST_TIMELINE:
+            held = html.escape(page)
+            return f'<iframe title="Timeline" sandbox="allow-scripts" srcdoc="{held}"></iframe>'
+        return "<p>Too large for a page: <code>fleet2d view</code> shows it.</p>"
+    return "<p>The run stored no plan, so that there is none to show.</p>"
 
 
 def _again(run: Run) -> str:

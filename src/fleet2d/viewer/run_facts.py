@@ -15,11 +15,11 @@ from fleet2d.viewer.contract import (
     BodyFacts,
     CameraFacts,
     ColumnFacts,
-    MarkFacts,
     RunFacts,
     TableFacts,
 )
 from fleet2d.viewer.home_facts import home_facts
+from fleet2d.viewer.marks import marks_of
 from fleet2d.viewer.walls import HomeDoors, WallsHistory
 
 Role = Literal["log", "algorithm", "metric", "layer"]
@@ -49,7 +49,7 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
         bodies=bodies_of(scenario, manifest["entities"]),
         tables=[_table_facts(run, name) for name in run.tables],
         walls=walls.changes,
-        marks=_marks(manifest),
+        marks=marks_of(run),
         metrics=run.metrics,
         scenario=scenario,
         walks_every_s=0.0,
@@ -157,30 +157,3 @@ def _role(scenario: Mapping[str, Any], name: str) -> Role:
     if name in scenario.get("algorithms", {}):
         return "algorithm"
     return "metric" if name in scenario.get("metrics", {}) else "log"
-
-
-def _marks(manifest: Mapping[str, Any]) -> list[MarkFacts]:
-    """Return the interventions that a manifest records."""
-    return [
-        MarkFacts(
-            step=int(entry["step"]),
-            end=int(entry["step"]),
-            kind="intervention",
-            label=_intervention_label(entry),
-        )
-        for entry in manifest.get("interventions") or ()
-    ]
-
-
-def _intervention_label(entry: Mapping[str, Any]) -> str:
-    """Return an intervention in few words.
-
-    >>> _intervention_label({"do": "change", "change": {"shut": "bath_door", "at": None}})
-    'shut bath_door'
-    >>> _intervention_label({"do": "put", "entity": "ana", "x": 5})
-    'put ana'
-    """
-    change = entry.get("change")
-    if isinstance(change, Mapping):
-        return next((f"{key} {value}" for key, value in change.items() if value), "change")
-    return f"{entry.get('do', '')} {entry.get('entity', '')}".strip()
