@@ -156,6 +156,9 @@ class History:
     def poses(self, name: str) -> BodyPoses:
         """Return the poses of a body. Algorithms may ask for robots, metrics for users, too.
 
+        Of a robot with `localization` algorithms are told where it believes to be, metrics where
+        it is.
+
         Raises:
             ComponentError: There is no such body, or it is a user and the asker an algorithm.
         """
@@ -167,4 +170,5 @@ class History:
                 else "there is no such body"
             )
             raise ComponentError(f"poses of {name!r} were asked for, but {why}; available: {known}")
-        return self.log.poses(name, self.first, self.end)
+        true = self.visible == frozenset(self.log.index)  # what metrics are told
+        return self.log.poses(name, self.first, self.end, true=true)

@@ -1,6 +1,6 @@
 """What is kept of a run: motions, observations and events, as far back as somebody may ask."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -16,7 +16,7 @@ from fleet2d.algorithms.observations import (
     Rows,
 )
 from fleet2d.algorithms.patches import Patches
-from fleet2d.algorithms.poses import BodyPoses
+from fleet2d.algorithms.poses import BodyPoses, Path
 from fleet2d.errors import ComponentError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.kernels.look import IDENTITY, STEP, X, Y
@@ -73,7 +73,9 @@ class Log:
         self.patches: Patches | None = None  # that bins of evidence tell apart
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
-        self._poses: dict[tuple[str, int, int], BodyPoses] = {}
+        # Of robots that don't know where they are: what they believe of their poses.
+        self.beliefs: dict[str, Callable[[Window], Path]] = {}
+        self._poses: dict[tuple[str, int, int, bool], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
         """Drop what is only needed for steps earlier than `before`."""
@@ -111,13 +113,21 @@ class Log:
             events.append(Event(step, HOME, EventKind.SENSOR, ""))
         return events
 
-    def poses(self, name: str, first: int, end: int) -> BodyPoses:
-        """Return the poses of a body in the steps from `first` to `end` - 1."""
-        key = (name, first, end)
+    def poses(self, name: str, first: int, end: int, *, true: bool = True) -> BodyPoses:
+        """Return the poses of a body in the steps from `first` to `end` - 1.
+
+        Args:
+            name: Of the body.
+            first: First step.
+            end: One past the last step.
+            true: Where it is; False: where it believes to be.
+        """
+        true = true or name not in self.beliefs
+        key = (name, first, end, true)
         if key not in self._poses:  # whoever is updated at the same time asks for the same
-            self._poses[key] = BodyPoses(
-                self.home, self._motions.runs(self.index[name], first, end)
-            )
+            runs = self._motions.runs(self.index[name], first, end)
+            path = runs if true else self.beliefs[name](runs)
+            self._poses[key] = BodyPoses(self.home, path)
         return self._poses[key]
 
     def observe(self, rows: NDArray[np.int64]) -> None:

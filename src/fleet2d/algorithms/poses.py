@@ -1,7 +1,7 @@
 """Poses of one body over a stretch of steps, as arrays in metres and radians."""
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.measure import rooms_at, sum_moves
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.timelines import Window
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.home.home import Home
@@ -18,10 +17,42 @@ if TYPE_CHECKING:
 Array = TypeVar("Array", bound=NDArray[Any])
 
 
+class Path(Protocol):
+    """Runs of equal pose, as a `Window` of one body has them."""
+
+    @property
+    def first(self) -> int:
+        """The first step."""
+
+    @property
+    def end(self) -> int:
+        """One past the last step."""
+
+    @property
+    def step(self) -> NDArray[np.int64]:
+        """At which each run begins."""
+
+    @property
+    def x(self) -> NDArray[np.int64]:
+        """Lattice units."""
+
+    @property
+    def y(self) -> NDArray[np.int64]:
+        """Lattice units."""
+
+    @property
+    def heading(self) -> NDArray[np.int64]:
+        """1/4096 turn."""
+
+    @property
+    def away(self) -> NDArray[np.uint8]:
+        """Not 0 while it isn't at home."""
+
+
 class BodyPoses:
     """Poses of one body, one entry per step; columns are worked out when they are asked for."""
 
-    def __init__(self, home: "Home", runs: Window) -> None:
+    def __init__(self, home: "Home", runs: Path) -> None:
         self._home, self._runs = home, runs
 
     def __len__(self) -> int:

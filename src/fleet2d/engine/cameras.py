@@ -12,11 +12,16 @@ from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.engine.verdicts import points_seen
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.localization import Drift, Localization
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event
+from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.look import (
+    CAMERA,
+    HEADING,
     IDENTITY,
     SIGHTING,
+    STEP,
     USER_LOST,
     USER_SEEN,
     Crowd,
@@ -69,6 +74,7 @@ class Cameras:
         activity_senses: How each camera tells activities.
         method: What tells who is in view; None: lines of sight.
         memory: All that is carried along.
+        drift: How wrong its owner is about where it is; None: it knows.
         perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
         awaited: Events that algorithms wait for: they end a span, too.
         taken: The step before which it has looked.
@@ -99,6 +105,8 @@ class Cameras:
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
         self.taken = 0
+        # Where its owner was in the last steps, for looks that become known later.
+        self._trace = np.zeros((0, 2), np.int64)
         self._sightings: list[I64] = []  # not collected yet
         self._ahead: _Look | None = None
 
@@ -115,7 +123,8 @@ class Cameras:
         common = getattr(owner.entity, "perception", None)  # users see what is there
         perceptions = [camera.perception or common for camera in cameras.values()]
         wrong = [not is_perfect(perception) for perception in perceptions]
-        self.errs = any(wrong)
+        self.drift = _drift_of(owner)
+        self.errs = any(wrong) or self.drift is not None
         scene = Scene(
             [other.name for other in self.others],
             [other.entity.radius * lattice.units_per_m for other in self.others],
@@ -231,12 +240,15 @@ class Cameras:
             found = None
         if found is None:
             found = self._look(bodies, end, stop=False)
+        rows = (
+            found.sightings if self.drift is None else self._misplaced(found.sightings, bodies, end)
+        )
         self.taken = end
-        if len(found.sightings):
-            self._sightings.append(found.sightings)
-        identity = found.sightings[:, IDENTITY]  # -1, somebody unknown, is the last row
-        self.perceived[identity, 0] = found.sightings[:, X]
-        self.perceived[identity, 1] = found.sightings[:, Y]
+        if len(rows):
+            self._sightings.append(rows)
+        identity = rows[:, IDENTITY]  # -1, somebody unknown, is the last row
+        self.perceived[identity, 0] = rows[:, X]
+        self.perceived[identity, 1] = rows[:, Y]
         names, entity = self.event_names, self.owner.name
         return [
             Event(step, entity, names[kind], self.name_of(identity))
@@ -253,6 +265,23 @@ class Cameras:
                 place = self.perceived[index.get(event.detail, len(index))]
                 x, y = lattice.to_metres(place).tolist()
                 yield self.row, SightEvent(event.event, event.detail, x, y)
+
+    def _misplaced(self, rows: I64, bodies: Bodies, end: int) -> I64:
+        """Return sightings as they are off with where their owner believes to be."""
+        drift, latest = self.drift, int(self.lenses.latency.max())
+        assert drift is not None
+        if not len(rows) and not latest:
+            return rows
+        block = bodies.block(self.taken, end)
+        now = np.stack([block.x[self.row], block.y[self.row]], axis=1)
+        trace = np.concatenate([self._trace, now])
+        looks = rows[:, STEP] - self.lenses.latency[rows[:, CAMERA]]
+        robot_x, robot_y = trace[looks - (end - len(trace))].T
+        rows = rows.copy()
+        rows[:, X], rows[:, Y] = drift.misplace(rows[:, X], rows[:, Y], robot_x, robot_y, looks)
+        rows[:, HEADING] = (rows[:, HEADING] + drift.at(looks).turn) % TURN
+        self._trace = trace[len(trace) - min(latest, len(trace)) :]
+        return rows
 
     def collect(self) -> I64:
         """Hand over what was perceived since this was called last, int64 (n, SIGHTING)."""
@@ -292,6 +321,14 @@ class Cameras:
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
         return _Look(self.taken + done, sightings, events, before)
+
+
+def _drift_of(owner: Actor) -> Drift | None:
+    settings: Localization | None = getattr(owner.entity, "localization", None)
+    if settings is None:
+        return None
+    lattice, clock = owner.home.plan.lattice, owner.clock
+    return Drift(settings, lattice.units_per_m, clock.step_us, owner.seed, owner.path)
 
 
 class _Look(NamedTuple):

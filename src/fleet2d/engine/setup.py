@@ -208,4 +208,5 @@ def _log(
     paths = {actor.name: actor.path for actor in actors}
     log = Log(home, paths, bodies, recorder.activities)
     log.cameras = [(those.index, name) for those in cameras for name in those.names]
+    log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
     return log

@@ -9,6 +9,7 @@ from fleet2d.component import OneOf, Settings
 from fleet2d.entities.battery import Battery
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.giving_way import GivesWay
+from fleet2d.entities.localization import Localization
 from fleet2d.entities.place import Place
 from fleet2d.problems import problem_at
 from fleet2d.sight.camera import Camera
@@ -108,6 +109,9 @@ class Robot(Entity):
     gives_way: GivesWay | None = Field(
         default=None,
         description="how it keeps clear of people; null: it drives on, and people go round it",
+    )
+    localization: Localization | None = Field(
+        default=None, description="how wrong it is about where it is; null: it knows"
     )
     sight_events: ClassVar[tuple[str, str]] = ("user_lost", "user_seen")
 

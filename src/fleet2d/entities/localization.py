@@ -1,0 +1,194 @@
+"""Localization: how wrong a robot is about where it is, and so about where it sees people."""
+
+from datetime import timedelta
+from functools import cache
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from fleet2d.component import Settings
+from fleet2d.kernels.headings import QUARTER, TURN, UNIT, cosine
+from fleet2d.kernels.random import BELL_STD, random_bell, random_below, random_uniform
+from fleet2d.kernels.timelines import Window
+from fleet2d.problems import problem_at
+from fleet2d.streams import stream_key
+from fleet2d.units import AngleDeg, Length, PositiveDuration, micros
+
+LONGEST = timedelta(days=1)
+MINUTE_US = 60_000_000
+# Noise is 2**-16 of what it is added to, per unit of random_bell.
+FINE = 1 << 16
+PURPOSES = (
+    "drift x", "drift y", "turn", "left x", "left y", "jump x", "jump y", "jumps", "when",
+)  # fmt: skip
+
+I64 = NDArray[np.int64]
+
+
+class Localization(Settings):
+    """How wrong a robot is about where it is. Left as it is, it knows.
+
+    The error drifts away from what is left of it after a correction, may jump once between two
+    corrections, and is corrected again at fixed intervals. What the robot sees is off with it.
+    """
+
+    drift: Length = Field(
+        default=0.0, ge=0, le=10, description="standard deviation per axis a minute after [m]"
+    )
+    drift_deg: AngleDeg = Field(
+        default=0.0, ge=0, le=90, description="likewise of its heading [deg]"
+    )
+    jump: Length = Field(
+        default=0.0, ge=0, le=100, description="standard deviation per axis of a jump [m]"
+    )
+    jumps_per_hour: float = Field(default=0.0, ge=0, description="how often the error jumps")
+    corrected_every: PositiveDuration = Field(
+        default=timedelta(minutes=10), description="time from correction to correction"
+    )
+    left: Length = Field(
+        default=0.0, ge=0, le=10, description="standard deviation per axis after a correction [m]"
+    )
+
+    @model_validator(mode="after")
+    def _jumps_at_most_once(self) -> Self:
+        if self.corrected_every > LONGEST:
+            raise problem_at(("corrected_every",), "at most a day is between two corrections")
+        expected = self.jumps_per_hour * self.corrected_every / timedelta(hours=1)
+        if expected > 1:
+            raise problem_at(
+                ("jumps_per_hour",),
+                f"{expected:g} jumps between two corrections: at most one is possible;"
+                " correct more often, or have fewer",
+            )
+        return self
+
+
+class Offsets(NamedTuple):
+    """Where a robot believes to be, less where it is: int64 (n,) each."""
+
+    x: I64  # lattice units
+    y: I64
+    turn: I64  # 1/4096 turn
+
+
+class Runs(NamedTuple):
+    """Poses of a body, one run for each step: a window as those who read poses need it."""
+
+    first: int
+    end: int
+    step: I64
+    x: I64
+    y: I64
+    heading: I64
+    away: NDArray[np.uint8]
+
+
+class Drift:
+    """The error of one robot in a run: a function of the step alone.
+
+    Example:
+        >>> drift = Drift(Localization(drift="2 cm", corrected_every="5 min"), 1280, 10**6, 4, "me")
+        >>> at = drift.at(np.array([0, 150, 299, 300]))
+        >>> bool(at.x[0] == 0 == at.x[3]), bool(abs(at.x[2]) > abs(at.x[1]) > 0)
+        (True, True)
+    """
+
+    def __init__(
+        self, settings: Localization, units_per_m: float, step_us: int, seed: int, path: str
+    ) -> None:
+        """Give each draw a stream of its own.
+
+        Args:
+            settings: How it errs.
+            units_per_m: Lattice units of a metre.
+            step_us: Length of a step.
+            seed: Of the run.
+            path: Of the robot.
+        """
+        self._step_us, self._every_us = step_us, micros(settings.corrected_every)
+        hours = settings.corrected_every / timedelta(hours=1)
+        self._jump_chance = settings.jumps_per_hour * hours
+        self._drift, self._jump, self._left = (
+            _noise(metres * units_per_m)
+            for metres in (settings.drift, settings.jump, settings.left)
+        )
+        self._turn = _noise(settings.drift_deg / 360 * TURN)
+        self._keys = {p: stream_key(seed, path, f"localization: {p}") for p in PURPOSES}
+
+    def at(self, steps: I64) -> Offsets:
+        """Return the error at some steps, in any order."""
+        moments = steps * self._step_us
+        numbers, which = np.unique(moments // self._every_us, return_inverse=True)
+        intervals: list[int] = numbers.tolist()
+        elapsed_us = moments - numbers[which] * self._every_us
+        jumps_at = np.array([self._jumps_at(interval) for interval in intervals], np.int64)
+        jumped = elapsed_us >= jumps_at[which]
+
+        def drawn(purpose: str, noise: int) -> I64:
+            """Return a draw of the interval of each step."""
+            draws = [self._draw(purpose, interval) for interval in intervals]
+            return (np.array(draws, np.int64) * noise)[which]
+
+        x, y = (
+            drawn(f"left {axis}", self._left)
+            + jumped * drawn(f"jump {axis}", self._jump)
+            + _after(drawn(f"drift {axis}", self._drift), elapsed_us)
+            for axis in "xy"
+        )
+        turn = _after(drawn("turn", self._turn), elapsed_us)
+        return Offsets(x // FINE, y // FINE, turn // FINE)
+
+    def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:
+        """Return where the robot puts points [lattice] that it sees at some steps.
+
+        Args:
+            x: Where they are, int64 (n,).
+            y: Likewise.
+            robot_x: Where the robot is, int64 (n,).
+            robot_y: Likewise.
+            steps: int64 (n,).
+        """
+        off = self.at(steps)
+        along, up = _cosines()[off.turn % TURN], _cosines()[(off.turn - QUARTER) % TURN]
+        dx, dy, half = x - robot_x, y - robot_y, UNIT // 2
+        return (
+            robot_x + off.x + (dx * along - dy * up + half) // UNIT,
+            robot_y + off.y + (dx * up + dy * along + half) // UNIT,
+        )
+
+    def believed(self, runs: Window) -> Runs:
+        """Return the poses that the robot believes to have."""
+        lengths = np.diff(runs.step, append=runs.end)
+        steps = np.arange(runs.first, runs.end, dtype=np.int64)
+        off = self.at(steps)
+        x, y, heading = (np.repeat(column, lengths) for column in (runs.x, runs.y, runs.heading))
+        away = np.repeat(runs.away, lengths)
+        turned = (heading + off.turn) % TURN
+        return Runs(runs.first, runs.end, steps, x + off.x, y + off.y, turned, away)
+
+    def _draw(self, purpose: str, interval: int) -> int:
+        return int(random_bell(self._keys[purpose], interval))
+
+    def _jumps_at(self, interval: int) -> int:
+        """Return when in an interval the error jumps [us]; its end if it doesn't."""
+        if random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
+            return self._every_us
+        return int(random_below(self._keys["when"], interval, self._every_us))
+
+
+@cache
+def _cosines() -> I64:
+    """Return the cosines of all headings, in 1/UNIT."""
+    return np.array([cosine(heading) for heading in range(TURN)], np.int64)
+
+
+def _noise(deviation: float) -> int:
+    return round(deviation / BELL_STD * FINE)
+
+
+def _after(speed: I64, elapsed_us: I64) -> I64:
+    """Return a drift per minute after some time; milliseconds keep it inside 64 bits."""
+    drifted: I64 = speed * (elapsed_us // 1000) // (MINUTE_US // 1000)
+    return drifted

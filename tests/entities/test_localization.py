@@ -1,0 +1,167 @@
+"""Localization: where a robot believes to be, and where it puts what it sees."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import digests, path, run, scenario, table
+
+import fleet2d
+from fleet2d import Algorithm
+from fleet2d.entities.localization import Drift, Localization
+from fleet2d.errors import InputError
+from fleet2d.kernels.headings import TURN, UNIT, cosine, sine
+from fleet2d.kernels.random import random_bell, random_below, random_uniform
+from fleet2d.streams import stream_key
+
+WRONG = {
+    "drift": "5 cm", "drift_deg": 1, "jump": "50 cm", "jumps_per_hour": 10,
+    "corrected_every": "4 min", "left": "3 cm",
+}  # fmt: skip
+MINUTE_US = 60_000_000
+
+
+def lost(duration: str = "30 min", camera: Any = None, **localization: Any) -> dict[str, Any]:
+    """A robot that goes about and sees Ana, who walks."""
+    robot = {"type": "meander", "camera": camera or {"angle_deg": 360, "range": [0, 8]}}
+    if localization:
+        robot["localization"] = localization
+    return scenario(duration, users={"ana": {"type": "meander"}}, robots={"astro": robot})
+
+
+def slow_offset(settings: Localization, step: int, units: float = 1280) -> tuple[int, int, int]:
+    """The error at a step, draw by draw."""
+    every_us = int(settings.corrected_every.total_seconds() * 10**6)
+    interval, elapsed_us = divmod(step * 10**6, every_us)
+
+    def draw(purpose: str) -> int:
+        return random_bell(stream_key(4, "robots.astro", f"localization: {purpose}"), interval)
+
+    def key(purpose: str) -> Any:
+        return stream_key(4, "robots.astro", f"localization: {purpose}")
+
+    def noise(value: float) -> int:
+        return round(value / 209.0215299915 * 65536)
+
+    def grown(value: int) -> int:
+        return value * (elapsed_us // 1000) // 60_000
+
+    hours = settings.corrected_every.total_seconds() / 3600
+    jumps = random_uniform(key("jumps"), interval) < settings.jumps_per_hour * hours
+    jumped = jumps and elapsed_us >= random_below(key("when"), interval, every_us)
+    offset = []
+    for axis in "xy":
+        value = draw(f"left {axis}") * noise(settings.left * units)
+        value += draw(f"jump {axis}") * noise(settings.jump * units) if jumped else 0
+        value += grown(draw(f"drift {axis}") * noise(settings.drift * units))
+        offset.append(value // 65536)
+    turn = grown(draw("turn") * noise(settings.drift_deg / 360 * TURN)) // 65536
+    return offset[0], offset[1], turn
+
+
+def test_the_error_is_that_of_its_slow_twin() -> None:
+    settings = Localization.model_validate(WRONG)
+    drift = Drift(settings, 1280, 10**6, 4, "robots.astro")
+    steps = np.array([0, 1, 100, 239, 240, 241, 3600, 86_399, 10**7, 17])
+    fast = drift.at(steps)
+    slow = [slow_offset(settings, step) for step in steps.tolist()]
+    assert slow == list(zip(*(column.tolist() for column in fast), strict=True))
+
+
+def test_points_are_put_where_its_slow_twin_puts_them() -> None:
+    settings = Localization.model_validate(WRONG)
+    drift = Drift(settings, 1280, 10**6, 4, "robots.astro")
+    steps = np.arange(0, 5000, 97)
+    draws = np.random.default_rng(1).integers(0, 20_000, (4, len(steps)))
+    placed = np.stack(drift.misplace(*draws, steps), axis=1).tolist()
+    for step, (x, y, at_x, at_y), point in zip(
+        steps.tolist(), draws.T.tolist(), placed, strict=True
+    ):
+        off_x, off_y, turn = slow_offset(settings, step)
+        along, up, half = cosine(turn % TURN), sine(turn % TURN), UNIT // 2
+        dx, dy = x - at_x, y - at_y
+        assert point == [
+            at_x + off_x + (dx * along - dy * up + half) // UNIT,
+            at_y + off_y + (dx * up + dy * along + half) // UNIT,
+        ]
+
+
+def test_errors_spread_as_configured() -> None:
+    settings = Localization(drift="10 cm", corrected_every="2 min", left="3 cm")  # type: ignore[arg-type]
+    drift = Drift(settings, 1280, 10**6, 4, "me")
+    begins = np.arange(4000) * 120
+    after = drift.at(begins + 119)
+    assert drift.at(begins).x.std() == pytest.approx(0.03 * 1280, rel=0.05)
+    spread = np.hypot(0.03, 0.10 * 119 / 60) * 1280
+    assert after.x.std() == pytest.approx(spread, rel=0.05)
+    assert after.y.std() == pytest.approx(spread, rel=0.05)
+    assert abs(np.corrcoef(after.x, after.y)[0, 1]) < 0.06
+
+
+def test_jumps_are_as_frequent_as_configured() -> None:
+    settings = Localization(jump="1 m", jumps_per_hour=3, corrected_every="10 min")  # type: ignore[arg-type]
+    drift = Drift(settings, 1280, 10**6, 4, "me")
+    ends = drift.at(np.arange(3000) * 600 + 599)
+    assert (ends.x != 0).mean() == pytest.approx(0.5, abs=0.03)
+
+
+def test_what_is_seen_is_off_as_the_robot_is() -> None:
+    stored = run(lost(left="40 cm", corrected_every="5 min"))
+    rows = table(stored, "observations")
+    assert len(rows["step"]) > 100
+    off = np.stack([rows["x"] - rows["true_x"], rows["y"] - rows["true_y"]], axis=1)
+    interval = rows["step"] // 300
+    for number in np.unique(interval):  # no turn, no drift: the same for all of an interval
+        assert np.ptp(off[interval == number], axis=0).max() < 2e-3
+    assert 0.05 < np.hypot(*off.T).mean() < 1.5
+
+
+@pytest.mark.parametrize("camera", [None, {"angle_deg": 360, "range": [0, 8], "latency": "7 s"}])
+def test_spans_do_not_show(camera: Any) -> None:
+    content = lost("20 min", camera, **WRONG)
+    first, *others = (digests(run(content, max_span=span)) for span in (None, 61, 1))
+    assert all(first == other for other in others)
+
+
+def test_nobody_moves_otherwise_and_off_is_as_if_it_were_not_there() -> None:
+    without, errs = run(lost()), run(lost(**WRONG))
+    for name in ("ana", "astro"):
+        assert np.array_equal(path(without, name).x, path(errs, name).x)
+    seen, wrong = table(without, "observations"), table(errs, "observations")
+    assert np.array_equal(seen["step"], wrong["step"])
+    assert "true_x" not in seen
+    assert np.array_equal(seen["x"], wrong["true_x"])
+    content = lost()
+    content["robots"]["astro"]["localization"] = None
+    assert digests(without) == digests(run(content))
+
+
+class Watch(Algorithm):
+    """Tells where the robot believed to be at first."""
+
+    def update(self, history: Any, state: Any) -> Any:
+        return {"x": float(history.poses("astro").x[0])}
+
+
+def test_algorithms_are_told_where_the_robot_believes_to_be() -> None:
+    content = lost(left="50 cm", corrected_every="10 min")
+    content["algorithms"] = {"watch": {"type": f"{__file__}:Watch", "period": "10 min"}}
+    stored = run(content)
+    off = table(stored, "watch")["x"] - path(stored, "astro").x[[0, 600, 1200]]
+    drift = Drift(Localization(left="50 cm"), 1280, 10**6, 4, "robots.astro")  # type: ignore[arg-type]
+    assert drift.at(np.array([0, 600, 1200])).x / 1280 == pytest.approx(off, abs=1e-3)
+    assert np.abs(off).min() > 0
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"jumps_per_hour": 20}, "at most one"),
+        ({"corrected_every": "2 d"}, "at most a day"),
+        ({"drift": -1}, "localization.drift"),
+        ({"drifts": 1}, "Did you mean|did you mean|Allowed"),
+    ],
+)
+def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fleet2d.load_scenario(lost(**fields))
