@@ -290,7 +290,7 @@ def test_abandoned_run_is_readable(tmp_path: Path) -> None:
     store = opened(tmp_path / "run", EVERY_KIND, flush_rows=64)
     rows = rows_of_every_kind(300)
     store.append("every_kind", **part(rows, 0, 130))
-    store.abandon()
+    store.close("interrupted")
 
     run = open_run(tmp_path / "run")
     assert "interrupted" == run.status
@@ -311,7 +311,7 @@ def test_close_after_an_interrupted_close(tmp_path: Path, monkeypatch: pytest.Mo
         patch.setattr("fleet2d.artifacts.store.sync_directory", interrupt)
         with pytest.raises(KeyboardInterrupt):
             store.close()
-    store.abandon()
+    store.close("interrupted")
 
     assert "interrupted" == open_run(tmp_path / "run").status
     assert [] == open_run(tmp_path / "run").verify()

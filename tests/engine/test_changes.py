@@ -11,7 +11,7 @@ from tests.scenes import digests, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, ComponentError, InputError
-from fleet2d.engine.changes import crossings
+from fleet2d.engine.passing import crossings
 from fleet2d.floorplan.home.change import HomeChange, HomeChanges
 from fleet2d.kernels.motion import Breakpoints
 

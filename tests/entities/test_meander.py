@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tests.scenes import OWN, path, run, scenario
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.plan import Walk
+from fleet2d.entities.motion import Walk
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.objects import POSTURES
 

@@ -13,7 +13,7 @@ from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.flashlight import Flashlight
-from fleet2d.view.fov import Pose, cells_panel, draw_fov, draw_fov_alone, parse_pose, region_panel
+from fleet2d.view.fov import Pose, cells_panel, draw_fov, parse_pose, region_panel
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +62,11 @@ def test_both_panels_show_what_is_in_view_and_only_that(plan: FloorPlan) -> None
 
 
 def test_pictures_are_written_the_same_twice(plan: FloorPlan, tmp_path: Path) -> None:
-    for draw in (draw_fov, draw_fov_alone):
-        for ending in (".png", ".svg"):
-            files = [tmp_path / f"{n}{ending}" for n in "ab"]
-            for file in files:
-                draw(plan, Pose(2.5, 2.5, 30.0), file)
-            assert files[0].read_bytes() == files[1].read_bytes()
+    for ending in (".png", ".svg"):
+        files = [tmp_path / f"{n}{ending}" for n in "ab"]
+        for file in files:
+            draw_fov(plan, Pose(2.5, 2.5, 30.0), file)
+        assert files[0].read_bytes() == files[1].read_bytes()
 
 
 def test_pose_in_a_wall_or_a_wrong_ending_writes_nothing(plan: FloorPlan, tmp_path: Path) -> None:

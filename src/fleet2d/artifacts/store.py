@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.buffer import FLUSH_ROWS, Checked, TableBuffer
-from fleet2d.artifacts.chunk import Chunk
 from fleet2d.artifacts.digest import TableDigest, run_digest
 from fleet2d.artifacts.directory import (
     cannot_write,
@@ -22,32 +20,14 @@ from fleet2d.artifacts.files import sync_directory, write_atomically
 from fleet2d.artifacts.journal import Commit
 from fleet2d.artifacts.ledger import Ledger, columns_of, remove_leftovers
 from fleet2d.artifacts.lock import LOCK_NAME
-from fleet2d.artifacts.manifest import (
-    FILE_NAME,
-    ColumnRecord,
-    Manifest,
-    Status,
-    TableRecord,
-)
+from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status
 from fleet2d.artifacts.seal import make_seal
 from fleet2d.artifacts.table import TableSpec
+from fleet2d.artifacts.table_writer import TableWriter
 from fleet2d.errors import ArtifactError, RunDirectoryError
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-    from fleet2d.artifacts.arrow import ParquetTable
-
-
-@dataclass
-class _Table:
-    """One table on its way: what waits, what is kept, and the digest so far."""
-
-    buffer: TableBuffer
-    digest: TableDigest
-    kept: list[tuple[Chunk, int]] = field(default_factory=list)
-    file: ParquetTable | None = None
-    logged: int = 0  # rows in the buffer that the journal has
 
 
 class RunStore:
@@ -68,7 +48,7 @@ class RunStore:
         >>> store = RunStore(None, [spec])
         >>> store.append("events", step=[0, 5], what=["seen", "lost"])
         >>> _ = store.close()
-        >>> store.run().tables["events"].num_rows
+        >>> store.arrow("events").num_rows
         2
     """
 
@@ -85,7 +65,7 @@ class RunStore:
         self.manifest = manifest or Manifest()
         self._root = None if self.directory is None else self.directory.absolute()
         self._flush_rows = flush_rows
-        self._tables: dict[str, _Table] = {}
+        self._tables: dict[str, TableWriter] = {}
         self._made: list[Path] = []
         self._digests: dict[str, str] | None = None
         self._is_open = directory is None
@@ -97,9 +77,7 @@ class RunStore:
     def hash_again(self) -> None:
         """Make the digests of a run in memory anew from its rows, which a file alone holds."""
         for entry in self._tables.values():
-            entry.digest = TableDigest(entry.buffer.spec)
-            for chunk, rows in entry.kept:
-                entry.digest.update(chunk, rows)
+            entry.hash_again()
 
     def check(self) -> None:
         """Say, without writing, that the directory can't be used: worth asking before set-up.
@@ -196,7 +174,7 @@ class RunStore:
         self._check_usable()
         with self._writing("the journal"):
             for entry in self._tables.values():
-                self._log(entry)
+                entry.log(self._ledger)
             return self._ledger_of().commit(step, sync=sync)
 
     def add_table(self, spec: TableSpec) -> None:
@@ -208,7 +186,8 @@ class RunStore:
         self._check_usable()
         known = self._tables.get(spec.name)
         if known is None:
-            self._tables[spec.name] = _Table(TableBuffer(spec, self._flush_rows), TableDigest(spec))
+            buffer = TableBuffer(spec, self._flush_rows)
+            self._tables[spec.name] = TableWriter(buffer, TableDigest(spec))
         elif known.buffer.spec != spec:
             raise ArtifactError(
                 f"there is a table {spec.name!r} with other columns already: name yours otherwise"
@@ -237,7 +216,7 @@ class RunStore:
         entry = self._tables[table]
         self._fill(entry, entry.buffer.check(columns))
 
-    def _fill(self, entry: _Table, checked: Checked, *, log: bool = True) -> None:
+    def _fill(self, entry: TableWriter, checked: Checked, *, log: bool = True) -> None:
         """Take rows; those that the journal has already are not logged."""
         start = 0
         while start < checked.rows:
@@ -296,7 +275,9 @@ class RunStore:
             raise ArtifactError("the run directory is not open: call open() before close()")
         digests = self.close_tables()
         self.manifest.status = status
-        self.manifest.tables = {name: self._described(name) for name in sorted(digests)}
+        self.manifest.tables = {
+            name: self._tables[name].record(digests[name]) for name in sorted(digests)
+        }
         self.manifest.digest = run_digest(digests)
         if self._root is not None:
             with self._writing(FILE_NAME):
@@ -305,10 +286,6 @@ class RunStore:
                 sync_directory(self._root)
             self._ledger_of().end(keep=status != "complete")
         return digests
-
-    def abandon(self) -> dict[str, str]:
-        """End a run that was interrupted: what was stored until now stays readable."""
-        return self.close("interrupted")
 
     def discard(self) -> None:
         """Take back everything that was made, for a run that failed before its first step."""
@@ -330,13 +307,13 @@ class RunStore:
         """Whether the run is closed, so that it can be read back."""
         return self._digests is not None
 
-    def _flush(self, entry: _Table) -> None:
+    def _flush(self, entry: TableWriter) -> None:
         """Hash the rows that wait, and write or keep them."""
         rows = entry.buffer.rows
         if not rows:
             return
         with self._writing("the journal"):
-            self._log(entry)
+            entry.log(self._ledger)
         chunk = entry.buffer.take(reuse=self._root is not None)
         entry.logged = 0
         entry.digest.update(chunk, rows)
@@ -345,48 +322,22 @@ class RunStore:
             return
         name = entry.buffer.spec.name
         with self._writing(f"{name}.parquet", entry):
-            self._file_of(entry, self._root).write(chunk, rows, entry.buffer.words)
-
-    def _log(self, entry: _Table) -> None:
-        """Write the rows of a table to the journal that it doesn't have yet."""
-        first, buffer = entry.logged, entry.buffer
-        if self._ledger is None or first == buffer.rows:
-            return
-        chunk = buffer.peek(first)
-        self._ledger.journal.add(buffer.spec, chunk, buffer.rows - first, buffer.words)
-        entry.logged = buffer.rows
+            entry.file_in(self._root).write(chunk, rows, entry.buffer.words)
 
     def _ledger_of(self) -> Ledger:
         assert self._ledger is not None, "a run in memory has no ledger"
         return self._ledger
 
-    def _file_of(self, entry: _Table, root: Path) -> ParquetTable:
-        from fleet2d.artifacts.arrow import ParquetTable
-
-        if entry.file is None:
-            entry.file = ParquetTable(root, entry.buffer.spec)
-        return entry.file
-
     def _finish_files(self, root: Path) -> None:
         """Make every file whole before any gets its name."""
         for name, entry in self._tables.items():
             with self._writing(f"{name}.parquet", entry):
-                self._file_of(entry, root).finish()
+                entry.file_in(root).finish()
         for name, entry in self._tables.items():
             with self._writing(f"{name}.parquet"):
-                self._file_of(entry, root).publish()
+                entry.file_in(root).publish()
         with self._writing("the directory"):
             sync_directory(root)
-
-    def _described(self, name: str) -> TableRecord:
-        """Return what the manifest says about a table."""
-        entry = self._tables[name]
-        columns = [
-            ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
-            for column in entry.buffer.spec.columns
-        ]
-        digest = self._digests[name] if self._digests else None
-        return TableRecord(rows=entry.digest.rows, digest=digest, columns=columns)
 
     def _check_usable(self) -> None:
         self._check_failure()
@@ -398,7 +349,7 @@ class RunStore:
             raise self._failure
 
     @contextmanager
-    def _writing(self, what: str, entry: _Table | None = None) -> Iterator[None]:
+    def _writing(self, what: str, entry: TableWriter | None = None) -> Iterator[None]:
         """Turn a failed write into the end of the run, marked as failed."""
         try:
             yield
@@ -418,7 +369,7 @@ class RunStore:
             )
             raise self._failure from error
 
-    def _mark_failed(self, reason: str, entry: _Table | None) -> bool:
+    def _mark_failed(self, reason: str, entry: TableWriter | None) -> bool:
         """Leave the files partial; return whether the manifest could still say so."""
         for other in self._tables.values():
             if other.file is not None:
@@ -426,23 +377,23 @@ class RunStore:
         self._ledger_of().end(keep=True, undo=True)
         self.manifest.status = "failed"
         self.manifest.notes.append(reason)
-        return self._try_manifest() or (
+        return _try_write(self.manifest, self._root) or (
             # The file is lost; what it takes up is enough for a manifest on a full disk.
             entry is not None
             and entry.file is not None
             and entry.file.empty()
-            and self._try_manifest()
+            and _try_write(self.manifest, self._root)
         )
-
-    def _try_manifest(self) -> bool:
-        if self._root is None:
-            return False
-        try:
-            self.manifest.write(self._root)
-        except OSError:
-            return False
-        return True
 
 
 def _file_names(table: str) -> tuple[str, str]:
     return f"{table}.parquet", f"{table}.parquet.partial"
+
+
+def _try_write(manifest: Manifest, root: Path | None) -> bool:
+    """Write the manifest of a run that failed; return whether that worked."""
+    with suppress(OSError):
+        if root is not None:
+            manifest.write(root)
+            return True
+    return False

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.body import NEVER
-from fleet2d.entities.plan import Plan, Pose, Walk
+from fleet2d.entities.motion import Pose, Walk
+from fleet2d.entities.plan import Plan
 from fleet2d.kernels.motion import Breakpoints, Poses
 from fleet2d.kernels.timelines import Timelines, Window
 

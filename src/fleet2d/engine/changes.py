@@ -13,22 +13,20 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString
 
 from fleet2d.clock import Clock
+from fleet2d.engine.passing import crossings, way_ahead
 from fleet2d.entities.actor import Actor
+from fleet2d.entities.motion import Track
 from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.entities.objects.home_object import HomeObject
-from fleet2d.entities.plan import Track
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.arrangement import moved
-from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home, lattice_footprint
 from fleet2d.floorplan.home.space import grown_shape
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
-from fleet2d.kernels.motion import Breakpoints
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros
 
@@ -256,7 +254,7 @@ class Changes:
                 actor.ask(step)
             elif shape is not None and not self._passes(actor, shape):
                 zone = grown_shape(shape, actor.entity.radius * units)
-                way = _way_ahead(actor, step * self.clock.step_us)
+                way = way_ahead(actor, step * self.clock.step_us)
                 if way is not None and way.intersects(zone):
                     actor.ask(step)
 
@@ -360,42 +358,6 @@ class Changes:
             raise ScenarioError(
                 f"({x:g}, {y:g}) m is not in the home: {thing.name} can't stand there"
             )
-
-
-def crossings(track: Breakpoints, line: Segment) -> list[int]:
-    """Return the moments [us] at which a track goes through a segment, to the microsecond.
-
-    A leg that only touches the line counts once; one along the line doesn't.
-
-    Args:
-        track: The motion [lattice].
-        line: From jamb to jamb [lattice].
-    """
-    (ax, ay), (bx, by) = line
-    x, y = track.x, track.y
-    side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
-    legs = np.flatnonzero((side[:-1] > 0) != (side[1:] > 0))
-    found: list[int] = []
-    for i in legs.tolist():
-        px, py, qx, qy = int(x[i]), int(y[i]), int(x[i + 1]), int(y[i + 1])
-        a = (qx - px) * (ay - py) - (qy - py) * (ax - px)
-        b = (qx - px) * (by - py) - (qy - py) * (bx - px)
-        if (a > 0) != (b > 0) or 0 in (a, b):
-            near, far = abs(int(side[i])), abs(int(side[i + 1]))
-            begin, end = int(track.time[i]), int(track.time[i + 1])
-            found.append(begin + (end - begin) * near // max(near + far, 1))
-    return found
-
-
-def _way_ahead(actor: Actor, now_us: int) -> LineString | None:
-    """Return what is left of a body's way [lattice], or None when it only stays where it is."""
-    assert isinstance(actor.motion, Track)
-    track = actor.motion.breakpoints
-    ahead = track.time > now_us
-    points = np.stack(
-        [np.append(actor.state.x, track.x[ahead]), np.append(actor.state.y, track.y[ahead])], axis=1
-    )
-    return LineString(points) if (points != points[0]).any() else None
 
 
 def _corners(shape: shapely.Polygon) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from fleet2d.clock import Clock
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.ordering import in_order
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.plan import Track
+from fleet2d.entities.motion import Track
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.motion import Breakpoints

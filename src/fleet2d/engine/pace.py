@@ -23,6 +23,10 @@ class Pace:
         self.slice_s = speedup * self.LOOK_S
         self._began = time.perf_counter()
 
+    def steps(self, step_us: int) -> int:
+        """Return how many steps may be simulated between two looks at the clock."""
+        return max(1, int(self.slice_s * 1e6 / step_us))
+
     def resume(self, simulated_s: float) -> None:
         """Go on after a pause, as if no time had passed since `simulated_s`."""
         self._began = max(self._began, time.perf_counter() - simulated_s / self.speedup)

@@ -162,8 +162,6 @@ class Simulation(Steering):
                 step, act = read_intervention(record)
                 self._state.interventions.add(act, step)
 
-    # Copies
-
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return a simulation that goes on by itself.
 
@@ -324,8 +322,6 @@ class Simulation(Steering):
             notes = self._state.learners.remember(self._store.directory / LEARNED_NAME)
             self._store.manifest.notes += notes
 
-    # The loop
-
     def _run_to(
         self,
         end: int,
@@ -367,7 +363,8 @@ class Simulation(Steering):
     ) -> None:
         reported, state = time.perf_counter(), self._state
         while self.step < end and not self._stopping and spans != 0:
-            span = Span(self.step, self._slice(end))
+            most = self._pace.steps(self.clock.step_us) if self._pace else end
+            span = Span(self.step, min(end, self.step + most))
             for phase in PHASES:
                 phase(state, span)
             if self._keeper is not None:
@@ -379,20 +376,11 @@ class Simulation(Steering):
                 reported = time.perf_counter()
             spans = None if spans is None else spans - 1
 
-    def _slice(self, end: int) -> int:
-        """Return the step before which the next span ends at the latest, to keep the pace."""
-        if self._pace:
-            steps = int(self._pace.slice_s * 1e6 / self.clock.step_us)
-            end = min(end, self.step + max(1, steps))
-        return end
-
     def _set_pace(self) -> None:
         speedup = self.scenario.simulation.speedup
         if speedup:
             self._pace = self._pace or Pace(speedup)
             self._pace.resume(self.step * self.clock.step_us / 1e6)
-
-    # Closing
 
     def _stop(self) -> None:
         """Let the run end after the present span, where everything stored fits together."""

@@ -19,7 +19,7 @@ from fleet2d.artifacts.manifest import plain
 from fleet2d.engine import arrays
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
-from fleet2d.entities.plan import Track, Walk
+from fleet2d.entities.motion import Track, Walk
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.costmap import CostedSpace
 from fleet2d.floorplan.home.space import Space

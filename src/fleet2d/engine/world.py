@@ -7,7 +7,7 @@ from fleet2d.clock import Clock
 from fleet2d.engine.state import State
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.arbitration import Arbiter
-from fleet2d.entities.plan import Pose
+from fleet2d.entities.motion import Pose
 from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home

@@ -13,9 +13,10 @@ from fleet2d.entities.behavior import Attention, Behavior, Command, SightEvent, 
 from fleet2d.entities.body import NEVER, Body
 from fleet2d.entities.giving_way import JUST_WAITED, Crowd, GivesWay, Waiting
 from fleet2d.entities.kinds import is_kind
+from fleet2d.entities.motion import Motion, Pose
 from fleet2d.entities.orders import Order
 from fleet2d.entities.place import ANY, Point, is_point
-from fleet2d.entities.plan import Motion, Plan, Pose
+from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws

@@ -8,8 +8,9 @@ from pydantic import Field
 
 from fleet2d.component import Settings
 from fleet2d.entities.furniture import stop_at
+from fleet2d.entities.motion import Motion, Track
 from fleet2d.entities.place import Place
-from fleet2d.entities.plan import Motion, Note, Plan, Track
+from fleet2d.entities.plan import Note, Plan
 from fleet2d.units import PositiveDuration, Share, micros
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fleet2d.clock import Clock
 from fleet2d.entities.entity import Entity
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
+from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
-from fleet2d.entities.plan import Pose
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space

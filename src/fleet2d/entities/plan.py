@@ -1,7 +1,6 @@
 """Plans: the timed path that a behavior decided on, followed until it is over or interrupted."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -9,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.furniture import seat_at
+from fleet2d.entities.motion import Motion, Track, Walk
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels.headings import TURN, turn_between
-from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros
@@ -24,35 +23,6 @@ if TYPE_CHECKING:
     from fleet2d.entities.place import Point, RoomChoice
 
 I64 = NDArray[np.int64]
-
-
-class Pose(NamedTuple):
-    """Where a body is at one step: lattice units, 1/4096 turn, 1 = away."""
-
-    x: int
-    y: int
-    heading: int
-    away: int
-
-
-@dataclass(frozen=True)
-class Track:
-    """A motion known beforehand."""
-
-    breakpoints: Breakpoints
-    step_us: int
-
-
-@dataclass(frozen=True)
-class Walk:
-    """A random walk, drawn step by step."""
-
-    walls: Mesh
-    space: Mesh
-    rule: WalkRule
-
-
-Motion = Track | Walk
 
 
 class Note(NamedTuple):

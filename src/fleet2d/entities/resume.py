@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.entities.plan import Note, Plan, Track
+from fleet2d.entities.motion import Track
+from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints

@@ -8,8 +8,9 @@ from fleet2d.component import register
 from fleet2d.entities import orders
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.furniture import furniture_of
+from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point, matching_rooms
-from fleet2d.entities.plan import Plan, Pose
+from fleet2d.entities.plan import Plan
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
 from fleet2d.interventions.world import World

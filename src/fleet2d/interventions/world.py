@@ -5,7 +5,7 @@ from typing import Protocol
 
 from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.plan import Pose
+from fleet2d.entities.motion import Pose
 from fleet2d.events import EventKind
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander
-from fleet2d.entities.plan import Pose
+from fleet2d.entities.motion import Pose
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan

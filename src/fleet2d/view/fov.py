@@ -108,18 +108,6 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
         save_figure(figure, path)
 
 
-def draw_fov_alone(plan: FloorPlan, pose: Pose, path: Path) -> None:
-    """Draw a robot in its home, and its field of view; arguments as for `draw_fov`."""
-    check_picture(path)
-    VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)
-    with drawing_style():
-        figure = Figure(figsize=figure_size(plan), dpi=DPI)
-        FigureCanvasAgg(figure)
-        axes = figure.add_axes((0, 0, 1, 1))
-        region_panel(plan, pose, axes, "")
-        save_figure(figure, path)
-
-
 def region_panel(plan: FloorPlan, pose: Pose, axes: Axes, title: str) -> None:
     """Draw the exact region in view of a pose, and the sector that it is cut from."""
     _ground(plan, axes, title)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
@@ -11,6 +11,7 @@ from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import matching_rooms
 from fleet2d.entities.plan import Plan
+from fleet2d.entities.users.setting import Setting, settle_at
 from fleet2d.entities.users.spots import Seat, Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.kernels.headings import TURN, turn_between
@@ -37,26 +38,6 @@ NEARLY_OVER_US = 90 * SECOND_US
 AHEAD_US = 1800 * SECOND_US
 # One turns to the side by up to half of two to the power of that: an eighth of a turn.
 SIDEWAYS_BITS = 10
-
-
-class Setting(NamedTuple):
-    """Where and how a body does an activity in its home.
-
-    Attributes:
-        activity: What.
-        rooms: Where; none if it is done out of the home.
-        seats: At which furniture; none: anywhere in the rooms.
-        stores: Rooms from which it fetches things.
-        restless: What moves one, and the law of the time to the next such move [s].
-        fetch_takes: How long one is away to fetch something [s].
-    """
-
-    activity: Activity
-    rooms: list["Room"]
-    seats: list[Seat]
-    stores: list["Room"]
-    restless: tuple[tuple[str, Law], ...]
-    fetch_takes: Law
 
 
 @dataclass
@@ -215,7 +196,7 @@ class Inhabitant(Behavior):
             elif doing.activity != REST or doing.end - doing.begin >= NO_GAP_S:
                 if doing.role == RESUMES and last.base is not None:
                     last.place = last.base
-                    _settle_at(plan, setting, last.base)
+                    settle_at(plan, setting, last.base)
                 else:
                     last.place = self._go(plan, setting, draws)
                 if doing.role == PLANNED:
@@ -261,7 +242,7 @@ class Inhabitant(Behavior):
         place: Spot | Seat = (
             draws.choice(setting.seats) if setting.seats else draws.choice(self.spots.in_room(room))
         )
-        _settle_at(plan, setting, place)
+        settle_at(plan, setting, place)
         return place
 
     def _stay_in_the_room(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
@@ -270,7 +251,7 @@ class Inhabitant(Behavior):
         room = self.spots.room_at(plan.x, plan.y)
         seats = [] if room is None else self._within(setting, room).seats
         place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
-        _settle_at(plan, setting, place)
+        settle_at(plan, setting, place)
         return place
 
     def _nearest(self, plan: Plan, rooms: list["Room"]) -> "Room":
@@ -336,7 +317,7 @@ class Inhabitant(Behavior):
             plan.stay_until(plan.time_us + wait_us)
             spot.walk(plan)
             plan.stay(timedelta(microseconds=takes_us))
-            _settle_at(plan, setting, place)
+            settle_at(plan, setting, place)
 
     def _setting(self, actor: "Actor", activity: Activity) -> Setting:
         if activity.away:
@@ -398,13 +379,6 @@ def rooms_at(doings: Iterable[Doing], time_s: int, activities: dict[str, Activit
             activity = activities[doing.activity]
             return () if activity.away else activity.rooms
     return ("any",)
-
-
-def _settle_at(plan: Plan, setting: Setting, place: Spot | Seat) -> None:
-    """Go to a place and sit or lie down as the activity wants; on foot, as the furniture does."""
-    place.walk(plan)
-    if setting.activity.posture != "stand":
-        plan.take(setting.activity.posture)
 
 
 def _wait_us(law: Law, bits: Bits) -> int:

@@ -1,0 +1,69 @@
+"""One table of a run on its way: rows that wait, rows that are kept, and the digest so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fleet2d.artifacts.buffer import TableBuffer
+from fleet2d.artifacts.chunk import Chunk
+from fleet2d.artifacts.digest import TableDigest
+from fleet2d.artifacts.ledger import Ledger
+from fleet2d.artifacts.manifest import ColumnRecord, TableRecord
+
+if TYPE_CHECKING:
+    from fleet2d.artifacts.arrow import ParquetTable
+
+
+@dataclass
+class TableWriter:
+    """A table that is being written.
+
+    Attributes:
+        buffer: The rows that wait.
+        digest: Of the rows that left the buffer.
+        kept: Those rows, of a run in memory.
+        file: Where they are, of a run in a directory; None before the first.
+        logged: How many rows of the buffer the journal has.
+    """
+
+    buffer: TableBuffer
+    digest: TableDigest
+    kept: list[tuple[Chunk, int]] = field(default_factory=list)
+    file: ParquetTable | None = None
+    logged: int = 0
+
+    def hash_again(self) -> None:
+        """Make the digest anew from the rows that are kept."""
+        self.digest = TableDigest(self.buffer.spec)
+        for chunk, rows in self.kept:
+            self.digest.update(chunk, rows)
+
+    def log(self, ledger: Ledger | None) -> None:
+        """Write the rows to the journal that it doesn't have yet.
+
+        Raises:
+            OSError: They can't be written.
+        """
+        first, buffer = self.logged, self.buffer
+        if ledger is None or first == buffer.rows:
+            return
+        ledger.journal.add(buffer.spec, buffer.peek(first), buffer.rows - first, buffer.words)
+        self.logged = buffer.rows
+
+    def file_in(self, root: Path) -> ParquetTable:
+        """Return the file of the table, begun if there is none yet."""
+        from fleet2d.artifacts.arrow import ParquetTable
+
+        if self.file is None:
+            self.file = ParquetTable(root, self.buffer.spec)
+        return self.file
+
+    def record(self, digest: str) -> TableRecord:
+        """Return what the manifest says about the table."""
+        columns = [
+            ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
+            for column in self.buffer.spec.columns
+        ]
+        return TableRecord(rows=self.digest.rows, digest=digest, columns=columns)
