@@ -1,5 +1,6 @@
 """What the page is sent, of whole, damaged and unfinished runs."""
 
+import io
 import json
 import shutil
 from datetime import timedelta
@@ -155,3 +156,23 @@ def test_unfinished_run_is_shown_as_far_as_it_goes(copy: Path) -> None:
     assert "observations" not in [table["name"] for table in facts["tables"]]
     assert any("cut off" in note for note in facts["notes"])
     assert [] != next(t for t in facts["tables"] if t["name"] == "events")["columns"]
+
+
+def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: Path) -> None:
+    out = tmp_path / "cut"
+    simulation = fleet2d.Simulation(
+        "simulation.duration=6 h", "artifacts.checkpoint=1 h", seed=4, out=out
+    )
+    simulation.advance(4 * 3600)
+    copied = shutil.copytree(out, tmp_path / "copied")  # as a crash would leave it
+    simulation.finish()
+    client = client_of(copied)
+    facts = client.get("run/0/facts.json").json()
+    assert "running" == facts["status"]
+    for name in ("key_frames", "events", "observations"):
+        answer = client.get(f"run/0/tables/{name}.parquet")
+        assert 200 == answer.status_code
+        whole = pq.read_table(out / f"{name}.parquet")["step"].to_pylist()
+        steps = pq.read_table(io.BytesIO(answer.content))["step"].to_pylist()
+        assert 0 < len(steps) <= len(whole)
+        assert whole[: len(steps)] == steps or "key_frames" == name

@@ -92,7 +92,10 @@ class ShownRun:
         if name not in self.run.tables:
             raise ArtifactError(f"the run has no table {name!r}")
         if self.run.directory is not None:
-            return self.run.directory / f"{name}.parquet"
+            path = self.run.directory / f"{name}.parquet"
+            if path.is_file():
+                return path
+        # A run in memory, or one that was never closed, whose rows stand in its journal.
         return self._written(name, lambda: self.run.tables[name])
 
     def _written(self, name: str, table: Any) -> Path:
