@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fleet2d import cli
-from fleet2d.cli import paper
 from fleet2d.errors import InputError
+from fleet2d.paper import command as paper
 
 Result = tuple[int, str, str]
 TINY = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")

@@ -5,16 +5,15 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from fleet2d.calibrate.command import calibrating
-from fleet2d.cli import inputs, paper, pictures, runs, watching
+from fleet2d.cli import inputs, pictures, runs
+from fleet2d.cli.plugins import Commands
 from fleet2d.cli.reproduce import reproduce
 from fleet2d.cli.resume import resume
 from fleet2d.cli.verify import verify
 from fleet2d.errors import Fleet2DError, InputError
-from fleet2d.fit.command import fitting
-from fleet2d.studies.command import studying, tune
 
 app = typer.Typer(
+    cls=Commands,
     help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
     no_args_is_help=True,
     invoke_without_command=True,
@@ -28,21 +27,13 @@ for command in (
     inputs.schema,
     inputs.components,
     pictures.show,
-    watching.view,
-    watching.film,
-    watching.report,
     inputs.convert,
     runs.export,
     resume,
     verify,
     reproduce,
-    paper.reproduce_paper,
-    tune,
 ):
     app.command()(command)
-app.add_typer(fitting, name="fit")
-app.add_typer(calibrating, name="calibrate")
-app.add_typer(studying, name="study")
 
 
 @app.callback()

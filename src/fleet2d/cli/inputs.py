@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from fleet2d.cli.arguments import Resolution, file_name, split
+from fleet2d.arguments import Resolution, file_name, split
+from fleet2d.cli.plugins import converter
 from fleet2d.errors import InputError
 
 
@@ -141,9 +142,7 @@ def convert(
         save_floorplan(plan, new)
         remarks = list(plan.notes)
     else:
-        from fleet2d.published import convert_file
-
-        remarks = convert_file(old, new)
+        remarks = converter()(old, new)
     for remark in remarks:
         typer.echo(f"note: {remark}")
     typer.echo(new)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from fleet2d.cli.arguments import Resolution, ThemeChoice, file_name
+from fleet2d.arguments import Resolution, ThemeChoice, file_name
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 

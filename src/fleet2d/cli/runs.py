@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fleet2d.cli.arguments import file_name, split
+from fleet2d.arguments import file_name, split
 from fleet2d.cli.summary import print_summary, summary_of
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting

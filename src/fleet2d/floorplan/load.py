@@ -8,11 +8,12 @@ import re
 from pathlib import Path
 from typing import Any
 
+from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import HOMES, bundled_names
 from fleet2d.floorplan.formats.native import FORMAT, native_plan, read_native
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import YAML, read_document, read_yaml
+from fleet2d.floorplan.source import YAML, FloorPlanSource, read_document, read_yaml
 from fleet2d.problems import did_you_mean
 
 USUAL_CELL_M = 0.05
@@ -49,9 +50,11 @@ def load_floorplan(
         return read_native(HOMES / f"{plan}.json", usual)
     seed = SYNTHETIC.fullmatch(str(plan))
     if seed is not None:
-        from fleet2d.floorplan.synthetic.source import Synthetic
-
-        return Synthetic(seed=int(seed[1]), cell=usual).load()
+        home = lookup("floorplan", "synthetic").model_validate(
+            {"seed": int(seed[1]), "cell": usual}
+        )
+        assert isinstance(home, FloorPlanSource)
+        return home.load()
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
             f"there is no floor plan file {str(plan)!r}, and no bundled home of that name"
