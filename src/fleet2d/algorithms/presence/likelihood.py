@@ -286,8 +286,10 @@ class Sightings(NamedTuple):
     @classmethod
     def of(cls, seen: I64) -> Self:
         """Return the sightings in counts (bins, users + 1, patches), as in Parts."""
-        bins, user, patch = np.nonzero(seen > 0)  # quicker than of the numbers themselves
-        return cls(user, bins, patch, seen[bins, user, patch])._by_user()
+        steps = seen.ravel()
+        places = np.flatnonzero(steps > 0)  # quicker than with three axes, or of the numbers
+        bins, user, patch = np.unravel_index(places, seen.shape)
+        return cls(user, bins, patch, steps[places])._by_user()
 
     @classmethod
     def joined(cls, parts: Sequence[Self], lengths: Sequence[int]) -> Self:
