@@ -3,10 +3,11 @@
 The robot learns where she is. Four times a day it is called to find her; then the simulation is
 copied as it stands, and in each copy another policy goes on: what differs is due to it alone.
 
-    python examples/compare_find.py
+    python examples/compare_find.py [DAYS]
 """
 
 import copy
+import sys
 from datetime import timedelta
 from typing import Any
 
@@ -16,7 +17,8 @@ from fleet2d import Simulation
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
 
 POLICIES = ("random", "nearest", "likeliest", "greedy", "exact", "receding")
-CALLS, DAYS, DEADLINE, SPEED = (10, 13, 18, 21), range(5, 17), 300.0, 0.6
+CALLS, DEADLINE, SPEED = (10, 13, 18, 21), 300.0, 0.6
+DAYS = range(5, 5 + int(sys.argv[1]) if len(sys.argv) > 1 else 17)
 FIND = {"type": "find", "user": "ana", "source": "rtp", "at": [f"{h}:00" for h in CALLS]}
 
 

@@ -3,9 +3,10 @@
 Every component draws from random streams of its own, so adding a robot leaves Ana's life identical,
 step by step. What differs between the two runs of a seed is then due to the robot alone.
 
-    python examples/compare_seeds.py
+    python examples/compare_seeds.py [SEEDS]
 """
 
+import sys
 from datetime import timedelta
 
 import numpy as np
@@ -17,9 +18,9 @@ SECOND = {"bolt": {"type": "patrol", "order": "random", "dwell": "2 min", "start
 
 
 def main() -> None:
-    """Compare the share of her time at home in which Ana is seen, over five seeds."""
-    gains = []
-    for seed in range(5):
+    """Compare the share of her time at home in which Ana is seen, over some seeds."""
+    gains, seeds = [], int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    for seed in range(seeds):
         one = fleet2d.run(WEEK, seed=seed)
         two = fleet2d.run(WEEK, seed=seed, robots=SECOND)  # merged: astro stays
         life, again = (run.path("ana", every=timedelta(minutes=1)) for run in (one, two))

@@ -1,7 +1,9 @@
-"""A new long-term presence in one file, beside the built-in ones, over ten synthetic homes.
+"""A new long-term presence in one file, beside the built-in ones, over some synthetic homes.
 
-python examples/own_presence/compare.py
+python examples/own_presence/compare.py [HOMES]
 """
+
+import sys
 
 import numpy as np
 
@@ -43,5 +45,6 @@ def errors(home: int) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    rows = [errors(home) for home in range(10)]
+    homes = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    rows = [errors(home) for home in range(homes)]
     print({name: round(float(np.mean([row[name] for row in rows])), 3) for name in rows[0]})
