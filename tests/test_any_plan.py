@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import pytest
+from tests.homes import plan_files
 
 import fleet2d
 
 
 def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
-    plans = sorted((shared_data / "houseexpo").glob("*.json"))
-    assert 50 == len(plans)
+    plans = plan_files(shared_data)
     for plan in plans:
         overrides = (
             "floorplan.type=houseexpo",

@@ -75,7 +75,7 @@ def test_region_holds_exactly_the_points_in_line_of_sight(
     check_verdicts(home, shuffled(home.mesh, rng), rng, eyes=1, count=4)
 
 
-def test_region_holds_exactly_the_points_in_line_of_sight_in_fifty_homes(shared_data: Path) -> None:
+def test_region_holds_exactly_the_points_in_line_of_sight_in_real_homes(shared_data: Path) -> None:
     rng = np.random.default_rng(3)
 
     for home in all_homes(shared_data):

@@ -81,7 +81,7 @@ def test_cells_round_a_pillar_are_those_that_brute_force_finds(
         assert np.array_equal(expected, found_in(ROOM, ROOM.mesh, pose, Reach(4900, 490_000, half)))
 
 
-def test_cells_are_those_in_line_of_sight_in_fifty_homes_turned_and_mirrored(
+def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(
     shared_data: Path,
 ) -> None:
     rng = np.random.default_rng(8)
@@ -95,7 +95,7 @@ def test_cells_are_those_in_line_of_sight_in_fifty_homes_turned_and_mirrored(
                 expected = by_lines(turned, pose, reach)
                 assert np.array_equal(expected, found_in(turned, turned.mesh, pose, reach)), pose
                 compared += expected.size
-    assert compared > 10_000_000
+    assert compared > 200_000 * (number + 1)
 
 
 def test_everything_in_view_all_round_is_free(shared_data: Path) -> None:

@@ -88,7 +88,7 @@ def test_line_of_sight_does_not_depend_on_the_mesh(polygons: list[Polygon], seed
     check_against_every_wall(home, shuffled(home.mesh, rng), rng)
 
 
-def test_line_of_sight_agrees_with_every_wall_of_fifty_homes(shared_data: Path) -> None:
+def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data: Path) -> None:
     rng = np.random.default_rng(1)
 
     for home in all_homes(shared_data):

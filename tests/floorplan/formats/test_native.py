@@ -5,6 +5,7 @@ from typing import Any, get_args
 import pytest
 import shapely
 import yaml
+from tests.homes import plan_files
 
 from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
@@ -53,7 +54,7 @@ def test_plan_written_by_hand_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("cell", [0.05, 0.2, 1.0])
 def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: float) -> None:
-    for path in sorted((shared_data / "houseexpo").glob("*.json")):
+    for path in plan_files(shared_data):
         if path.name.startswith("f1ac") and cell < 0.1:
             continue  # the largest takes seconds
         plan = read_houseexpo(path, cell)

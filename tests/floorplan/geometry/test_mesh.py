@@ -53,7 +53,7 @@ def test_mesh_fills_the_free_space_and_ends_at_walls(polygons: list[Polygon]) ->
     check_mesh(home_of(polygons).mesh, polygons)
 
 
-def test_mesh_fills_fifty_homes(shared_data: Path) -> None:
+def test_mesh_fills_real_homes(shared_data: Path) -> None:
     for home in all_homes(shared_data):
         assert 2 * sum(polygon.area for polygon in home.polygons) == doubled_area(home.mesh)
 
