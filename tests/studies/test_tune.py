@@ -8,11 +8,14 @@ import pytest
 from tests.studies.scenes import SPEED, base, small
 
 from fleet2d.errors import InputError, ScenarioError
+from fleet2d.studies.driver import check_study
+from fleet2d.studies.engine import Prefix
 from fleet2d.studies.execution import Event, SerialExecutor
 from fleet2d.studies.jobs import Job
 from fleet2d.studies.local import LocalExecutor
+from fleet2d.studies.sampling import Parameter
 from fleet2d.studies.schedule import Schedule
-from fleet2d.studies.trials import TrialTask
+from fleet2d.studies.trials import TrialJob, TrialSchedule, TrialTask
 from fleet2d.studies.tune import Tuned, tune
 
 pytest.importorskip("optuna")
@@ -91,6 +94,57 @@ def test_what_does_badly_is_given_up_at_simulated_times(tmp_path: Path) -> None:
     assert result.trials["pruned"] > 0
     assert 12 == result.trials["pruned"] + result.trials["complete"]
     assert {60.0, 120.0, None} == {task.until_s for task in spy.trials}
+
+
+def test_what_goes_on_is_not_begun_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = []
+
+    class Counted(Prefix):
+        def __init__(self, scenario: Any) -> None:
+            begun.append(scenario)
+            super().__init__(scenario)
+
+    monkeypatch.setattr("fleet2d.studies.trials.Prefix", Counted)
+    spy = Spy()
+    found(tmp_path, spy, trials=8, prune_at=["1 min", "2 min"])
+    runs = {(task.trial, task.index) for task in spy.trials}
+    assert len(runs) == len(begun) < len(spy.trials)
+
+
+def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
+    checked = check_study(search())
+    parameters = {"speed": Parameter(key=SPEED, low=0.2, high=1.0)}
+    objectives = ("distance.astro", "sightings.ana")
+
+    def answers(*stages: float | None) -> list[bytes]:
+        job = TrialJob(checked.plan.design, parameters, objectives)
+        return [job(TrialTask(0, 0, "", "", 0, {"speed": 0.5}, stage)) for stage in stages]
+
+    early, later, end = answers(60.0, 120.0, None)
+    assert [later] == answers(120.0)
+    assert [end] == answers(None)
+    assert early != later
+
+
+def test_a_variant_goes_on_with_the_worker_that_keeps_it() -> None:
+    optuna = pytest.importorskip("optuna")
+    study = optuna.create_study(pruner=optuna.pruners.NopPruner())
+    variants = [(0, "home"), (1, "home")]
+    parameters = {"speed": Parameter(key=SPEED, low=0.2, high=1.0)}
+    schedule = TrialSchedule(study, parameters, variants, (60.0, None), 1)
+    first, second = schedule.take("one"), schedule.take("two")
+    assert isinstance(first, TrialTask)
+    assert isinstance(second, TrialTask)
+    assert schedule.take("one") is None
+    schedule.finished(first, [1.0], None)
+    schedule.finished(second, [1.0], None)
+    taken = schedule.take("two"), schedule.take("one")
+    assert [second.index, first.index] == [task.index for task in taken if task]
+    schedule.put_back(taken[1])  # type: ignore[arg-type]
+    schedule.leave("one")
+    left = schedule.take("two")
+    assert left is not None
+    assert first.index == left.index
 
 
 def test_several_objectives_end_in_several_settings(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 Whatever processes may share between runs, such as homes, belongs here.
 """
 
+import copy
 import sys
 import time
 import traceback
@@ -77,6 +78,46 @@ def run_scenario(
         Fleet2DError: It is wrong, or a component failed.
     """
     return Simulation(scenario, out=out, **settings).run()
+
+
+class Prefix:
+    """A run under way: what it came to by some time is read, and it goes on from there.
+
+    Example:
+        >>> from fleet2d.scenario.model import load_scenario
+        >>> prefix = Prefix(load_scenario("simulation.duration=2 h", seed=4))
+        >>> hour = prefix.until(3600.0)
+        >>> whole = prefix.until(None)
+        >>> hour.status, whole.status
+        ('interrupted', 'complete')
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Set the run up.
+
+        Raises:
+            Fleet2DError: The scenario is wrong, or a component can't start.
+        """
+        self._simulation = Simulation(scenario)
+
+    @property
+    def done(self) -> bool:
+        """Whether the run is over."""
+        return self._simulation.done
+
+    def until(self, seconds: float | None) -> "Run":
+        """Go on until a simulated time [s], None for the end; return the run as of then.
+
+        Raises:
+            Fleet2DError: A component failed.
+        """
+        simulation = self._simulation
+        if seconds is None:
+            return simulation.run()
+        steps = int(seconds * 1e6) // simulation.clock.step_us - simulation.step
+        if steps > 0:
+            simulation.advance(min(steps, simulation.clock.steps - simulation.step))
+        return copy.deepcopy(simulation).finish()
 
 
 def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> Outcome:

@@ -4,7 +4,6 @@ import pickle
 from collections import deque
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ComponentError, Fleet2DError
@@ -12,7 +11,7 @@ from fleet2d.scenario.compose import assignment, changed
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.choice import key_path
 from fleet2d.studies.design import Design
-from fleet2d.studies.engine import describe_error, flat_numbers, run_scenario
+from fleet2d.studies.engine import Prefix, describe_error, flat_numbers
 from fleet2d.studies.record import Task
 from fleet2d.studies.sampling import Parameter, rounded
 from fleet2d.studies.schedule import Schedule
@@ -21,6 +20,7 @@ from fleet2d.trust import Trust, current_trust, under
 if TYPE_CHECKING:
     import optuna
 
+MOST_KEPT = 40  # runs under way that a process keeps for the next stage of their trial
 FAILURE = "failure"  # what Optuna keeps the reason of a failed trial under
 
 
@@ -54,10 +54,9 @@ class TrialJob:
     search: Mapping[str, Parameter]
     objectives: tuple[str, ...]
     trust: Trust | None = field(default_factory=current_trust)
+    _kept: dict[tuple[int, int], Prefix] = field(default_factory=dict, repr=False)
 
-    def scenario(
-        self, index: int, settings: Mapping[str, Any], until_s: float | None = None
-    ) -> Scenario:
+    def scenario(self, index: int, settings: Mapping[str, Any]) -> Scenario:
         """Return a variant with a setting.
 
         Raises:
@@ -72,10 +71,6 @@ class TrialJob:
             )
             for name, value in settings.items()
         ]
-        if until_s is not None:
-            duration = min(timedelta(seconds=until_s), scenario.simulation.duration)
-            seconds = duration.total_seconds()
-            changes.append(assignment(("simulation", "duration"), seconds, "tune.prune_at"))
         document = changed(scenario._document, changes)
         return scenario_of(document, scenario.folder)
 
@@ -84,14 +79,27 @@ class TrialJob:
         assert isinstance(task, TrialTask)
         try:
             with under(self.trust):
-                run = run_scenario(self.scenario(task.index, task.settings, task.until_s))
-            numbers = dict(flat_numbers(run.metrics))
+                metrics = self._metrics(task)
+            numbers = dict(flat_numbers(metrics))
             missing = [name for name in self.objectives if name not in numbers]
             if missing:
                 raise ComponentError(f"the run came to no number {missing[0]!r}")
             return pickle.dumps(([numbers[name] for name in self.objectives], None))
         except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
             return pickle.dumps((None, describe_error(error)))
+
+    def _metrics(self, task: TrialTask) -> Mapping[str, Any]:
+        """Return the metrics as of the end of a stage; go on with what this process keeps of it."""
+        key = task.trial, task.index
+        prefix = self._kept.pop(key, None)
+        if prefix is None:
+            prefix = Prefix(self.scenario(task.index, task.settings))
+        metrics = prefix.until(task.until_s).metrics
+        if task.until_s is not None and not prefix.done:
+            self._kept[key] = prefix
+            while len(self._kept) > MOST_KEPT:  # of trials given up, which no message tells of
+                del self._kept[next(iter(self._kept))]
+        return metrics
 
 
 @dataclass
@@ -109,8 +117,9 @@ class _Running:
 class TrialSchedule(Schedule):
     """Tasks of a search: a new trial is asked for when workers have nothing else to do.
 
-    A trial runs all variants up to each time of `prune_at` before it goes on to the next, each
-    time from the start; Optuna decides in between whether it is worth going on.
+    A trial runs all variants up to each time of `prune_at` before it goes on to the next; Optuna
+    decides in between whether it is worth going on. A variant goes on with the worker that keeps
+    it: another takes it only if nothing else is left, and runs it from the start.
     """
 
     def __init__(
@@ -136,6 +145,7 @@ class TrialSchedule(Schedule):
         self._to_begin = trials
         self._running: dict[int, _Running] = {}
         self._waiting: deque[TrialTask] = deque()
+        self._keepers: dict[tuple[int, int], Hashable] = {}
         self._numbers = 0
 
     def __len__(self) -> int:
@@ -147,14 +157,32 @@ class TrialSchedule(Schedule):
         return bool(self._waiting or self._to_begin)
 
     def take(self, worker: Hashable) -> Task | None:
-        """Return the next task, of a new trial if all others are taken."""
-        if not self._waiting and self._to_begin:
+        """Return the next task: one to go on with, to begin with, of a new trial, or any left."""
+        task = self._waiting_for(worker)
+        if task is None and self._to_begin:
             self._to_begin -= 1
             trial = self._study.ask()
             settings = {name: suggested(trial, name, p) for name, p in self._search.items()}
             self._running[trial.number] = running = _Running(trial, settings)
             self._begin_stage(running)
-        return self._waiting.popleft() if self._waiting else None
+            task = self._waiting_for(worker)
+        task = task or (self._waiting[0] if self._waiting else None)
+        if task is not None:
+            self._waiting.remove(task)
+            self._keepers[task.trial, task.index] = worker
+        return task
+
+    def _waiting_for(self, worker: Hashable) -> TrialTask | None:
+        """Return the first task that a worker goes on with, else one that nobody has begun with."""
+        keepers = [self._keepers.get((task.trial, task.index)) for task in self._waiting]
+        for keeper in (worker, None):
+            if keeper in keepers:
+                return self._waiting[keepers.index(keeper)]
+        return None
+
+    def leave(self, worker: Hashable) -> None:
+        """Give up what a worker kept: it is gone."""
+        self._keepers = {key: keeper for key, keeper in self._keepers.items() if keeper != worker}
 
     def put_back(self, task: Task) -> None:
         """Let a task be taken again."""
@@ -173,6 +201,8 @@ class TrialSchedule(Schedule):
         if running.error is None and self._goes_on(running):
             return False
         del self._running[task.trial]
+        for index, _ in self._variants:
+            self._keepers.pop((task.trial, index), None)
         return True
 
     def _begin_stage(self, running: _Running) -> None:
