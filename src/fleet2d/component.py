@@ -31,6 +31,7 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from fleet2d.component_class import ComponentClass
@@ -65,6 +66,8 @@ class Settings(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _name_known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        if isinstance(data, Mapping):
+            _refuse_truth(data, cls.model_fields)
         try:
             return handler(data)
         except ValidationError as error:
@@ -91,6 +94,21 @@ class Settings(BaseModel):
         return type(self) is type(other) and all(
             getattr(self, name) == getattr(other, name) for name in type(self).model_fields
         )
+
+
+_NUMBERS = (int, float, int | None, float | None)
+
+
+def _refuse_truth(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> None:
+    """Refuse true and false where a number is wanted; Pydantic takes them for 1 and 0.
+
+    Raises:
+        ValidationError: There is one.
+    """
+    for key, value in data.items():
+        if isinstance(value, bool) and key in fields and fields[key].annotation in _NUMBERS:
+            found = str(value).lower()
+            raise problem_at((key,), f"found {found}; a number is wanted", value)
 
 
 def _example(cls: type[Settings], key: str) -> str:

@@ -1,16 +1,17 @@
 """Read one YAML file into plain data that remembers where each value was written."""
 
 import re
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from fleet2d.errors import ScenarioError
+from fleet2d.bounds import FILE_BYTES, one_line, read_bytes
+from fleet2d.errors import InputError, ScenarioError
 from fleet2d.paths import Text
 from fleet2d.problems import Location, did_you_mean
+from fleet2d.yaml_tree import NodeError, Walk, compose
 
 Keys = tuple[str, ...]
 """The path of a value in a scenario; the places in a list are written as keys, too."""
@@ -75,7 +76,11 @@ def read_document(path: Path, shown: str | None = None) -> Document:
     if not isinstance(document.data, dict):
         raise ScenarioError(
             f"{shown}: a scenario is a mapping (simulation: …, floorplan: …); this is "
-            f"{'a list' if isinstance(document.data, list) else f'the value {document.data!r}'}"
+            + (
+                "a list"
+                if isinstance(document.data, list)
+                else f"the value {one_line(repr(document.data))}"
+            )
         )
     return document
 
@@ -92,7 +97,7 @@ def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | No
         ScenarioError: the text is not YAML; with file and line.
     """
     try:
-        node = _compose(text)
+        node = compose(text)
         if node is None:
             return None
         return _Builder(folder, shown, {} if places is None else places).build(node, ())
@@ -101,8 +106,13 @@ def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | No
             f":{error.problem_mark.line + 1}" if error.problem_mark and places is not None else ""
         )
         raise ScenarioError(f"{shown}{line}: not valid YAML: {_plainly(error)}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ScenarioError(f"{shown}: not valid YAML: {error}") from error
+    except NodeError as error:
+        line = f":{error.node.start_mark.line + 1}" if places is not None else ""
+        raise ScenarioError(f"{shown}{line}: {error}") from None
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ScenarioError(f"{shown}: not valid YAML: {one_line(error, 200)}") from error
+    except InputError as error:
+        raise ScenarioError(f"{shown}: {error}") from None
 
 
 _YAML_ERRORS = (
@@ -134,7 +144,7 @@ def _plainly(error: yaml.MarkedYAMLError) -> str:
 
 def _read_text(path: Path, shown: str) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return read_bytes(path, FILE_BYTES, ScenarioError).decode("utf-8-sig")
     except FileNotFoundError:
         near = [str(p) for p in sorted(path.parent.glob("*.y*ml"))] if path.parent.is_dir() else []
         raise ScenarioError(f"there is no file {shown}{did_you_mean(path, near)}") from None
@@ -146,82 +156,6 @@ def _read_text(path: Path, shown: str) -> str:
         raise ScenarioError(f"can't read {shown}: {error.strerror}") from error
 
 
-# libyaml calls itself for each level of a text, without end; PyYAML's own parser stops in time.
-SHALLOW = 2000
-
-
-def _compose(text: str) -> yaml.Node | None:
-    """Return the tree of nodes of a YAML text, None if it is empty.
-
-    libyaml reads ten times as fast; PyYAML's own parser says better what is wrong.
-    """
-    levels = text.count("[") + text.count("{") + 2 * max(map(len, text.splitlines()), default=0)
-    if levels < SHALLOW:
-        with suppress(yaml.YAMLError, RecursionError):
-            return _composed(_FastLoader(text))
-    return _composed(_Loader(text))
-
-
-def _composed(loader: Any) -> yaml.Node | None:
-    try:
-        node: yaml.Node | None = loader.get_single_node()
-        return node
-    finally:
-        loader.dispose()
-
-
-class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader with the scalars of YAML 1.2, dates included."""
-
-
-class _FastLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """The same in C, where PyYAML comes with it."""
-
-
-_Loader.yaml_implicit_resolvers = {}
-_TAG = "tag:yaml.org,2002:"
-for _name, _pattern, _first in (
-    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
-    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
-    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
-    (
-        "float",
-        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
-        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
-        list("-+.0123456789"),
-    ),
-    ("merge", r"<<", ["<"]),
-):
-    _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
-_TIMESTAMP = [
-    resolver
-    for resolver in yaml.SafeLoader.yaml_implicit_resolvers["1"]
-    if resolver[0] == _TAG + "timestamp"
-]
-for _digit in "0123456789":
-    _Loader.yaml_implicit_resolvers[_digit] += _TIMESTAMP
-_FastLoader.yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
-
-
-def _construct_int(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
-    text = node.value
-    return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
-
-
-def _construct_timestamp(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> Any:
-    try:
-        return loader.construct_yaml_timestamp(node)
-    except (
-        ValueError,
-        AttributeError,
-    ):  # 2026-02-31, or a tagged text: text, which the model refuses with the key's name
-        return node.value
-
-
-_Loader.add_constructor(_TAG + "int", _construct_int)
-_Loader.add_constructor(_TAG + "timestamp", _construct_timestamp)
-
-
 @dataclass
 class _Builder:
     """Turns a tree of YAML nodes into plain data."""
@@ -230,43 +164,28 @@ class _Builder:
     shown: str
     places: dict[Keys, str]
     open_nodes: list[yaml.Node] = field(default_factory=list)
-    loader: _Loader = field(default_factory=lambda: _Loader(""))  # constructs scalars
+    walk: Walk = field(default_factory=Walk)
 
     def build(self, node: yaml.Node, location: Keys) -> Any:
         """Build a node's value; note where it starts."""
         self.places.setdefault(location, f"{self.shown}:{node.start_mark.line + 1}")
-        if any(node is outer for outer in self.open_nodes):
-            raise self._error(node, "a value can't contain itself")
+        self.walk.take(node, self.open_nodes)
+        if isinstance(node, yaml.ScalarNode):
+            value = self.walk.scalar(node)
+            return Text(value, self.folder) if isinstance(value, str) else value
         self.open_nodes.append(node)
         try:
             if isinstance(node, yaml.MappingNode):
                 return self._mapping(node, location)
-            if isinstance(node, yaml.SequenceNode):
-                return [self.build(item, (*location, str(i))) for i, item in enumerate(node.value)]
-            value = self.loader.construct_object(node)
-            return Text(value, self.folder) if isinstance(value, str) else value
+            return [self.build(item, (*location, str(i))) for i, item in enumerate(node.value)]
         finally:
             self.open_nodes.pop()
 
     def _mapping(self, node: yaml.MappingNode, location: Keys) -> dict[str, Any]:
-        seen: dict[str, int] = {}
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise self._error(key, "a key must be plain text")
-            line = key.start_mark.line + 1
-            if key.value in seen:
-                raise self._error(
-                    key, f"the key {key.value!r} is already in line {seen[key.value]}"
-                )
-            seen[key.value] = line
-        self.loader.flatten_mapping(node)  # unfolds '<<: *anchor': merged keys come first
         result = {}
-        for key, value in node.value:
+        for key, value in self.walk.pairs(node):
             inner = (*location, key.value)
             self.places.pop(inner, None)
             result[key.value] = self.build(value, inner)
             self.places[inner] = f"{self.shown}:{key.start_mark.line + 1}"
         return result
-
-    def _error(self, node: yaml.Node, message: str) -> ScenarioError:
-        return ScenarioError(f"{self.shown}:{node.start_mark.line + 1}: {message}")

@@ -1,8 +1,29 @@
 """What can go wrong, as a small tree: catch :class:`Fleet2DError` for all of it."""
 
+# Characters of a line of a message; what is longer echoes input, and is cut in its middle.
+_LONGEST, _HEAD, _TAIL = 1000, 600, 300
+
 
 class Fleet2DError(Exception):
-    """Base of every error that Fleet2D raises on purpose."""
+    """Base of every error that Fleet2D raises on purpose.
+
+    Example:
+        >>> len(str(Fleet2DError("x" * 10**6)))
+        903
+    """
+
+    def __init__(self, *args: object) -> None:
+        """Cut lines that no one could read."""
+        super().__init__(*(_cut(arg) if isinstance(arg, str) else arg for arg in args))
+
+
+def _cut(text: str) -> str:
+    if len(text) <= _LONGEST:
+        return text
+    lines = text.split("\n")
+    return "\n".join(
+        line if len(line) <= _LONGEST else f"{line[:_HEAD]}...{line[-_TAIL:]}" for line in lines
+    )
 
 
 class InputError(Fleet2DError):

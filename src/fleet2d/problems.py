@@ -1,11 +1,13 @@
 """Errors that validators raise: in plain words, about a key, with the nearest valid name."""
 
 import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import get_args
 
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+
+from fleet2d.bounds import one_line
 
 Location = tuple[int | str, ...]
 
@@ -36,7 +38,7 @@ def unknown_key(key: object, known: Iterable[str]) -> PydanticCustomError:
         "unknown_key",
         "unknown key {key}{hint} Allowed here: {names}",
         {
-            "key": repr(key),
+            "key": one_line(repr(key)),
             "hint": did_you_mean(key, names),
             "names": ", ".join(names),
             "known": names,
@@ -68,6 +70,7 @@ def did_you_mean(name: object, known: Iterable[object]) -> str:
     >>> did_you_mean("sped", ["speed", "radius"])
     ": did you mean 'speed'?"
     """
+    name = str(name)[:60]
     names = [str(k) for k in known]
     longer = [k for k in names if str(name) and k.startswith(f"{name}_")]
     near = longer or difflib.get_close_matches(str(name), names, n=1)
@@ -80,4 +83,15 @@ def shown(value: object) -> str:
     >>> shown("fast"), shown(3)
     ("'fast'", '3')
     """
-    return repr(str(value)) if isinstance(value, str) else str(value)
+    return one_line(repr(str(value)) if isinstance(value, str) else _brief(value))
+
+
+def _brief(value: object) -> str:
+    """Write a value that isn't text; of a huge number only how long it is."""
+    if isinstance(value, int) and value.bit_length() > 200:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, list | tuple) and len(value) > 20:
+        return f"a list of {len(value)}"
+    if isinstance(value, Mapping) and len(value) > 20:
+        return f"a mapping of {len(value)} keys"
+    return str(value)

@@ -44,6 +44,7 @@ __all__ = [
 ]
 
 LONGEST_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
+MOST_DIGITS = 400  # of a number; a fraction with a million would fill the memory
 MICROSECOND = timedelta(microseconds=1)
 
 # Exponents are short on purpose: Fraction("1e999999999") would fill the memory.
@@ -82,6 +83,8 @@ class Quantity:
             part = _PART.match(text, position)
             if part is None or (not part[2] and part.span() != (0, len(text))):
                 raise self._unreadable(text)
+            if len(part[1]) > MOST_DIGITS:
+                raise problem(f"found {shown(text)}; a number has {MOST_DIGITS} digits at most")
             total += Fraction(part[1]) * (self._unit(part[2], text) if part[2] else 1)
             position = part.end()
         return total
@@ -89,10 +92,14 @@ class Quantity:
     def _number(self, value: object, found: object) -> Fraction:
         if isinstance(value, bool) or not isinstance(value, Real | Decimal):
             raise self._unreadable(found)
-        if not math.isfinite(value):
-            raise problem(f"found {value}; {self.name} is a finite number")
-        # repr, because the user who wrote 0.1 meant one tenth and not the nearest binary fraction
-        return Fraction(value if isinstance(value, Decimal) else repr(float(value)))
+        try:
+            # repr, because who wrote 0.1 meant one tenth and not the nearest binary fraction
+            exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
+        except OverflowError:
+            raise problem(f"found {shown(value)}; {self.name} is a finite number") from None
+        if not exact.is_finite() or exact.adjusted() > MOST_DIGITS:
+            raise problem(f"found {shown(value)}; {self.name} is a finite number")
+        return Fraction(exact)
 
     def _unit(self, unit: object, found: object) -> Fraction:
         factor = self.units.get(str(unit))

@@ -1,6 +1,6 @@
 """Algorithms: what learns from the history of a run, and what others may read."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -116,6 +116,17 @@ class Algorithm(Component):
         check_shapes(run_state(self), learned, type(self).__name__)
         for name, value in learned.items():
             setattr(self, name, value)
+
+    def check_learned(self, users: Sequence[str], start: datetime) -> None:
+        """Refuse what was learned with other users; called after `recall`, before the run begins.
+
+        Args:
+            users: Their names.
+            start: When the run begins.
+
+        Raises:
+            ComponentError: It doesn't fit.
+        """
 
     def files(self) -> list[Path]:
         """Return the files that it reads: a run notes their content, to be reproducible."""

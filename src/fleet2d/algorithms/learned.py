@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.bounds import LEARNED_BYTES, check_file, one_line
 from fleet2d.errors import ComponentError, InputError
 
 # Between the names of a nested mapping, in the names of the file's arrays.
@@ -38,20 +39,33 @@ def load_learned(path: Path) -> dict[str, Any]:
     """
     state: dict[str, Any] = {}
     try:
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, AttributeError, TypeError, BadZipFile) as error:
+        check_file(path, LEARNED_BYTES)
+        with path.open("rb") as opened, ZipFile(opened) as file:
+            unpacked = sum(entry.file_size for entry in file.infolist())
+            LEARNED_BYTES.check(unpacked, path)
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as content:
+            arrays = {name: _plain(content[name], name) for name in content.files}
+        for name, array in arrays.items():
+            *above, last = name.split(BELOW)
+            here = state
+            for key in above:
+                here = here.setdefault(key, {})
+            here[last] = array if array.ndim else array.item()
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
         raise InputError(
-            f"{path}: this is not what an algorithm has learned ({error}); give a file .npz of the"
-            " folder learned/ of a run"
+            f"{path}: this is not what an algorithm has learned ({one_line(error, 100)}); give a"
+            " file .npz of the folder learned/ of a run"
         ) from None
-    for name, array in arrays.items():
-        *above, last = name.split(BELOW)
-        here = state
-        for key in above:
-            here = here.setdefault(key, {})
-        here[last] = array if array.ndim else array.item()
     return state
+
+
+def _plain(value: Any, name: str) -> NDArray[Any]:
+    """Return an array of plain values; NumPy hands on whatever else is in the archive."""
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "biufU":
+        raise ValueError(f"{name!r} is no array of numbers, truth values or texts")
+    return value
 
 
 def run_state(component: Any) -> dict[str, Any]:
@@ -70,11 +84,57 @@ def check_shapes(now: Mapping[str, Any], before: Mapping[str, Any], where: str) 
         made = now.get(name)
         if isinstance(value, Mapping) and isinstance(made, Mapping):
             check_shapes(made, value, where)
-        elif isinstance(made, np.ndarray) and made.size and np.shape(value) != made.shape:
+            continue
+        check_numbers(name, value, where)
+        if isinstance(made, np.ndarray) and made.size and np.shape(value) != made.shape:
             raise ComponentError(
                 f"{where}: what was learned has {name!r} of shape {np.shape(value)}, but this home"
                 f" and its users make {made.shape}: it was learned somewhere else"
             )
+
+
+def array_of(
+    learned: Mapping[str, Any],
+    name: str,
+    shape: tuple[int, ...],
+    kind: type[np.generic] = np.float64,
+    most: float = 1e300,
+) -> NDArray[Any]:
+    """Return an array of what was learned, a copy.
+
+    Args:
+        learned: What was learned.
+        name: Of the array.
+        shape: Its shape; -1 for any length above 0.
+        kind: Its type.
+        most: Its numbers are from -most to most.
+
+    Raises:
+        ComponentError: It is missing, of another shape, or holds what is no number.
+    """
+    found = np.asarray(learned.get(name, ()))
+    fits = found.ndim == len(shape) and all(
+        size == wanted or wanted < 0 < size for size, wanted in zip(found.shape, shape, strict=True)
+    )
+    if not fits or found.dtype.kind not in "biuf" or not (np.abs(found) <= most).all():
+        raise ComponentError(
+            f"what was learned has no {name!r} of shape {shape}, of numbers alone: it is damaged,"
+            " or from another home, other users or another estimator"
+        )
+    return np.array(found, kind)
+
+
+def check_numbers(name: str, value: Any, where: str) -> None:
+    """Refuse what is no number among those that were learned.
+
+    Raises:
+        ComponentError: There is a NaN.
+    """
+    if isinstance(value, Mapping):
+        for inner, entry in value.items():
+            check_numbers(f"{name}{BELOW}{inner}", entry, where)
+    elif np.asarray(value).dtype.kind == "f" and np.isnan(value).any():
+        raise ComponentError(f"{where}: what was learned has NaN in {name!r}: it is damaged")
 
 
 def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -19,6 +19,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from fleet2d.artifacts.files import write_atomically
 from fleet2d.artifacts.strict_json import read_json
 from fleet2d.artifacts.table import Kind
+from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import RunDirectoryError
 from fleet2d.problems import did_you_mean
 
@@ -218,7 +219,8 @@ def read_content(directory: Path) -> Any:
     """
     path = directory / FILE_NAME
     try:
-        return json_of(path, path.read_bytes() if is_regular(path) else None)
+        regular = is_regular(path)
+        return json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError) if regular else None)
     except FileNotFoundError as error:
         raise RunDirectoryError(
             f"{directory} is no run directory, for it has no {FILE_NAME}: "

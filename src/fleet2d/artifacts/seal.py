@@ -25,6 +25,7 @@ from fleet2d.artifacts.manifest import (
     is_regular,
     json_of,
 )
+from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import ArtifactError, RunDirectoryError
 
 # Files that may be added to a run later: pictures of it.
@@ -99,7 +100,7 @@ def verify_run(directory: Path | str) -> Verification:
     if manifest.seal is None:
         return _without_seal(root, manifest)
     try:
-        text = (root / FILE_NAME).read_bytes()
+        text = read_bytes(root / FILE_NAME, FILE_BYTES, RunDirectoryError)
         differing = _differing_fields(root, text, manifest.seal)
         for name, record in manifest.seal.files.items():
             how = _difference(root / name, record)

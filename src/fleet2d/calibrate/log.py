@@ -4,11 +4,13 @@ import csv
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.bounds import LOG_BYTES, LOG_ROWS, check_file, one_line
 from fleet2d.errors import InputError
 
 F64 = NDArray[np.float64]
@@ -59,11 +61,13 @@ def read_log(path: Path) -> DetectionLog:
             which line and column, what was found, what is wanted.
     """
     try:
+        check_file(path, LOG_BYTES)
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
             columns = [name.strip() for name in reader.fieldnames or ()]
             reader.fieldnames = columns
-            rows = [(reader.line_num, row) for row in reader]
+            rows = [(reader.line_num, row) for row in islice(reader, LOG_ROWS.most + 1)]
+        LOG_ROWS.check(len(rows), path, least="at least ")
     except UnicodeDecodeError:
         raise InputError(f"{path} is no text in UTF-8: save it as a CSV file in UTF-8") from None
     except (OSError, csv.Error) as error:
@@ -107,13 +111,14 @@ def _check_columns(path: Path, columns: list[str]) -> None:
     """Refuse a heading line that lacks a column, or names one twice."""
     for name in columns:
         if columns.count(name) > 1:
-            raise InputError(f"{path} names the column {name!r} twice: name each once")
+            raise InputError(f"{path} names the column {one_line(name)!r} twice: name each once")
     for wanted in ("distance", "detected"):
         if wanted not in columns:
             apart = any(mark in name for name in columns for mark in ";\t")
+            known = one_line(", ".join(columns), 200) or "none"
             raise InputError(
-                f"{path} has no column {wanted!r}; it has: {', '.join(columns) or 'none'}. Wanted"
-                " are distance [m] and detected (0 or 1), and if known bearing_deg,"
+                f"{path} has no column {wanted!r}; it has: {known}. Wanted are"
+                " distance [m] and detected (0 or 1), and if known bearing_deg,"
                 f" orientation_deg, identity, true_identity{', with commas between' * apart}"
             )
 
@@ -138,7 +143,7 @@ class _Table:
                 values[i] = read(text)
             except ValueError as error:
                 raise InputError(
-                    f"{self.path}:{line}: {name} is {text!r}; {error} is wanted"
+                    f"{self.path}:{line}: {name} is {one_line(text)!r}; {error} is wanted"
                 ) from None
         return values
 

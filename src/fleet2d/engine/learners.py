@@ -190,6 +190,7 @@ class Learners:
             component.start(self.home)
             if isinstance(component, Algorithm) and component.learned is not None:
                 component.recall(load_learned(component.learned))
+                component.check_learned(self.users, self.clock.start)
         # Metrics and algorithms may share a name; some file systems take A and a for one.
         taken = {*_FIXED, *(learner.table.casefold() for learner in self.all)}
         table = name

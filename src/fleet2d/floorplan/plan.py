@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
+from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.arrangement import described, number_objects
 from fleet2d.floorplan.geometry.free_space import free_on_lattice, in_order, part_notes
@@ -113,8 +114,11 @@ class FloorPlan:
             FloorPlanError: There is no free space at this cell size, it would lose more of its area
                 than rounding explains, it is too large, or the entrance is not in it.
         """
-        lattice, polygons = free_on_lattice(name, free, cell)
         lines = list(doorways or ())
+        POLYGONS.check(len(regions) + len(objects) + len(lines), "it", FloorPlanError)
+        shapes = [free, *(region.shape for region in regions), *(o.footprint for o in objects)]
+        CORNERS.check(int(shapely.get_num_coordinates(shapes).sum()), "it", FloorPlanError)
+        lattice, polygons = free_on_lattice(name, free, cell)
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
         passages: Survey | None = None
         if doorways is None or regions_are != "exact":

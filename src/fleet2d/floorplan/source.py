@@ -11,8 +11,10 @@ from typing import Annotated, Any, ClassVar
 import yaml
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
+from fleet2d import yaml_tree
+from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
 from fleet2d.component import Component
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.corrections import RoomCorrection, corrected
 from fleet2d.floorplan.furniture.furnishing import Furnishing, FurniturePiece, furnished
 from fleet2d.floorplan.home.costmap import CostmapSettings
@@ -21,15 +23,13 @@ from fleet2d.floorplan.kept import Kept
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
+from fleet2d.yaml_tree import NodeError
 
 # No home is as large; what is beyond was not written in metres.
 MAX_COORDINATE_M = 100_000.0
 TINY = 1e-12
 
 YAML = (".yaml", ".yml")
-# Lists in lists: a floor plan has 8; what is deeper is damaged, or made to break the reader.
-MAX_DEPTH = 64
-MAX_VALUES = 20_000_000
 # Homes that a process keeps, read and furnished.
 PLANS_KEPT = 8
 
@@ -172,6 +172,8 @@ def read_json(path: Path) -> dict[str, Any]:
         FloorPlanError: There is no such file, or it doesn't hold a JSON object.
     """
     text = _read_text(path, "JSON")
+    values = text.count(",") + text.count("[") + text.count("{")
+    JSON_VALUES.check(values, path, FloorPlanError, least="about ")
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:
@@ -195,47 +197,22 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """
     text = _read_text(path, "YAML")
     try:
-        _check_events(text)
-        content = yaml.load(text, Loader=_YAML_LOADER)  # noqa: S506, it is a safe one
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        what = " ".join(str(error).split())[:200]
-        raise FloorPlanError(f"{path} is not YAML: {what}") from None
+        content = yaml_tree.parse(text)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise FloorPlanError(f"{path} is not YAML: {one_line(error, 200)}") from None
+    except NodeError as error:
+        line = error.node.start_mark.line + 1
+        raise FloorPlanError(f"{path}, line {line}: {error}") from None
+    except InputError as error:
+        raise FloorPlanError(f"{path}: {error}") from None
     return _mapping(content, path, "a YAML mapping of keys and values")
-
-
-_YAML_LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
-
-def _check_events(text: str) -> None:
-    """Refuse what grows without end, before anything is built of it."""
-    counts: dict[str, int] = {}  # by anchor: how many values it stands for
-    around: list[tuple[str | None, int]] = []
-    for event in yaml.parse(text, Loader=_YAML_LOADER):
-        if isinstance(event, yaml.CollectionStartEvent):
-            around.append((event.anchor, 1))
-            if len(around) > MAX_DEPTH:
-                raise yaml.YAMLError(f"more than {MAX_DEPTH} lists in lists")
-            continue
-        anchor, count = None, 1
-        if isinstance(event, yaml.CollectionEndEvent):
-            anchor, count = around.pop()
-        elif isinstance(event, yaml.AliasEvent):
-            count = counts.get(str(event.anchor), MAX_VALUES)  # inside itself it has no end
-        elif isinstance(event, yaml.ScalarEvent):
-            anchor = event.anchor
-        if anchor is not None:
-            counts[anchor] = count
-        if around:
-            around[-1] = (around[-1][0], around[-1][1] + count)
-            if around[-1][1] > MAX_VALUES:
-                raise yaml.YAMLError(f"its aliases make more than {MAX_VALUES} values of it")
 
 
 def _read_text(path: Path, what: str) -> str:
     if path.is_dir():
         raise FloorPlanError(f"{path} is a folder: name the floor plan's {what} file in it")
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_bytes(path, FILE_BYTES, FloorPlanError).decode("utf-8-sig")
     except FileNotFoundError:
         raise FloorPlanError(f"there is no file {path}: check floorplan.path") from None
     except OSError as error:

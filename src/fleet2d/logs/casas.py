@@ -12,7 +12,8 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order
+from fleet2d.bounds import one_line
+from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines
 from fleet2d.logs.times import parse_time, since
 
 LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
@@ -29,26 +30,23 @@ def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
     readings: list[Reading] = []
     others: Counter[str] = Counter()
     first_day = None
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, text in enumerate(lines, 1):
-            if not text.strip():
-                continue
-            match = LINE.fullmatch(text.strip())
-            if match is None:
-                raise LogError(
-                    f"{path}, line {number}: found {text.strip()[:60]!r} where date, time, room,"
-                    " sensor, ON or OFF, and activity are wanted"
-                )
-            day, time, room, _, value, activity = match.groups()
-            moment = parse_time(f"{day} {time}", path, number)
-            first_day = first_day or moment.date()
-            if value.upper() in ON:
-                at = since(first_day, moment)
-                readings.append(Reading(at, at, room, (activity or "").strip(), number))
-            elif value.upper() not in OFF:
-                others[value] += 1
+    for number, text in log_lines(path):
+        match = LINE.fullmatch(text)
+        if match is None:
+            raise LogError(
+                f"{path}, line {number}: found {one_line(text)!r} where date, time, room, sensor,"
+                " ON or OFF, and activity are wanted"
+            )
+        day, time, room, _, value, activity = match.groups()
+        moment = parse_time(f"{day} {time}", path, number)
+        first_day = first_day or moment.date()
+        if value.upper() in ON:
+            at = since(first_day, moment)
+            readings.append(Reading(at, at, room, (activity or "").strip(), number))
+        elif value.upper() not in OFF:
+            others[value] += 1
     readings, notes = in_order(readings, path, sort=sort)
     if others:
-        values = ", ".join(sorted(others)[:5])
+        values = one_line(", ".join(sorted(others)[:5]), 200)
         notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")
     return ActivityLog(path, "casas", first_day, tuple(readings), tuple(notes))

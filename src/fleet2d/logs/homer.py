@@ -20,16 +20,18 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fleet2d.logs.log import DAY_US, ActivityLog, LogError, Reading, in_order
+from fleet2d.bounds import one_line
+from fleet2d.logs.log import DAY_US, ActivityLog, LogError, Reading, in_order, log_lines
 
-AGENDA = re.compile(r"(\w+) \((\d+):(\d\d) - (?:(\d+)\s?days? - )?(\d+):(\d\d)\)")
+AGENDA = re.compile(r"(\w+) \((\d{1,9}):(\d\d) - (?:(\d{1,9})\s?days? - )?(\d{1,9}):(\d\d)\)")
 SCRIPT = re.compile(r"### (\w+?)-\w+\.txt")
 ACTION = re.compile(r"\[(\w+)\]((?: <\w+> \(\d+\))*) \[\d+\]")
-THING = re.compile(r"<(\w+)> \((\d+)\)")
+THING = re.compile(r"<(\w+)> \((\d{1,9})\d*\)")
 MINUTE = re.compile(r"\d+(?:\.\d+)?")
 ROOM = re.compile(r"bathroom|bedroom|dining_room|home_office|kitchen|living_?room|hallway")
 ADDED = 1000  # things from this number on were added later, anywhere
 MINUTE_US = 60_000_000
+MOST_MINUTES = 1e6  # what is later is at the end of its activity anyway
 
 
 @dataclass
@@ -78,27 +80,26 @@ def _day(path: Path) -> list[_Block]:
     blocks: list[_Block] = []
     block = -1
     waiting: list[tuple[str, int]] = []
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, text in enumerate(lines, 1):
-            line = text.strip()
-            if match := AGENDA.fullmatch(line):
-                blocks.append(_agenda(match, path, number))
-            elif match := SCRIPT.fullmatch(line):
-                block += 1
-                if block >= len(blocks) or blocks[block].activity != match[1]:
-                    raise LogError(
-                        f"{path}, line {number}: the script of {match[1]} isn't next on the agenda"
-                    )
-                waiting = []
-            elif match := ACTION.fullmatch(line):
-                waiting += [(name, int(n)) for name, n in THING.findall(match[2])]
-            elif MINUTE.fullmatch(line):
-                if block < 0:
-                    raise LogError(f"{path}, line {number}: an action before any '### activity'")
-                # To the microsecond: sums of thirds of minutes end in …33332.
-                at = round(float(line) * MINUTE_US)
-                blocks[block].steps.append((at, waiting, number))
-                waiting = []
+    for number, line in log_lines(path):
+        if match := AGENDA.fullmatch(line):
+            blocks.append(_agenda(match, path, number))
+        elif match := SCRIPT.fullmatch(line):
+            block += 1
+            if block >= len(blocks) or blocks[block].activity != match[1]:
+                raise LogError(
+                    f"{path}, line {number}: the script of {one_line(match[1])} isn't next on the"
+                    " agenda"
+                )
+            waiting = []
+        elif match := ACTION.fullmatch(line):
+            waiting += [(name, int(n)) for name, n in THING.findall(match[2])]
+        elif MINUTE.fullmatch(line):
+            if block < 0:
+                raise LogError(f"{path}, line {number}: an action before any '### activity'")
+            # To the microsecond: sums of thirds of minutes end in …33332.
+            at = round(min(float(line), MOST_MINUTES) * MINUTE_US)
+            blocks[block].steps.append((at, waiting, number))
+            waiting = []
     if not blocks:
         raise LogError(f"{path}: no line like 'breakfast (08:35 - 09:02)'; is it a day of HOMER+?")
     return blocks
@@ -108,9 +109,9 @@ def _agenda(match: re.Match[str], path: Path, line: int) -> _Block:
     begin = int(match[2]) * 60 + int(match[3])
     end = (int(match[4] or 0) * 24 + int(match[5])) * 60 + int(match[6])
     if begin >= 24 * 60 or int(match[5]) > 24:
-        raise LogError(f"{path}, line {line}: a day has 24 hours, found {match[0]!r}")
+        raise LogError(f"{path}, line {line}: a day has 24 hours, found {one_line(match[0])!r}")
     if end < begin:
-        raise LogError(f"{path}, line {line}: it ends before it begins, {match[0]!r}")
+        raise LogError(f"{path}, line {line}: it ends before it begins, {one_line(match[0])!r}")
     return _Block(match[1], begin * MINUTE_US, end * MINUTE_US, line)
 
 

@@ -1,6 +1,7 @@
 """What a log says, in one form for all layouts: readings of rooms and activities, or fixes."""
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date
 from itertools import pairwise
@@ -10,11 +11,48 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file
 from fleet2d.errors import InputError
 
 DAY_US = 86_400_000_000
+# Lines that a note names.
+_MOST_NAMED = 20
+# Characters of a line of a log.
+_LONGEST = 10_000
 AWAY = "away"
 """The room label of who is out of the home."""
+
+
+def log_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the number and the text of each line of a log that isn't blank, stripped.
+
+    Raises:
+        LogError: The file can't be read, is no text file, or is beyond a bound.
+    """
+    try:
+        check_file(path, LOG_BYTES, LogError)
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
+                if number > LOG_ROWS.most:
+                    LOG_ROWS.check(number, path, LogError, least="more than ")
+                if len(text) == _LONGEST:
+                    raise LogError(
+                        f"{path}, line {number}: it is longer than {_LONGEST} characters"
+                    )
+                if stripped := text.strip():
+                    yield number, stripped
+    except OSError as error:
+        raise LogError(f"{path} can't be read: {error.strerror or error}") from error
+
+
+def check_days(first: date, last: date, path: Path) -> None:
+    """Refuse a log that lasts longer than logs do: one of its dates is wrong.
+
+    Raises:
+        LogError: It does.
+    """
+    days = (last - first).days + 1
+    LOG_DAYS.check(days, f"{path} runs from {first} to {last}: it", LogError)
 
 
 class LogError(InputError):
@@ -107,6 +145,8 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     """
     if not readings:
         raise LogError(f"{path} holds no reading: is it the right file?")
+    first, last = min(r.begin_us for r in readings), max(r.end_us for r in readings)
+    LOG_DAYS.check((last - first) // DAY_US + 1, path, LogError)
     backwards = [b for a, b in pairwise(readings) if b.begin_us < a.begin_us]
     if backwards and not sort:
         raise LogError(
@@ -124,7 +164,9 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     notes = []
     ended = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
     if ended:
-        notes.append(f"an end before the begin isn't believed, in line {', '.join(ended)}")
+        more = f" and {len(ended) - _MOST_NAMED} more" if len(ended) > _MOST_NAMED else ""
+        lines = f"{', '.join(ended[:_MOST_NAMED])}{more}"
+        notes.append(f"an end before the begin isn't believed, in line {lines}")
     if backwards:
         readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable
         notes.append(f"{_counted(len(backwards), 'line')} ran backwards in time and were sorted in")

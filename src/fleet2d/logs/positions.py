@@ -13,6 +13,8 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.arrow import unpacked_bytes
+from fleet2d.bounds import FIXES, LOG_BYTES, LOG_DAYS, TABLE_BYTES, check_file, one_line
 from fleet2d.logs.log import DAY_US, LogError, PositionLog
 from fleet2d.logs.times import parse_time
 from fleet2d.problems import did_you_mean
@@ -26,6 +28,10 @@ NAMES = {
 }
 """The names that a column may have, if the user gives none."""
 
+EARLIEST_US, LATEST_US = -2_208_988_800_000_000, 7_258_118_400_000_000
+"""The years 1900 and 2200 [us since 1970]."""
+
+MOST_NUMBER = 8e18  # of nanoseconds since 1970
 QUARTER_HOUR_US = 900_000_000
 I64 = NDArray[np.int64]
 
@@ -65,7 +71,16 @@ def read_positions(
         heading = _numbers(table, named["heading"], path, line)
         if named["heading"].endswith("_deg"):
             heading = heading / 180 * np.pi
-    time_us, dated, repeated = _local(table[named["time"]], time_zone, path, line)
+    time_us, dated, zoned = _times(table[named["time"]], path, line)
+    _check_times(time_us, path, line, dated=dated)
+    repeated = np.zeros(len(time_us), bool)
+    if zoned:
+        if time_zone is None:
+            raise LogError(
+                f"{path}: its times are of a time zone; say which local time the home has by"
+                " time_zone, like 'Europe/Berlin' or 'UTC'"
+            )
+        time_us, repeated = _in_zone(time_us, time_zone)
     kept = np.isfinite(x) & np.isfinite(y)
     if not kept.all():
         notes.append(f"{np.count_nonzero(~kept)} fixes without a position were left out")
@@ -88,11 +103,21 @@ def read_positions(
 
 def _table(path: Path) -> pa.Table:
     try:
+        check_file(path, LOG_BYTES, LogError)
         if path.suffix.lower() in (".parquet", ".pq"):
-            return pq.read_table(path)
-        return pacsv.read_csv(path)
+            with pq.ParquetFile(path) as file:
+                FIXES.check(file.metadata.num_rows, path, LogError)
+                TABLE_BYTES.check(unpacked_bytes(file), path, LogError, least="about ")
+                table = file.read()
+        else:
+            table = pacsv.read_csv(path)
+        FIXES.check(table.num_rows, path, LogError)
+        _ = table.column_names
+    except UnicodeDecodeError:
+        raise LogError(f"{path}, line 1: the names of its columns are no text in UTF-8") from None
     except (pa.ArrowException, OSError) as error:
-        raise LogError(f"{path} can't be read: {' '.join(str(error).split())}") from error
+        raise LogError(f"{path} can't be read: {one_line(error, 200)}") from error
+    return table
 
 
 def _columns(table: pa.Table, given: Mapping[str, str], path: Path) -> dict[str, str]:
@@ -151,8 +176,8 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.fl
                 float(text or "nan")
             except ValueError:
                 raise LogError(
-                    f"{path}, line {at}: found {text!r} in column {name!r}, where a number is"
-                    " wanted"
+                    f"{path}, line {at}: found {one_line(text)!r} in column {name!r}, where a"
+                    " number is wanted"
                 ) from None
         column = pc.cast(pc.if_else(pc.equal(column, ""), "nan", column), pa.float64())
     try:
@@ -163,37 +188,36 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.fl
     return out
 
 
-def _local(
-    column: pa.ChunkedArray, time_zone: str | None, path: Path, line: I64
-) -> tuple[I64, bool, NDArray[np.bool_]]:
-    """Return local times [us since 1970, or since the log began], whether dated, and repeats."""
+def _times(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:
+    """Return times [us], whether they count from 1970, not the log's begin, and if in UTC."""
     if column.null_count:
         empty = np.flatnonzero(pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False))
         raise LogError(f"{path}, line {line[empty[0]]}: it has no time")
     kind: Any = column.type
-    zoned = False
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
-        texts = column.to_pylist()
-        values, zoned = _parsed(texts, path, line)
-    elif pa.types.is_timestamp(kind):
+        values, zoned = _parsed(column.to_pylist(), path, line)
+        return values, True, zoned
+    if pa.types.is_timestamp(kind):
         values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
-        values = pc.cast(values, pa.int64()).to_numpy()
-        zoned = kind.tz is not None
-    elif pa.types.is_integer(kind) or pa.types.is_floating(kind):
-        values, zoned = _scaled(column.to_numpy())
-        if not zoned:
-            return values, False, np.zeros(len(values), bool)
-    else:
-        raise LogError(f"{path}: the times are {kind}; text, timestamps or numbers are wanted")
-    if not zoned:
-        return values, True, np.zeros(len(values), bool)
-    if time_zone is None:
+        return pc.cast(values, pa.int64()).to_numpy(), True, kind.tz is not None
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+        values, zoned = _scaled(column.to_numpy(), path, line)
+        return values, zoned, zoned
+    raise LogError(f"{path}: the times are {kind}; text, timestamps or numbers are wanted")
+
+
+def _check_times(time_us: I64, path: Path, line: I64, *, dated: bool) -> None:
+    """Refuse times of another century, and logs that last longer than logs do."""
+    first, end = (EARLIEST_US, LATEST_US) if dated else (-LATEST_US, LATEST_US)
+    wrong = np.flatnonzero((time_us < first) | (time_us >= end))
+    if len(wrong):
+        wanted = "a time from 1900 to 2199" if dated else "seconds since the log began"
         raise LogError(
-            f"{path}: its times are of a time zone; say which local time the home has by"
-            " time_zone, like 'Europe/Berlin' or 'UTC'"
+            f"{path}, line {line[wrong[0]]}: its time is out of all bounds ({len(wrong)} such"
+            f" lines): {wanted} is wanted"
         )
-    local, repeated = _in_zone(values, time_zone)
-    return local, True, repeated
+    days = int(time_us.max() - time_us.min()) // DAY_US + 1
+    LOG_DAYS.check(days, path, LogError)
 
 
 def _parsed(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
@@ -214,9 +238,12 @@ def _parsed(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
     return np.array(values, np.int64), zones == {True}
 
 
-def _scaled(numbers: NDArray[Any]) -> tuple[I64, bool]:
+def _scaled(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, bool]:
     """Return numbers as microseconds, and whether they count from 1970."""
-    size = float(np.max(np.abs(numbers)))
+    wrong = np.flatnonzero(~(np.abs(numbers.astype(np.float64)) < MOST_NUMBER))
+    if len(wrong):
+        raise LogError(f"{path}, line {line[wrong[0]]}: its time is no number, or far too large")
+    size = float(np.max(np.abs(numbers.astype(np.float64))))
     if size >= 1e17:
         return (numbers // 1000).astype(np.int64), True
     if size >= 1e14:

@@ -1,13 +1,14 @@
 """Read a log of any layout."""
 
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
 from fleet2d.logs.casas import LINE as CASAS_LINE
 from fleet2d.logs.casas import read_casas
 from fleet2d.logs.homer import AGENDA, read_homer
-from fleet2d.logs.log import ActivityLog, LogError, PositionLog
+from fleet2d.logs.log import ActivityLog, LogError, PositionLog, log_lines
 from fleet2d.logs.uci_adl import HEAD, read_uci_adl
 from fleet2d.logs.uci_adl import LINE as UCI_LINE
 
@@ -73,15 +74,13 @@ def _look(path: Path) -> Layout:
         )
     if path.suffix.lower() in (".parquet", ".pq"):
         return "positions"
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for text, _ in zip(lines, range(FIRST_LINES), strict=False):
-            line = text.strip()
-            if AGENDA.fullmatch(line):
-                return "homer"
-            if UCI_LINE.fullmatch(line) or (line and HEAD.fullmatch(line)):
-                return "uci_adl"
-            if CASAS_LINE.fullmatch(line):
-                return "casas"
+    for _, line in islice(log_lines(path), FIRST_LINES):
+        if AGENDA.fullmatch(line):
+            return "homer"
+        if UCI_LINE.fullmatch(line) or HEAD.fullmatch(line):
+            return "uci_adl"
+        if CASAS_LINE.fullmatch(line):
+            return "casas"
     if path.suffix.lower() == ".csv":
         return "positions"
     raise LogError(

@@ -16,7 +16,8 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order
+from fleet2d.bounds import one_line
+from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines
 from fleet2d.logs.times import parse_time, since
 
 _TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
@@ -73,18 +74,17 @@ def _pair(path: Path) -> dict[str, Path]:
 
 def _rows(path: Path) -> list[_Row]:
     rows = []
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, text in enumerate(lines, 1):
-            if not text.strip() or HEAD.fullmatch(text.strip()):
-                continue
-            match = LINE.fullmatch(text.strip())
-            if match is None:
-                raise LogError(
-                    f"{path}, line {number}: found {text.strip()[:60]!r} where a start time, an end"
-                    " time and an activity, or a sensor, its type and its place, are wanted"
-                )
-            begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
-            rows.append(_Row(begin, end, match[3].strip(), number))
+    for number, text in log_lines(path):
+        if HEAD.fullmatch(text):
+            continue
+        match = LINE.fullmatch(text)
+        if match is None or not match[3].strip():
+            raise LogError(
+                f"{path}, line {number}: found {one_line(text)!r} where a start time, an end time"
+                " and an activity, or a sensor, its type and its place, are wanted"
+            )
+        begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
+        rows.append(_Row(begin, end, match[3].strip(), number))
     if not rows:
         raise LogError(f"{path} holds no reading: is it the right file?")
     return rows

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fleet2d.bounds import one_line
 from fleet2d.component import base_of, lookup
 from fleet2d.document import Document, Keys, parse_yaml, read_document
 from fleet2d.errors import ScenarioError
@@ -141,7 +142,7 @@ def _chain(chain: tuple[Path, ...], last: Path) -> str:
 def _read_override(text: str) -> Document:
     key, equals, value = text.partition("=")
     keys = tuple(key.strip().split("."))
-    shown = f"override {text!r}"
+    shown = f"override {(text if len(text) <= 100 else one_line(text, 100))!r}"
     if not equals:
         raise ScenarioError(f"{shown}: there is no '=' in it; write key.path=value")
     if not all(keys):

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from fleet2d.bounds import one_line
 from fleet2d.component import components
 from fleet2d.document import Document
 from fleet2d.errors import ScenarioError
@@ -67,7 +68,7 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
             continue
         told.add(once or "")
         line["msg"] += _whose_key(line, location, document.data)
-        key = (document.place(location), ".".join(map(str, location)))
+        key = (document.place(location), one_line(".".join(map(str, location)), 200))
         problems.setdefault(key, []).append(line)
     return ScenarioError(
         "\n".join(
@@ -130,9 +131,9 @@ def _found(value: Any) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Mapping):
-        return f"a mapping of {', '.join(map(str, value))}" if value else "an empty mapping"
-    text = shown(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+        keys = ", ".join(map(str, list(value)[:20]))
+        return f"a mapping of {one_line(keys, 100)}" if value else "an empty mapping"
+    return shown(value)
 
 
 def _written_location(line: ErrorDetails, data: Any) -> Location:

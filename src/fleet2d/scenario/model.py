@@ -16,6 +16,7 @@ from pydantic import (
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.bounds import one_line
 from fleet2d.component import OneOf, Settings, ShortForm
 from fleet2d.document import Document
 from fleet2d.entities.entity import Robot, User
@@ -32,7 +33,7 @@ from fleet2d.sight.settings import SightSettings
 from fleet2d.trust import check_code
 from fleet2d.units import Duration, PositiveDuration, format_duration, micros
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 
 
 def _local_time(value: Any) -> Any:
@@ -60,7 +61,8 @@ def _named(entries: Any) -> Any:
             if not _NAME.fullmatch(str(name)):
                 raise problem_at(
                     (name,),
-                    f"the name {name!r} must be letters, digits, '_' and '-', a letter first",
+                    f"the name {one_line(repr(name))} must be letters, digits, '_' and '-', a"
+                    " letter first, 100 characters at most",
                 )
     return entries
 
@@ -104,7 +106,7 @@ class SimulationSettings(Settings):
     )
     speedup: float | None = Field(
         default=None,
-        gt=0,
+        ge=0.001,
         description="Run at this many times real time; null: as fast as possible.",
     )
 
@@ -245,7 +247,7 @@ def load_scenario(
         ScenarioError: what is wrong, where it is written, and what is wanted; a line per problem.
     """
     folder = Path.cwd()
-    if isinstance(source, str) and "=" in source and not Path(source).exists():
+    if isinstance(source, str) and "=" in source and not _is_path(source):
         overrides, source = (source, *overrides), None  # as on the command line
     if isinstance(source, Scenario):
         if not overrides and not settings:
@@ -274,6 +276,14 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
         raise explain(error, document) from None
     scenario._folder, scenario._document = folder, document
     return scenario
+
+
+def _is_path(text: str) -> bool:
+    """Whether there is a file of that name; an override may be too long for one."""
+    try:
+        return Path(text).exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _key(name: str) -> tuple[str, ...]:

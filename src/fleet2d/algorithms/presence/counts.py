@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.evidence import Evidence, Parts
+from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS
 
 F64 = NDArray[np.float64]
@@ -253,13 +254,14 @@ class DayCounts:
             learned: What was remembered.
             today: Ordinal of the day that begins. Days of another time are moved by whole weeks.
         """
-        *days, last = np.asarray(learned["days"]).tolist()
+        day = 1 << 31
+        *days, last = array_of(learned, "days", (-1,), np.int64, most=day).tolist()
         weeks = max(0, -((today - 1 - last) // 7))
         self.days = [day - 7 * weeks for day in days]
-        self.by_day = np.array(learned["by_day"], np.float64)
-        self.week = np.array(learned["week"], np.float64)
-        self.over = np.array(learned["over"], np.float64)
-        self.hours = np.array(learned["hours"], np.float64)
+        self.by_day = array_of(learned, "by_day", (len(days), *self.shape))
+        self.week = array_of(learned, "week", self.week.shape)
+        self.over = array_of(learned, "over", self.shape)
+        self.hours = array_of(learned, "hours", self.hours.shape)
         self.today = last - 7 * weeks if last else 0
         if self.today:
             self.begin_day(today)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, Estimator, normalized
@@ -177,7 +178,7 @@ class Fremen(Estimator):
     def recall(self, learned: Mapping[str, Any], today: int) -> None:
         """Go on from what `remember` returned; called after `begin`."""
         super().recall(learned, today)
-        self.waves = np.array(learned["waves"], np.float64)
-        self.fit = np.array(learned["fit"], np.float64)
-        self.span = int(learned["span"])
+        self.waves = array_of(learned, "waves", self.waves.shape)
+        self.fit = array_of(learned, "fit", self.fit.shape)
+        self.span = int(array_of(learned, "span", (), np.int64, most=1 << 31))
         self.first = today - self.span

@@ -1,7 +1,7 @@
 """Long-term presence: how much of the time each user spends in each room."""
 
-from collections.abc import Mapping, Set
-from datetime import timedelta
+from collections.abc import Mapping, Sequence, Set
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
+from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.estimator import F64, Estimator
@@ -86,11 +87,20 @@ class LongTermPresence(Algorithm):
         return presence if self.interval is None else self._with_interval(presence, state)
 
     def _begin(self, state: Present) -> None:
-        half_life = None if self.half_life is None else self.half_life / DAY
-        self.estimator.begin(self.rooms, len(state.users), half_life)
-        if self.recalled is not None:
-            self.estimator.recall(self.recalled, state.start.toordinal())
+        self._prepare(self.estimator, len(state.users), state.start)
         self.begun, self.until = True, -1
+
+    def _prepare(self, estimator: Estimator, users: int, start: datetime) -> None:
+        half_life = None if self.half_life is None else self.half_life / DAY
+        estimator.begin(self.rooms, users, half_life)
+        if self.recalled is not None:
+            estimator.recall(self.recalled, start.toordinal())
+
+    def check_learned(self, users: Sequence[str], start: datetime) -> None:
+        """Begin on trial with what was learned, which must fit the users."""
+        if self.recalled is not None:
+            check_numbers("", self.recalled, self.type_name)
+            self._prepare(self.estimator.model_copy(deep=True), len(users), start)
 
     def _with_interval(self, presence: Presence, state: Present) -> Presence:
         """Add the interval, which changes when a day is over, and always holds the estimate."""

@@ -1,7 +1,7 @@
 """Real-time presence: where each user is now, given all that was and wasn't seen."""
 
-from collections.abc import Mapping, Set
-from datetime import timedelta
+from collections.abc import Mapping, Sequence, Set
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
 import numpy as np
@@ -9,6 +9,7 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
+from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import ANYONE, Presence, Track, are_distributions
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.model import Model
@@ -63,10 +64,19 @@ class RealTimePresence(Algorithm):
         return self.model.presence(state.users, time, bins.bin_steps * step_us, track)
 
     def _begin(self, state: Present) -> None:
-        self.model.begin(self.rooms, len(state.users), state.start.toordinal())
-        if self.recalled is not None:
-            self.model.recall(self.recalled)
+        self._prepare(self.model, len(state.users), state.start)
         self.begun = True
+
+    def _prepare(self, model: Model, users: int, start: datetime) -> None:
+        model.begin(self.rooms, users, start.toordinal())
+        if self.recalled is not None:
+            model.recall(self.recalled)
+
+    def check_learned(self, users: Sequence[str], start: datetime) -> None:
+        """Begin on trial with what was learned, which must fit the users."""
+        if self.recalled is not None:
+            check_numbers("", self.recalled, self.type_name)
+            self._prepare(self.model.model_copy(deep=True), len(users), start)
 
     def _check(self, home: Any, away: Any, bins: int, state: Present) -> None:
         """Refuse what a model says of some bin that is no distribution."""

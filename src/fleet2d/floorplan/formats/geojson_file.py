@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shapely import LineString, MultiLineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from fleet2d.bounds import POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.floorplan.source import MAX_COORDINATE_M, settled, shown_value
@@ -96,6 +97,7 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
     found = content.get("features")
     if content.get("type") != COLLECTION or not isinstance(found, list):
         raise FloorPlanError(f'no GeoJSON plan: "type": "{COLLECTION}" with features is expected')
+    POLYGONS.check(len(found), "it", FloorPlanError)
     features: list[Feature] = []
     floors: list[dict[str, Any]] = []
     unread: Counter[str] = Counter()

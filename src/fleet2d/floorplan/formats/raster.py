@@ -4,6 +4,7 @@ import io
 import re
 import warnings
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
 from fleet2d.errors import FloorPlanError
-
-MAX_PIXELS = 2**26
-"""A map of 8192 x 8192 pixels: 400 m a side at 5 cm."""
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
@@ -22,6 +21,8 @@ _CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
 _PGM_HEADER = re.compile(
     rb"P([25])" + rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" * 3 + rb"(?:#[^\r\n]*)?\s"
 )
+_SPACE = re.compile(rb"\s")
+_PIECE = 1 << 18  # bytes that are split into words at once
 _PGM_COMMENT = re.compile(rb"#[^\r\n]*")
 
 
@@ -48,7 +49,7 @@ def read_grey(path: Path) -> GreyPicture:
             Pillow is not installed.
     """
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, PICTURE_BYTES, FloorPlanError)
     except OSError as error:
         raise FloorPlanError(f"the image {path} can't be read: {error.strerror}") from None
     try:
@@ -94,13 +95,28 @@ def _packed_values(body: bytes, columns: int, rows: int, depth: int) -> NDArray[
 
 
 def _plain_values(body: bytes, columns: int, rows: int) -> NDArray[np.integer[Any]]:
-    words = _PGM_COMMENT.sub(b"", body).split()
-    if len(words) != columns * rows:
-        _refuse_count(len(words), columns, rows)
-    wrong = next((word for word in words if not word.isdigit() or len(word) > 9), None)
-    if wrong is not None:
-        raise FloorPlanError(f"has the pixel {wrong[:20].decode('latin-1')!r}: not a whole number")
-    return np.array(words).astype(np.int64)
+    values, count = np.empty(columns * rows, np.int64), 0
+    for words in _in_pieces(_PGM_COMMENT.sub(b"", body)):
+        wrong = next((word for word in words if not word.isdigit() or len(word) > 9), None)
+        if wrong is not None:
+            text = wrong[:20].decode("latin-1")
+            raise FloorPlanError(f"has the pixel {text!r}: not a whole number")
+        fitting = words[: len(values) - count]
+        values[count : count + len(fitting)] = np.array(fitting, "S9").astype(np.int64)
+        count += len(words)
+    if count != len(values):
+        _refuse_count(count, columns, rows)
+    return values
+
+
+def _in_pieces(text: bytes) -> Iterator[list[bytes]]:
+    """Yield the words of a text, some at a time: all of them would fill the memory."""
+    begin = 0
+    while begin < len(text):
+        space = _SPACE.search(text, begin + _PIECE)
+        end = space.start() if space else len(text)
+        yield text[begin:end].split()
+        begin = end
 
 
 def _refuse_count(count: float, columns: int, rows: int) -> None:
@@ -114,11 +130,7 @@ def _refuse_count(count: float, columns: int, rows: int) -> None:
 def _check_size(columns: int, rows: int) -> None:
     if columns * rows == 0:
         raise FloorPlanError(f"is {columns} x {rows} pixels: it is empty")
-    if columns * rows > MAX_PIXELS:
-        raise FloorPlanError(
-            f"is {columns} x {rows} pixels: at most {MAX_PIXELS // 2**20} million are read;"
-            " cut out the home, or scale it down"
-        )
+    PIXELS.check(columns * rows, f"is {columns} x {rows}: it", FloorPlanError)
 
 
 # --- PNG ---------------------------------------------------------------------------------------
@@ -132,6 +144,7 @@ def _read_png(content: bytes) -> GreyPicture:
             'is PNG, and to read that takes Pillow: pip install "fleet2d[viz]", or convert the'
             " image to PGM"
         ) from None
+    _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size

@@ -1,0 +1,148 @@
+"""Bounds on what is read from files, so that no file can take all memory or time of a machine.
+
+Each is far beyond what real homes, logs and scenarios need, is named in the message that refuses a
+file, and can be raised by a variable of the environment.
+"""
+
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from fleet2d.errors import Fleet2DError, InputError
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The most of something that is read.
+
+    Attributes:
+        name: Of the variable that raises it, behind `FLEET2D_MAX_`.
+        usual: The most, unless that says otherwise.
+        noun: What is counted.
+
+    Example:
+        >>> Bound("DEPTH", 64, "lists in lists").check(100, "home.yaml")
+        Traceback (most recent call last):
+        fleet2d.errors.InputError: home.yaml has 100 lists in lists, and at most 64 are read; if \
+that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
+    """
+
+    name: str
+    usual: int
+    noun: str
+
+    @property
+    def variable(self) -> str:
+        """The variable of the environment that raises it."""
+        return f"FLEET2D_MAX_{self.name}"
+
+    @property
+    def most(self) -> int:
+        """The most that is read now.
+
+        Raises:
+            InputError: The variable holds no whole number above 0.
+        """
+        text = os.environ.get(self.variable, "")
+        if not text:
+            return self.usual
+        if not (text.isascii() and text.isdigit() and len(text) < 19 and int(text) > 0):
+            raise InputError(f"{self.variable} is {text[:40]!r}: a whole number above 0 is wanted")
+        return int(text)
+
+    def check(
+        self, amount: int, what: object, error: type[Fleet2DError] = InputError, *, least: str = ""
+    ) -> None:
+        """Refuse what goes beyond the bound.
+
+        Args:
+            amount: How much there is.
+            what: What has it, for the message.
+            error: What is raised.
+            least: Said before an amount that was not counted to its end, such as "more than ".
+
+        Raises:
+            Fleet2DError: Of the type that is wanted.
+        """
+        if amount > self.most:
+            raise error(
+                f"{what} has {least}{amount} {self.noun}, and at most {self.most} are read; if that"
+                f" is as it should be, set {self.variable}={amount * (2 if least else 1)} in the"
+                " environment"
+            )
+
+
+FILE_BYTES = Bound("FILE_BYTES", 64 << 20, "bytes")
+"""Of a text that is held whole: YAML, JSON, GeoJSON."""
+PICTURE_BYTES = Bound("PICTURE_BYTES", 256 << 20, "bytes")
+"""Of a picture of a floor plan."""
+LOG_BYTES = Bound("LOG_BYTES", 1 << 30, "bytes")
+"""Of a log."""
+DEPTH = Bound("DEPTH", 64, "lists in lists")
+"""Of YAML."""
+VALUES = Bound("VALUES", 500_000, "values")
+"""Of a YAML text, each time that an alias stands for them counted."""
+JSON_VALUES = Bound("JSON_VALUES", 5_000_000, "values")
+"""Of a JSON text."""
+PIXELS = Bound("PIXELS", 1 << 25, "pixels")
+"""Of a picture of a floor plan, unpacked."""
+POLYGONS = Bound("POLYGONS", 5_000, "polygons and lines")
+"""Of a floor plan: rooms, pieces, features, doorways."""
+CORNERS = Bound("CORNERS", 200_000, "corners")
+"""Of all polygons of a floor plan."""
+LOG_ROWS = Bound("LOG_ROWS", 5_000_000, "rows")
+"""Of a log of rooms, activities or detections."""
+FIXES = Bound("FIXES", 20_000_000, "fixes")
+"""Of a log of positions."""
+LOG_DAYS = Bound("LOG_DAYS", 3_660, "days from its first to its last row")
+"""From the first to the last day of a log: ten years."""
+LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
+"""Of what an algorithm has learned, unpacked."""
+TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
+"""Of a table that is read whole, unpacked."""
+
+BOUNDS = (
+    FILE_BYTES, PICTURE_BYTES, LOG_BYTES, DEPTH, VALUES, JSON_VALUES, PIXELS, POLYGONS, CORNERS,
+    LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES,
+)  # fmt: skip
+"""All of them."""
+
+
+def read_bytes(path: Path, bound: Bound, error: type[Fleet2DError] = InputError) -> bytes:
+    """Return the content of a regular file of a bounded size.
+
+    Raises:
+        OSError: It can't be read.
+        Fleet2DError: It is larger than the bound, or is a device or a pipe.
+    """
+    check_file(path, bound, error)
+    with path.open("rb") as file:
+        content = file.read(bound.most + 1)
+    bound.check(len(content), path, error)  # it may have grown since
+    return content
+
+
+def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError) -> None:
+    """Refuse a file that is larger than a bound, and devices and pipes, which have no end.
+
+    Raises:
+        OSError: There is none.
+        Fleet2DError: See above.
+    """
+    state = path.stat()
+    if not (stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)):
+        raise error(f"{path} is a device or a pipe: give a file")
+    bound.check(state.st_size, path, error)
+
+
+def one_line(value: object, most: int = 60) -> str:
+    r"""Return what a file has for a message: on one line, and cut where it is long.
+
+    Example:
+        >>> one_line("a\nb"), one_line("x" * 100, 12)
+        ('a b', 'xxxxxxxxx...')
+    """
+    text = value if isinstance(value, str) else str(value)
+    text = " ".join(text[: 4 * most].split())
+    return text if len(text) <= most else f"{text[: most - 3]}..."

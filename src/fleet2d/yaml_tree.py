@@ -1,0 +1,231 @@
+"""YAML as trees of nodes, of a bounded size and depth: the one reader of all YAML.
+
+Scalars are those of YAML 1.2: booleans are true and false only, 12:30 is text. An alias is the node
+that it stands for, so who walks a tree counts what comes of it: see `Tally`.
+"""
+
+import re
+from typing import Any
+
+import yaml
+
+from fleet2d.bounds import DEPTH, VALUES, one_line
+from fleet2d.errors import InputError
+
+# Of a shorter text all nodes fit into memory, whatever they are.
+_SHORT = 1 << 20
+# libyaml calls itself for each level of a text, without end: as many it may.
+_SHALLOW = 2000
+# Of a longer text PyYAML's own parser, which says better what is wrong, would take too long.
+_TOLD_WELL = 100_000
+
+
+class Loader(yaml.SafeLoader):
+    """PyYAML's safe loader with the scalars of YAML 1.2, dates included."""
+
+
+class _FastLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """The same in C, where PyYAML comes with it."""
+
+
+Pair = tuple[yaml.ScalarNode, yaml.Node]
+
+TAG = "tag:yaml.org,2002:"
+MERGE = f"{TAG}merge"
+_PLAIN = frozenset(TAG + name for name in ("null", "bool", "int", "float", "str", "timestamp"))
+
+Loader.yaml_implicit_resolvers = {}
+for _name, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
+    (
+        "float",
+        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+        list("-+.0123456789"),
+    ),
+    ("merge", r"<<", ["<"]),
+):
+    Loader.add_implicit_resolver(TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
+_TIMESTAMP = [
+    resolver
+    for resolver in yaml.SafeLoader.yaml_implicit_resolvers["1"]
+    if resolver[0] == f"{TAG}timestamp"
+]
+for _digit in "0123456789":
+    Loader.yaml_implicit_resolvers[_digit] += _TIMESTAMP
+_FastLoader.yaml_implicit_resolvers = Loader.yaml_implicit_resolvers
+
+
+def _construct_int(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+    text = node.value
+    return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
+
+
+def _construct_timestamp(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> Any:
+    try:
+        return loader.construct_yaml_timestamp(node)
+    except (ValueError, AttributeError):
+        return node.value  # 2026-02-31, or a tagged text: text, which the model refuses
+
+
+Loader.add_constructor(f"{TAG}int", _construct_int)
+Loader.add_constructor(f"{TAG}timestamp", _construct_timestamp)
+
+
+class NodeError(InputError):
+    """Something is wrong with a node of a YAML text.
+
+    Attributes:
+        node: The node.
+    """
+
+    def __init__(self, node: yaml.Node, message: str) -> None:
+        super().__init__(message)
+        self.node = node
+
+
+def compose(text: str) -> yaml.Node | None:
+    """Return the tree of nodes of a YAML text, None if it is empty.
+
+    Raises:
+        yaml.YAMLError: It is no YAML.
+        InputError: It is beyond a bound.
+    """
+    longest = max(map(len, text.splitlines()), default=0)
+    try:
+        if len(text) > _SHORT or text.count("[") + text.count("{") + 2 * longest > _SHALLOW:
+            _check_events(text)
+        return _composed(_FastLoader(text))
+    except yaml.YAMLError:
+        if len(text) > _TOLD_WELL:
+            raise
+    return _composed(Loader(text))
+
+
+def _composed(loader: Any) -> yaml.Node | None:
+    try:
+        node: yaml.Node | None = loader.get_single_node()
+        return node
+    except RecursionError:
+        raise yaml.YAMLError("it has lists in lists without end") from None
+    finally:
+        loader.dispose()
+
+
+def _check_events(text: str) -> None:
+    """Refuse a text of too many levels or values before anything is built of it."""
+    depth = values = 0
+    most_depth, most_values = DEPTH.most, VALUES.most
+    for event in yaml.parse(text, Loader=_FastLoader):
+        if isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        elif isinstance(event, yaml.NodeEvent):
+            values += 1
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            if depth > most_depth:
+                DEPTH.check(depth, "it", least="at least ")
+            if values > most_values:
+                VALUES.check(values, "it", least="more than ")
+
+
+def parse(text: str) -> Any:
+    r"""Return a YAML text as plain data.
+
+    Raises:
+        yaml.YAMLError: It is no YAML.
+        InputError: It is beyond a bound, or a value in it can't be read.
+
+    Example:
+        >>> parse("a: &x [1, 2]\\nb: {<<: {c: 12:30}, d: *x}")
+        {'a': [1, 2], 'b': {'c': '12:30', 'd': [1, 2]}}
+    """
+    node = compose(text)
+    return None if node is None else _plain(node, [], Walk())
+
+
+def _plain(node: yaml.Node, above: list[yaml.Node], walk: "Walk") -> Any:
+    walk.take(node, above)
+    if isinstance(node, yaml.ScalarNode):
+        return walk.scalar(node)
+    inside = [*above, node]
+    if isinstance(node, yaml.MappingNode):
+        return {key.value: _plain(value, inside, walk) for key, value in walk.pairs(node)}
+    return [_plain(item, inside, walk) for item in node.value]
+
+
+class Walk:
+    """Walks a tree: counts what comes of it, aliases unfolded, and reads scalars and mappings."""
+
+    def __init__(self) -> None:
+        """Count nothing yet."""
+        self._values, self._most_values, self._most_depth = 0, VALUES.most, DEPTH.most
+        self._scalars = Loader("")
+        self._pairs: dict[int, dict[str, Pair] | None] = {}
+
+    def take(self, node: yaml.Node, above: list[yaml.Node]) -> None:
+        """Count a node below others.
+
+        Raises:
+            NodeError: It contains itself.
+            InputError: There are too many.
+        """
+        self._values += 1
+        if self._values > self._most_values:
+            VALUES.check(self._values, "it", least="more than ")
+        if len(above) >= self._most_depth:
+            DEPTH.check(len(above) + 1, "it", least="at least ")
+        if any(node is outer for outer in above):
+            raise NodeError(node, "a value can't contain itself")
+
+    def scalar(self, node: yaml.ScalarNode) -> Any:
+        """Return the value of a scalar.
+
+        Raises:
+            NodeError: Its tag says that it is something else than it is.
+        """
+        kind, found = node.tag.removeprefix(TAG), one_line(node.value)
+        if node.tag not in _PLAIN:
+            raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
+        try:
+            return self._scalars.construct_object(node)
+        except (ValueError, LookupError, TypeError, AttributeError, OverflowError):
+            more = f" of {len(node.value)} characters" if len(node.value) > len(found) else ""
+            raise NodeError(node, f"{found!r}{more} is no {kind} that can be read") from None
+
+    def pairs(self, node: yaml.MappingNode) -> list[Pair]:
+        """Return the keys and values of a mapping, those that it merges from others ('<<') first.
+
+        Raises:
+            NodeError: A key is no text or is there twice, or what is merged is no mapping.
+        """
+        return list(self._pairs_of(node).values())
+
+    def _pairs_of(self, node: yaml.MappingNode) -> dict[str, Pair]:
+        if id(node) in self._pairs:
+            known = self._pairs[id(node)]
+            if known is None:
+                raise NodeError(node, "a value can't contain itself")
+            return known
+        self._pairs[id(node)] = None  # under way
+        own: dict[str, Pair] = {}
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise NodeError(key, "a key must be plain text")
+            if key.value in own:
+                line = own[key.value][0].start_mark.line + 1
+                raise NodeError(key, f"the key {one_line(key.value)!r} is already in line {line}")
+            own[key.value] = (key, value)
+        found: dict[str, Pair] = {}
+        for name, (key, value) in list(own.items()):
+            if key.tag == MERGE:
+                del own[name]
+                sources = value.value if isinstance(value, yaml.SequenceNode) else [value]
+                for source in reversed(sources):  # what the first says holds
+                    if not isinstance(source, yaml.MappingNode):
+                        raise NodeError(source, "'<<' merges a mapping, or a list of mappings")
+                    found.update(self._pairs_of(source))
+        found.update(own)
+        self._pairs[id(node)] = found
+        return found
