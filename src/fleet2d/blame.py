@@ -3,7 +3,7 @@
 import sys
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
@@ -27,15 +27,25 @@ class blame:  # noqa: N801  (used as a function)
         fleet2d.errors.ComponentError: users.ana failed at step 7: KeyError: 'kitchen'
     """
 
+    now: ClassVar["blame | None"] = None
+    """The innermost component whose code runs now, for the watchdog."""
+
+    interrupts: ClassVar[bool] = True
+    """Whether Ctrl-C raises KeyboardInterrupt; in a run it is only noted, so code raised it."""
+
     def __init__(self, path: str, step: int | None) -> None:
         self.path, self.step = path, step
 
     def __enter__(self) -> None:
         """Begin."""
+        self._around, blame.now = blame.now, self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         """Turn an exception into one that says whose it is."""
-        if not isinstance(error, Exception) or isinstance(error, ArtifactError):
+        blame.now = self._around
+        if error is None or isinstance(error, ArtifactError | GeneratorExit | MemoryError):
+            return
+        if isinstance(error, KeyboardInterrupt) and blame.interrupts:
             return
         if isinstance(error, InputError) and self.step is None:
             return
@@ -45,8 +55,16 @@ class blame:  # noqa: N801  (used as a function)
             if when in str(error):
                 return
             raise ComponentError(f"{error} ({when})") from error
-        what = str(error) if own else f"{type(error).__name__}: {error}"
+        what = str(error) if own else f"{type(error).__name__}: {_text(error)}"
         raise ComponentError(f"{self.path} failed {when}: {what}{_place(error)}") from error
+
+
+def _text(error: BaseException) -> str:
+    """Return the message of an error, whose own code may fail too."""
+    try:
+        return str(error)
+    except Exception as failure:  # noqa: BLE001 - it is the user's code
+        return f"(its message can't be written: {type(failure).__name__})"
 
 
 def _place(error: BaseException) -> str:

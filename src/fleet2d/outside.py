@@ -71,7 +71,7 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
         check_trust(name, files_of(folder, module_name))
     try:
         module = _import_module(folder, module_name)
-    except Exception as error:  # whatever the user's module does while it is imported
+    except (Exception, SystemExit) as error:  # whatever the user's module does at its import
         missing = public_name(error.name or "") if isinstance(error, ModuleNotFoundError) else ""
         if missing and f"{module_name}.".startswith(f"{missing}."):
             raise ScenarioError(
@@ -114,7 +114,7 @@ def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
     return f"{shown} has no class {qualname!r}{did_you_mean(qualname, names)} {has}"
 
 
-def _failure(error: Exception, folder: Path) -> str:
+def _failure(error: BaseException, folder: Path) -> str:
     """Say where in the user's files an import failed, and how."""
     what = f"{type(error).__name__}: {public_name(str(error))}"
     if isinstance(error, SyntaxError) and error.filename:

@@ -1,14 +1,13 @@
 """The command that goes on with a run: resume."""
 
-import json
 import sys
+from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from fleet2d.cli.runs import run_with_progress
-from fleet2d.cli.summary import print_summary, summary_of
+from fleet2d.cli.runs import print_results, run_with_progress
 from fleet2d.trust_options import TrustFiles, TrustFolders, trust_of
 
 
@@ -22,12 +21,9 @@ def resume(
     """Go on with a run that was interrupted or killed, to the digest of an undisturbed one."""
     from fleet2d.engine.resume import reopen
 
-    simulation, remark = reopen(directory, trust_of(trust, trust_dir))
-    if not quiet:
-        typer.echo(remark, err=True)
-    stored = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
-    summary = summary_of(stored)
-    if as_json:
-        typer.echo(json.dumps(summary))
-    elif not quiet:
-        print_summary(summary, stored)
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what components print
+        simulation, remark = reopen(directory, trust_of(trust, trust_dir))
+        if not quiet:
+            typer.echo(remark, err=True)
+        stored = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+    print_results(stored, as_json=as_json, quiet=quiet)

@@ -4,7 +4,7 @@ import gc
 import json
 import sys
 import time
-from contextlib import suppress
+from contextlib import nullcontext, redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +12,7 @@ import typer
 
 from fleet2d.arguments import file_name, split
 from fleet2d.cli.summary import print_summary, summary_of
+from fleet2d.cli.watchdog import watched
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
@@ -36,23 +37,35 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Simulate a scenario and store the run."""
-    scenario, overrides = split(arguments)
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what components print
+        stored = run_with_progress(
+            _set_up(arguments, seed, out), show=sys.stderr.isatty() and not quiet
+        )
+    print_results(stored, as_json=as_json, quiet=quiet)
+
+
+def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> "Simulation":
     from fleet2d.engine.simulation import Simulation
     from fleet2d.scenario.model import load_scenario
 
+    scenario, overrides = split(arguments)
     settings = {} if seed is None else {"seed": seed}
-    loaded = load_scenario(scenario, *overrides, **settings)
-    name = loaded.name or (Path(scenario).stem if scenario else "run")
-    directory = out or _fresh_directory(name)
-    try:
-        simulation = Simulation(loaded, out=directory)
-    except BaseException:
-        if out is None:
-            with suppress(OSError):
-                directory.rmdir()
-                directory.parent.rmdir()  # if it was the first run here
-        raise
-    stored = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+    with watched():
+        loaded = load_scenario(scenario, *overrides, **settings)
+        name = loaded.name or (Path(scenario).stem if scenario else "run")
+        directory = out or _fresh_directory(name)
+        try:
+            return Simulation(loaded, out=directory)
+        except BaseException:
+            if out is None:
+                with suppress(OSError):
+                    directory.rmdir()
+                    directory.parent.rmdir()  # if it was the first run here
+            raise
+
+
+def print_results(stored: "Run", *, as_json: bool, quiet: bool) -> None:
+    """Print what came of a run: one JSON object, a table for people, or nothing."""
     summary = summary_of(stored)
     if as_json:
         typer.echo(json.dumps(summary))
@@ -120,7 +133,8 @@ def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
         Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
     """
     try:
-        return _run_with_bar(simulation, show=show)
+        with watched():
+            return _run_with_bar(simulation, show=show)
     except KeyboardInterrupt:
         typer.echo(
             f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"

@@ -11,6 +11,7 @@ from typing import Any
 from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import Entities, InputRecord, Manifest, file_record, versions
 from fleet2d.artifacts.store import RunStore
+from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
@@ -114,6 +115,7 @@ def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
     before = {number: signal.getsignal(number) for number in _STOPPING}
 
     def put_back() -> None:
+        blame.interrupts = True
         for number, handler in before.items():
             signal.signal(number, handler)
 
@@ -125,6 +127,7 @@ def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
 
     for number in _STOPPING:
         signal.signal(number, on_signal)
+    blame.interrupts = False
     try:
         yield
     finally:

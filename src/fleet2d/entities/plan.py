@@ -16,7 +16,7 @@ from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.problems import did_you_mean
-from fleet2d.units import micros
+from fleet2d.units import LONGEST_DURATION, micros
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -218,12 +218,15 @@ class Plan:
         """Stay for a while, or until a local time (at once over if that is past); else for good.
 
         Raises:
-            ComponentError: The duration is negative.
+            ComponentError: The duration is negative, or longer than 1000 years.
         """
         self._check_goes_on()
         if duration is not None:
-            if duration < timedelta(0):
-                raise ComponentError(f"{self._actor.path}: can't stay for {duration}")
+            if not timedelta(0) <= duration <= LONGEST_DURATION:
+                raise ComponentError(
+                    f"{self._actor.path}: can't stay for {duration}: 0 to 1000 years are possible;"
+                    " leave the duration out to stay for good"
+                )
             self.time_us += micros(duration)
         elif until is not None:
             self.time_us = max(self.time_us, self._actor.clock.elapsed(until))

@@ -1,0 +1,211 @@
+"""Code of a user that ends, interrupts, prints, waits or writes where it shouldn't."""
+
+import json
+import time
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from tests.scenes import fleet2d_process, scenario
+
+import fleet2d
+from fleet2d import Algorithm, Behavior, Metric
+from fleet2d.artifacts.reader import open_run
+from fleet2d.blame import blame
+from fleet2d.cli.watchdog import watched
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
+from fleet2d.outside import import_class
+
+
+class Text(Exception):
+    """An error whose message fails."""
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+class Ends(Algorithm):
+    """Does what its key says in the second hour."""
+
+    how: str = "exit"
+
+    def update(self, history: Any, state: Any) -> Any:
+        if state.step < 7000:
+            return {"n": 1.0}
+        raise {
+            "exit": SystemExit(0),
+            "exit with words": SystemExit("bye"),
+            "interrupt": KeyboardInterrupt(),
+            "text": Text(),
+            "recursion": RecursionError(),
+        }[self.how]
+
+
+def small(**sections: Any) -> dict[str, Any]:
+    people = {"users": {"ana": {"type": "meander"}}}
+    robots = {"robots": {"astro": {"type": "patrol", "camera": {"range": [0, 4]}}}}
+    return scenario("3 h", **{**people, **robots, **sections})
+
+
+def name(cls: type) -> str:
+    return f"{__name__}:{cls.__name__}"
+
+
+@pytest.mark.parametrize(
+    ("how", "what"),
+    [
+        ("exit", "SystemExit: 0"),
+        ("exit with words", "SystemExit: bye"),
+        ("interrupt", "KeyboardInterrupt"),
+        ("text", "Text: (its message can't be written: RuntimeError)"),
+        ("recursion", "RecursionError"),
+    ],
+)
+def test_code_that_ends_the_run_is_named_and_the_run_kept(
+    tmp_path: Path, how: str, what: str
+) -> None:
+    algorithms = {"ends": {"type": name(Ends), "how": how}}
+    with pytest.raises(ComponentError) as caught:
+        fleet2d.run(small(algorithms=algorithms), seed=4, out=tmp_path / "run")
+    assert str(caught.value).startswith("algorithms.ends failed at step 7199: " + what)
+    stored = open_run(tmp_path / "run")
+    assert "failed" == stored.status
+    assert 1 == stored.arrow("ends").num_rows
+    assert blame.now is None
+    assert blame.interrupts
+
+
+MODULE = """
+import os, sys
+import fleet2d
+
+print("imported")
+
+class Prints(fleet2d.Algorithm):
+    how: str = ""
+    def start(self, home):
+        print("started")
+    def update(self, history, state):
+        print("updated")
+        if self.how == "exit" and state.step > 3600:
+            sys.exit(0)
+        if self.how == "gone" and state.step > 7000:
+            os._exit(0)
+        return {"n": 1.0}
+"""
+
+
+def test_what_components_print_goes_to_stderr_with_json(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(MODULE)
+    override = "algorithms.own.type=mine:Prints"
+    done = fleet2d_process("run", "simulation.duration=2 h", override, "--json", cwd=tmp_path)
+    assert 0 == done.returncode, done.stderr
+    assert 7200 == json.loads(done.stdout)["steps"]
+    assert ["imported", "started", "updated", "updated"] == done.stderr.splitlines()
+
+
+def test_an_exit_in_an_update_is_exit_code_1(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(MODULE)
+    override = "algorithms.own={type: mine:Prints, how: exit}"
+    done = fleet2d_process("run", "simulation.duration=3 h", override, "--out", "a", cwd=tmp_path)
+    assert 1 == done.returncode
+    assert "algorithms.own failed at step 7199: SystemExit: 0 (mine.py:" in done.stderr
+    assert "failed" == open_run(tmp_path / "a").status
+
+
+def test_a_process_that_is_gone_leaves_a_run_to_go_on_with(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(MODULE)
+    override = "algorithms.own={type: mine:Prints, how: gone}"
+    fleet2d_process("run", "simulation.duration=3 h", override, "--out", "a", cwd=tmp_path)
+    stored = open_run(tmp_path / "a")
+    assert "running" == stored.status
+    assert any("resume" in note for note in stored.notes) or stored.manifest["steps"] == 0
+
+
+@pytest.mark.parametrize("code", ["import sys; sys.exit(0)", "raise SystemExit", "exit(3)"])
+def test_an_exit_at_import_is_an_error(
+    tmp_path: Path, code: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(f"class C: pass\n{code}\n")
+    with pytest.raises(ScenarioError, match=r"can't import 'mine:C': mine\.py:2: SystemExit"):
+        import_class("mine:C")
+
+
+class Writes(Metric):
+    """Looks for arrays of the history and the home that it may change."""
+
+    needs = frozenset({"evidence", "exposure"})
+    writable: list[str] = []  # noqa: RUF012 - of the whole test
+
+    def update(self, history: Any, state: Any) -> None:
+        given = {
+            "observations": history.observations, "truth": history.truth, "looks": history.looks,
+            "exposure": history.exposure, "evidence": history.evidence,
+            "readings": history.readings, "poses": history.poses("ana"),
+            "robot": history.poses("astro"), "earlier": history.between(history.first, history.end),
+            "plan": state.home.plan,
+        }  # fmt: skip
+        for where, value in given.items():
+            type(self).writable += [f"{where}.{at}" for at in writable_arrays(value, 3)]
+
+    def finish(self) -> Any:
+        return {}
+
+
+def writable_arrays(value: Any, depth: int) -> list[str]:
+    if isinstance(value, np.ndarray):
+        return [""] if value.flags.writeable else []
+    if depth == 0 or isinstance(value, str | int | float | type(None) | shapely.Geometry):
+        return []
+    if isinstance(value, tuple | list) and not hasattr(value, "_fields"):
+        items = list(enumerate(value))[:5]
+    else:
+        names = [n for n in dir(value) if n[0] != "_" and n not in ("log", "home", "between")]
+        items = []
+        for each in names:
+            try:
+                found = getattr(value, each)
+            except (Fleet2DError, NotImplementedError):
+                continue
+            if not callable(found):
+                items.append((each, found))
+    return [f"{key}.{at}" for key, entry in items for at in writable_arrays(entry, depth - 1)]
+
+
+def test_arrays_of_the_history_are_read_only() -> None:
+    Writes.writable = []
+    metrics = {"writes": {"type": name(Writes), "period": "1 h"}}
+    fleet2d.run(small(metrics=metrics), seed=4)
+    assert [] == sorted(set(Writes.writable))
+
+
+class Stays(Behavior):
+    """Stays for far too long."""
+
+    def decide(self, now: Any) -> Any:
+        return now.plan().stay(timedelta.max)
+
+
+def test_a_stay_of_millions_of_years_is_refused() -> None:
+    with pytest.raises(ComponentError, match=r"users\.ana.*1000 years"):
+        fleet2d.run(small(users={"ana": {"type": name(Stays)}}), seed=4)
+
+
+def test_a_component_that_keeps_the_run_waiting_is_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with watched(0.05), blame("algorithms.slow", 7):
+        time.sleep(1.0)
+    said = capsys.readouterr().err.splitlines()
+    assert 1 <= len(said) <= 5  # each time that it took twice as long
+    assert said[0].startswith("algorithms.slow has been running for 0 s at step 7 (test_mis")
+    with watched(0.05):
+        time.sleep(0.2)
+        for step in range(20):
+            with blame("algorithms.quick", step):
+                time.sleep(0.01)
+    assert "" == capsys.readouterr().err
