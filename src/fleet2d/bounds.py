@@ -8,6 +8,7 @@ import os
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fleet2d.errors import Fleet2DError, InputError
 
@@ -134,6 +135,30 @@ def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
     if not (stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)):
         raise error(f"{path} is a device or a pipe: give a file")
     bound.check(state.st_size, path, error)
+
+
+def unpacked_bytes(file: Any, group: int | None = None) -> int:
+    """Return about how many bytes a Parquet file, or a row group of it, takes once it is read.
+
+    What is packed says how large it is unpacked, but few values may stand for many rows.
+
+    Args:
+        file: A `pyarrow.parquet.ParquetFile`.
+        group: Number of the row group; None for all.
+    """
+    groups = range(file.num_row_groups) if group is None else (group,)
+    described = [file.metadata.row_group(number) for number in groups]
+    packed = sum(int(each.total_byte_size) for each in described)
+    widths = sum(_width_of(kind) for kind in file.schema_arrow.types)
+    return max(packed, sum(int(each.num_rows) for each in described) * widths)
+
+
+def _width_of(kind: Any) -> int:
+    """Return the bytes that a value of an Arrow type takes at the least."""
+    try:
+        return max(1, int(kind.bit_width) // 8)
+    except ValueError:  # of a text or a list: its offset
+        return 4
 
 
 def one_line(value: object, most: int = 60) -> str:

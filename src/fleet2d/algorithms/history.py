@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.frozen import frozen
 from fleet2d.algorithms.log import Log as Log
 from fleet2d.algorithms.observations import Looks, Observations, Truth, truth
 from fleet2d.algorithms.poses import BodyPoses
@@ -87,9 +88,9 @@ class History:
         """What the sensors said."""
         rows = [row for row in self.log.readings if self.first <= row.step < self.end]
         return Readings(
-            np.array([row.step for row in rows], np.int64),
-            np.array([row.sensor for row in rows], np.int32),
-            np.array([row.on for row in rows], np.bool_),
+            frozen(np.array([row.step for row in rows], np.int64)),
+            frozen(np.array([row.sensor for row in rows], np.int32)),
+            frozen(np.array([row.on for row in rows], np.bool_)),
         )
 
     @cached_property
@@ -107,7 +108,7 @@ class History:
         """
         self._check_metric("truth")
         log = self.log
-        return truth(log.home.plan, log.seen(self.first, self.end).whole, log.activities)
+        return frozen(truth(log.home.plan, log.seen(self.first, self.end).whole, log.activities))
 
     @cached_property
     def looks(self) -> Looks:
@@ -117,7 +118,7 @@ class History:
             ComponentError: The asker is an algorithm.
         """
         self._check_metric("looks")
-        return self.log.looks(self.first, self.end, self.log.users)
+        return frozen(self.log.looks(self.first, self.end, self.log.users))
 
     @cached_property
     def exposure(self) -> NDArray[np.int64]:
@@ -130,7 +131,7 @@ class History:
             ComponentError: The asker has no needs = {"exposure"}.
         """
         self._check_needs("exposure")
-        return self.log.exposure(self.first, self.end)
+        return frozen(self.log.exposure(self.first, self.end))
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -140,7 +141,7 @@ class History:
             ComponentError: The asker has no needs = {"evidence"}, or no period of whole minutes.
         """
         self._check_needs("evidence")
-        return self.log.evidence(self.first, self.end, self.log.users)
+        return frozen(self.log.evidence(self.first, self.end, self.log.users))
 
     def _check_needs(self, what: str) -> None:
         if what not in self.needs:

@@ -130,7 +130,7 @@ class Observations:
     @cached_property
     def activity(self) -> Names:
         """What somebody is taken to do; None where that isn't perceived: object (n,)."""
-        return self._activities.perceived(self._rows.whole)
+        return read_only(self._activities.perceived(self._rows.whole))
 
 
 class Truth(NamedTuple):

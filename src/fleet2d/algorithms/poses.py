@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.frozen import frozen
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.measure import rooms_at, sum_moves
@@ -120,7 +121,7 @@ class BodyPoses:
         Steps are counted from the first one on; the room of who is away is NOWHERE.
         """
         begin = self._runs.step - self._runs.first
-        return begin, begin + self._lengths, self._rooms
+        return frozen((begin, begin + self._lengths, self._rooms))
 
     @cached_property
     def time_in_rooms(self) -> NDArray[np.int64]:

@@ -17,7 +17,7 @@ from fleet2d.artifacts import files
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, empty_chunk
 from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
-from fleet2d.bounds import TABLE_BYTES
+from fleet2d.bounds import TABLE_BYTES, unpacked_bytes
 from fleet2d.errors import ArtifactError
 
 # Bytes of text in one array: Arrow counts them by 32 bits.
@@ -293,23 +293,6 @@ def read_row_groups(path: Path) -> Iterator[pa.Table]:
             except (OSError, pa.ArrowException) as error:
                 raise _damaged(path, error) from error
             yield part
-
-
-def unpacked_bytes(file: pq.ParquetFile, group: int | None = None) -> int:
-    """Return about how many bytes a table, or a row group of it, takes once it is read.
-
-    What is packed says how large it is unpacked, but few values may stand for many rows.
-    """
-    groups = range(file.num_row_groups) if group is None else (group,)
-    described = [file.metadata.row_group(number) for number in groups]
-    packed = sum(each.total_byte_size for each in described)
-    widths = (_width_of(kind) for kind in file.schema_arrow.types)
-    return max(int(packed), sum(int(each.num_rows) for each in described) * sum(widths))
-
-
-def _width_of(kind: pa.DataType) -> int:
-    """Return the bytes that a value of a type takes at the least."""
-    return int(getattr(kind, "byte_width", 4)) if not pa.types.is_boolean(kind) else 1
 
 
 def count_rows(path: Path) -> int:

@@ -13,8 +13,15 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.arrow import unpacked_bytes
-from fleet2d.bounds import FIXES, LOG_BYTES, LOG_DAYS, TABLE_BYTES, check_file, one_line
+from fleet2d.bounds import (
+    FIXES,
+    LOG_BYTES,
+    LOG_DAYS,
+    TABLE_BYTES,
+    check_file,
+    one_line,
+    unpacked_bytes,
+)
 from fleet2d.logs.log import DAY_US, LogError, PositionLog
 from fleet2d.logs.times import parse_time
 from fleet2d.problems import did_you_mean
