@@ -1,0 +1,1 @@
+"""Fuzzers of every reader: what is nearly right, and must be read or refused in plain words."""

@@ -1,0 +1,363 @@
+"""Every reader: files that are right, how they are changed, and how they are read."""
+
+import hashlib
+import io
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+from hypothesis import strategies as st
+from tests.floorplan.test_damaged_files import FORMATS, PGM
+from tests.fuzz.changes import lines, pieces, structures
+from tests.logs.test_read import ADLS, CASAS, HOMER, SENSORS
+from tests.scenes import flat_document, scenario
+
+import fleet2d
+from fleet2d.algorithms.learned import load_learned
+from fleet2d.artifacts.seal import verify_run
+from fleet2d.calibrate.log import read_log as read_detections
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.logs import read_log
+from fleet2d.routines.persona import BUNDLED as PERSONAS
+from fleet2d.scenario.model import load_scenario
+from fleet2d.studies.specification import read_specification
+from fleet2d.trust import Trust, restricted
+
+RUN = Path(__file__).parents[1] / "fixtures" / "runs" / "v2"
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader and its inputs.
+
+    Attributes:
+        name: What it reads.
+        file: What the file is called.
+        contents: Contents of the file that are nearly right.
+        read: Reads the file; what is wrong is a `Fleet2DError`.
+        beside: Puts other files into the folder before.
+        cost: How many times as long as others it takes.
+        is_apart: Whether it is read in a process of its own, which may crash.
+    """
+
+    name: str
+    file: str
+    contents: Callable[[], st.SearchStrategy[bytes]]
+    read: Callable[[Path], Any]
+    beside: Callable[[Path], Any] = lambda _: None
+    cost: int = 1
+    is_apart: bool = False
+
+
+def _yaml(*seeds: Any) -> st.SearchStrategy[bytes]:
+    texts = [yaml.safe_dump(seed, sort_keys=False).encode() for seed in seeds]
+    changed = st.one_of(*map(structures, seeds)).map(_dumped)
+    return st.one_of(changed, changed, *map(pieces, texts))
+
+
+def _dumped(content: Any) -> bytes:
+    try:
+        return yaml.safe_dump(content, sort_keys=False, allow_unicode=True).encode(
+            "utf-8", "replace"
+        )
+    except ValueError:  # a number of too many digits for Python to write
+        return b"{}"
+
+
+def _json(*seeds: Any) -> st.SearchStrategy[bytes]:
+    texts = [json.dumps(seed).encode() for seed in seeds]
+    changed = st.one_of(*map(structures, seeds)).map(lambda c: json.dumps(c).encode())
+    return st.one_of(changed, changed, *map(pieces, texts))
+
+
+# --- Scenarios ---------------------------------------------------------------------------------
+
+
+def _scenario() -> dict[str, Any]:
+    days = [{"on": "weekdays", "items": [{"at": "07:00", "place": "kitchen", "dwell": "20 min"}]}]
+    content = scenario(
+        "1 h",
+        users={
+            "ana": {"type": "routine", "persona": "works_from_home"},
+            "ben": {"type": "schedule", "days": days},
+            "cid": {"behaviors": [{"type": "room_sampling"}, {"type": "meander"}]},
+        },
+        robots={
+            "astro": {
+                "camera": {"range": [0.3, 4.5], "angle_deg": 108, "detection": "95 %"},
+                "behaviors": [{"type": "hangout", "source": "ltp"}, {"type": "patrol"}],
+            }
+        },
+        objects={"door": {"type": "motion_sensor", "at": [2, 1], "range": "4 m"}},
+        algorithms={"ltp": {"type": "long_term_presence", "period": "30 min"}},
+        metrics={"sightings": {}, "ltp_error": {"of": "ltp"}},
+        changes=[{"at": "30 min", "open": "door 1"}],
+    )
+    content["floorplan"] = {"type": "bundled", "cell": "0.05 m", "furnish": True}
+    return content
+
+
+def _study() -> dict[str, Any]:
+    return {
+        "base": _scenario(),
+        "axes": {"robots.astro.speed": [0.3, 0.6], "who": {"options": {"a": {"name": "x"}}}},
+        "replicates": 2,
+        "rules": [{"when": {"who": "a"}, "set": {"users.ana.speed": 1.0}}],
+        "keep": {"metrics": ["sightings.*"], "tables": ["observations"]},
+        "compare": [{"metric": "sightings.astro", "against": {"robots.astro.speed": 0.3}}],
+    }
+
+
+def _persona() -> Any:
+    return yaml.safe_load((PERSONAS / "works_from_home.yaml").read_text())
+
+
+def _safely(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
+    def wrapped(path: Path) -> Any:
+        with restricted(Trust()):
+            return read(path)
+
+    return wrapped
+
+
+def _lives_by(path: Path) -> Any:
+    user = {"type": "routine", "persona": str(path)}
+    return load_scenario({"extends": "bundled:base", "users": {"ana": user}})
+
+
+# --- Runs --------------------------------------------------------------------------------------
+
+
+def _read_run(path: Path) -> None:
+    """Open a run, use all of it, and compare it with its seal."""
+    folder = path if path.is_dir() else path.parent
+    try:
+        run = fleet2d.open_run(folder)
+        _ = run.metrics, run.digest, run.notes, repr(run), run.status
+        for name in run.tables:
+            _ = run.tables[name]
+        _ = run.plan
+        with restricted(Trust()):
+            for body in run.manifest["entities"]["users"][:2]:
+                _ = run.path(body)
+    finally:
+        verify_run(folder)
+
+
+def _run_beside(folder: Path) -> None:
+    shutil.copytree(RUN, folder, dirs_exist_ok=True)
+
+
+@cache
+def _manifest() -> Any:
+    return json.loads((RUN / "manifest.json").read_text())
+
+
+@cache
+def _unfinished() -> dict[str, bytes]:
+    """The files of a run that was interrupted."""
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        run = fleet2d.Simulation("simulation.duration=2 h", seed=4, out=f"{folder}/run")
+        run.advance(4000)
+        run.finish()
+        root = Path(folder) / "run"
+        return {
+            p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()
+        }
+
+
+def _unfinished_beside(folder: Path) -> None:
+    for name, content in _unfinished().items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+
+
+def _resume(path: Path) -> None:
+    """Open an unfinished run, and set it up to go on."""
+    from fleet2d.engine.resume import reopen
+
+    root = path.parents[1]
+    fleet2d.open_run(root)
+    simulation, _ = reopen(root, Trust())
+    simulation.advance(60)
+    simulation.finish()
+
+
+@st.composite
+def _forged(draw: st.DrawFn) -> bytes:
+    """A checkpoint whose state was changed and whose digest was made anew."""
+    magic, _, first, body = _unfinished()["unfinished/checkpoint"].split(b"\n", 3)
+    content = bytearray(body)
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, len(content) - 9))
+        odd = [b"\0", b"\xff", b"\x7f", bytes(8), b"\xff" * 8, b"\xff" * 7 + b"\x7f", b"\1"]
+        new = draw(st.sampled_from(odd))
+        content[at : at + len(new)] = new
+    digest = hashlib.sha256(first + bytes(content)).hexdigest().encode()
+    return b"\n".join((magic, digest, first, bytes(content)))
+
+
+# --- Learned states ----------------------------------------------------------------------------
+
+
+@cache
+def _learned() -> dict[str, Any]:
+    with np.load(RUN / "learned" / "ltp.npz") as file:
+        return {name: file[name] for name in file.files}
+
+
+@st.composite
+def _learned_states(draw: st.DrawFn) -> bytes:
+    arrays = dict(_learned())
+    for _ in range(draw(st.integers(1, 3))):
+        name = draw(st.sampled_from(sorted(arrays) or ["x"]))
+        value = arrays.get(name, np.zeros(3))
+        match draw(st.sampled_from("nvdstrk")):
+            case "n" if value.dtype.kind == "f" and value.size:
+                value = value.copy()
+                odd = [np.nan, np.inf, -1.0, 1e300, 0.0]
+                value.flat[draw(st.integers(0, value.size - 1))] = draw(st.sampled_from(odd))
+            case "v":
+                value = np.array(draw(st.sampled_from([0, -1, 2**62, 1e300, np.nan, "x", True])))
+            case "d":
+                arrays.pop(name, None)
+                continue
+            case "s":
+                value = value[..., :-1] if value.ndim else value
+            case "t":
+                kind = draw(st.sampled_from(["int8", "float32", "U3", "bool", "uint64"]))
+                with np.errstate(all="ignore"):
+                    value = value.astype(kind)
+            case "r":
+                value = value.reshape(-1)
+            case _:
+                name = draw(st.sampled_from([f"{name}/x", "/", "counts", "x//y", "stays/days"]))
+        arrays[name] = value
+    target = io.BytesIO()
+    np.savez(target, **arrays)  # type: ignore[arg-type]
+    return target.getvalue()
+
+
+def _start_from(path: Path) -> None:
+    load_learned(path)
+    algorithms = {"ltp": {"learned": str(path)}}
+    users = dict.fromkeys(("ben",))
+    changes = {"simulation": {"duration": "7 h"}, "algorithms": algorithms}
+    del users
+    fleet2d.Simulation({"extends": "bundled:base", **changes}, seed=4)
+
+
+# --- Tables ------------------------------------------------------------------------------------
+
+
+def _parquet(columns: dict[str, Any]) -> bytes:
+    target = io.BytesIO()
+    pq.write_table(pa.table(columns), target)
+    return target.getvalue()
+
+
+FIXES = "time,id,x,y,heading_deg\n" + "".join(
+    f"2020-03-02 07:00:{second:02},a,{second / 10},1.5,90\n" for second in range(12)
+)
+DETECTIONS = "distance,detected,bearing_deg,identity,true_identity\n" + "".join(
+    f"{row / 20},{int(row % 3 > 0)},{row % 50},ana,{'ana' if row % 5 else 'ben'}\n"
+    for row in range(60)
+)
+
+
+def _words(text: str) -> Callable[[], st.SearchStrategy[bytes]]:
+    """Changes to the cells of a table as to the words of a log."""
+    spaced = text.replace(",", " , ")
+    return lambda: lines(spaced).map(lambda content: content.replace(b" , ", b","))
+
+
+def _replay(path: Path) -> None:
+    """Read a log, and live by it."""
+    read_log(path, time_zone="UTC")
+    user = {"type": "replay", "path": str(path), "time_zone": "UTC", "sort": True}
+    if path.suffix == ".txt":
+        del user["time_zone"]
+    home = scenario("1 h", users={"ana": user}, robots={})
+    fleet2d.Simulation({**home, "simulation": {**home["simulation"], "start": "2020-03-02"}})
+
+
+def _plan(kind: str) -> Reader:
+    name, content, _ = FORMATS[kind]
+    make = _yaml if name.endswith("yaml") else _json
+    return Reader(
+        kind, name, lambda: make(content), load_floorplan,
+        lambda folder: (folder / "map.pgm").write_bytes(PGM), cost=3,
+    )  # fmt: skip
+
+
+def _png() -> bytes:
+    from PIL import Image
+
+    target = io.BytesIO()
+    shades = np.zeros((30, 40), np.uint8)
+    shades[5:-5, 5:-5] = 255
+    Image.fromarray(shades).save(target, "PNG")
+    return target.getvalue()
+
+
+def _drawing(path: Path) -> Any:
+    return load_floorplan(path, resolution=0.1)
+
+
+READERS = {
+    reader.name: reader
+    for reader in (
+        Reader("scenario", "home.yaml", lambda: _yaml(_scenario()), _safely(load_scenario), cost=2),
+        Reader("study", "study.yaml", lambda: _yaml(_study()), _safely(read_specification), cost=2),
+        Reader("persona", "me.yaml", lambda: _yaml(_persona()), _safely(_lives_by)),
+        *(_plan(kind) for kind in FORMATS),
+        Reader("flat", "flat.json", lambda: _json(flat_document()), load_floorplan, cost=3),
+        Reader("map", "map.pgm", lambda: pieces(PGM), _drawing),
+        Reader("drawing", "map.png", lambda: pieces(_png()), _drawing),
+        Reader("casas", "events.txt", lambda: lines(CASAS), _replay, cost=2),
+        Reader("uci sensors", "home_Sensors.txt", lambda: lines(SENSORS), _replay, cost=2),
+        Reader("uci activities", "home_ADLs.txt", lambda: lines(ADLS), _replay, cost=2),
+        Reader("homer", "day.txt", lambda: lines(HOMER), _replay, cost=2),
+        Reader("fixes", "rtls.csv", _words(FIXES), _replay, cost=2),
+        Reader(
+            "fixes as Parquet", "rtls.parquet",
+            lambda: pieces(_parquet({"time": [0.0, 1.0], "x": [1.0, 2.0], "y": [1.0, 1.5]})),
+            _replay, cost=2,
+        ),
+        Reader("detections", "seen.csv", _words(DETECTIONS), read_detections),
+        Reader("manifest", "manifest.json", lambda: _json(_manifest()), _read_run, _run_beside, 3),
+        Reader(
+            "table", "key_frames.parquet",
+            lambda: pieces((RUN / "key_frames.parquet").read_bytes()), _read_run, _run_beside, 3,
+        ),
+        Reader(
+            "plan of a run", "floorplan.json",
+            lambda: _json(json.loads((RUN / "floorplan.json").read_text())), _read_run, _run_beside, 3,
+        ),
+        Reader(
+            "journal", "unfinished/journal",
+            lambda: pieces(_unfinished()["unfinished/journal"]), _resume, _unfinished_beside, 8,
+        ),
+        Reader(
+            "checkpoint", "unfinished/checkpoint",
+            lambda: pieces(_unfinished()["unfinished/checkpoint"]), _resume, _unfinished_beside, 8,
+        ),
+        Reader(
+            "forged checkpoint", "unfinished/checkpoint", _forged, _resume, _unfinished_beside, 8,
+            is_apart=True,
+        ),
+        Reader("learned", "ltp.npz", _learned_states, _start_from, cost=5),
+    )
+}  # fmt: skip
+"""All of them, by name."""
