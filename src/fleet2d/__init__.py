@@ -6,7 +6,7 @@ Heavy parts load when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.leaves import Views, register_views
+from fleet2d.leaves import Judges, Views, register_judges, register_views
 from fleet2d.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -104,7 +104,14 @@ def _notebook() -> Views:
     return notebook
 
 
+def _judges() -> Judges:
+    from fleet2d.engine import reproduce as reproducing
+
+    return reproducing
+
+
 register_views(_notebook)
+register_judges(_judges)
 
 
 def __dir__() -> list[str]:

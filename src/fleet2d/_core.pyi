@@ -1267,3 +1267,75 @@ class Timelines:
     def __getstate__(self) -> tuple[Any, ...]: ...
 
     def __setstate__(self, state: tuple[Any, ...]) -> None: ...
+
+def distances_between(window: Window, body: int, other: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return how far the centres of two bodies are apart.
+
+    Args:
+        window: How bodies move.
+        body: Number of one of them.
+        other: Number of the other.
+
+    Returns:
+        The steps at which the distance changes, int64 (n,), and what it is from then on [lattice units], float64 (n,);
+        infinite while one of them is away.
+    """
+
+def distances_to_shape(window: Window, body: int, edges: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return how far the centre of a body is from a shape, 0 inside it.
+
+    Args:
+        window: How bodies move.
+        body: Number of the body.
+        edges: int64 (n, 4), edges from (x, y) to (x, y) [lattice units]; closed rings enclose an inside.
+
+    Returns:
+        The steps at which the distance changes, int64 (n,), and what it is from then on [lattice units], float64 (n,);
+        infinite while the body is away.
+    """
+
+def speeds(window: Window, body: int, before: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return how far a body comes in each step: at a step, the way from the step before.
+
+    Args:
+        window: How bodies move.
+        body: Number of the body.
+        before: int64 (3,), x, y and away at the step before the window; (0,) if there was none.
+
+    Returns:
+        The steps at which it changes, int64 (n,), and the way of each step from then on [lattice units], float64 (n,).
+    """
+
+def sliding_max(start: numpy.typing.NDArray[numpy.int64], value: numpy.typing.NDArray[numpy.float64], end: int, low: int, high: int, before: float, after: float) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return the greatest value that a signal has from `low` to `high` steps after each step.
+
+    Args:
+        start: int64 (n,), ascending, where the signal's stretches begin.
+        value: float64 (n,), what it is in them.
+        end: The step before which the last one ends.
+        low: The first step of the window, from where it is asked about; negative before it.
+        high: The last step of the window.
+        before: What the signal is before the first step.
+        after: What it is from `end` on.
+
+    Returns:
+        The steps at which it changes, int64 (m,), and what it is from then on, float64 (m,).
+    """
+
+def until(start: numpy.typing.NDArray[numpy.int64], hold: numpy.typing.NDArray[numpy.float64], goal: numpy.typing.NDArray[numpy.float64], after: float) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return how well one signal holds until another one does, from each step on.
+
+    Args:
+        start: int64 (n,), ascending, where the stretches of both begin.
+        hold: float64 (n,), what must hold.
+        goal: float64 (n,), until when.
+        after: What comes after the last stretch.
+
+    Returns:
+        The steps at which it changes, int64 (m,), and what it is from then on, float64 (m,).
+    """

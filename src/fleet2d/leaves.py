@@ -1,4 +1,4 @@
-"""What shows runs and homes: named from above, so that what is shown knows nothing of it.
+"""What shows and judges runs: named from above, so that what is shown knows nothing of it.
 
 A few methods of `Run` and `FloorPlan` hand over to it. Everything else works without.
 """
@@ -28,7 +28,35 @@ class Views(Protocol):
         """Return the page of a run as a widget of a height [pixels]."""
 
 
+class Judges(Protocol):
+    """What judges finished runs; `fleet2d.engine.reproduce` does."""
+
+    def judge_again(self, run: Any, expectation: Any, name: str) -> Any:
+        """Return the verdict on what is expected of a run."""
+
+
 _load: list[Callable[[], Views]] = []
+_load_judges: list[Callable[[], Judges]] = []
+
+
+def register_judges(load: Callable[[], Judges]) -> None:
+    """Name what judges finished runs from now on.
+
+    Args:
+        load: Returns it; called when something is judged.
+    """
+    _load_judges[:] = [load]
+
+
+def judges() -> Judges:
+    """Return what judges finished runs.
+
+    Raises:
+        InputError: There is nothing.
+    """
+    if not _load_judges:
+        raise InputError("nothing is registered that could judge a run")
+    return _load_judges[0]()
 
 
 def register_views(load: Callable[[], Views]) -> None:

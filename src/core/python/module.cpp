@@ -33,4 +33,5 @@ NB_MODULE(_core, m) {
     bind_stays(m);
     bind_smoothing(m);
     bind_timelines(m);
+    bind_signals(m);
 }

@@ -29,5 +29,6 @@ void bind_evidence(nanobind::module_& m);
 void bind_legs(nanobind::module_& m);
 void bind_stays(nanobind::module_& m);
 void bind_smoothing(nanobind::module_& m);
+void bind_signals(nanobind::module_& m);
 
 }  // namespace fleet2d

@@ -73,6 +73,10 @@ class Activities:
         steps.append(step)
         codes.append(self._code(activity))
 
+    def now(self, user: int) -> str | None:
+        """Return what a user began last; None if nothing is known."""
+        return list(self._codes)[self._begun[user][1][-1]]
+
     def true(self, rows: I64) -> Names:
         """Return what the user of each row of observations did at the look."""
         return self._named(self._looked_at(rows)[0])

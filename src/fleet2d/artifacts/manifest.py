@@ -128,6 +128,7 @@ class Manifest(BaseModel):
         metrics: Summary of the metrics.
         notes: Remarks in plain words.
         interventions: What was done to the run from outside, in order.
+        expectations: What became of what was expected, by name; see `Verdict.content`.
         resumed: The steps at which it was taken up again after it had ended early.
         seal: What the whole run is recognised by; None until the run is closed, and in format 1.
 
@@ -155,6 +156,7 @@ class Manifest(BaseModel):
     metrics: dict[str, Any] = {}
     notes: list[str] = []
     interventions: list[dict[str, Any]] = []
+    expectations: dict[str, dict[str, Any]] = {}
     resumed: list[Count] = []
     seal: Seal | None = None
 
@@ -208,7 +210,7 @@ class Manifest(BaseModel):
 
 
 # What the manifest of every version has.
-_ALWAYS = Manifest.model_fields.keys() - {"interventions", "resumed", "seal"}
+_ALWAYS = Manifest.model_fields.keys() - {"expectations", "interventions", "resumed", "seal"}
 
 
 def read_content(directory: Path) -> Any:

@@ -7,6 +7,7 @@ import typer
 
 from fleet2d.cli import inputs, pictures, runs
 from fleet2d.cli.plugins import Commands
+from fleet2d.cli.product_tests import run_tests
 from fleet2d.cli.reproduce import reproduce
 from fleet2d.cli.resume import resume
 from fleet2d.cli.verify import verify
@@ -34,6 +35,7 @@ for command in (
     reproduce,
 ):
     app.command()(command)
+app.command("test")(run_tests)
 
 
 @app.callback()

@@ -7,6 +7,8 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from fleet2d.cli.verdicts import print_expectations
+
 if TYPE_CHECKING:
     from fleet2d.metrics.metric import Metric
     from fleet2d.runs.run import Run
@@ -30,6 +32,7 @@ def summary_of(stored: "Run") -> dict[str, Any]:
         "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
         "peak_rss_mb": _peak_rss_mb(),
         "metrics": stored.metrics,
+        **({"expectations": judged} if (judged := manifest["expectations"]) else {}),
     }
 
 
@@ -66,6 +69,7 @@ def print_summary(summary: dict[str, Any], stored: "Run") -> None:
         console.print(table)
     if hidden:
         console.print(f"{hidden} more numbers are in the run: --json shows them", highlight=False)
+    print_expectations(console, stored.manifest["expectations"])
     for note in stored.notes or stored.manifest["notes"]:
         console.print(f"note: {note}", highlight=False)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)

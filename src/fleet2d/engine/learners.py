@@ -252,7 +252,7 @@ def checked_result(result: Any, where: str = "result()") -> Any:
     return result
 
 
-_FIXED = {"trajectories", "key_frames", "observations", "events", "sensors"}
+_FIXED = {"trajectories", "key_frames", "observations", "events", "sensors", "violations"}
 
 
 def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:

@@ -144,6 +144,8 @@ def _update(state: State, log: Log, end: int) -> None:
     if learners.next_due() == end or any(event.event in awaited for event in happened):
         state.count_looks()
         learners.update(end, log, happened)
+        if state.expecting is not None:
+            state.expecting.learned(end, state)
         for name, output in learners.fresh.items():
             if isinstance(output, HomeChanges):
                 for change in output.changes:

@@ -2,16 +2,20 @@
 
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.seal import verify_run
+from fleet2d.engine.expecting import TABLE
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.keeping import SLOW
 from fleet2d.engine.simulation import Simulation
-from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
+from fleet2d.expectations.expectation import Expectation
+from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import Trust, refuse_untrusted, restricted
@@ -20,6 +24,9 @@ from fleet2d.trust import Trust, refuse_untrusted, restricted
 NOT_COMPARED = ("inputs", "resumed", "versions", "wall_s")
 # Compared by itself, or for every run the same.
 _APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
+
+# What an expectation is called while a run is judged by it; no name in a scenario has a space.
+JUDGED = "what is judged"
 
 
 @dataclass(frozen=True)
@@ -84,7 +91,40 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
     return Reproduction(stored.digest, again.digest, sorted(differing), causes)
 
 
+def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Verdict:
+    """Judge a finished run: it is run again from its manifest, and what is expected is measured.
+
+    Raises:
+        InputError: See `Simulation.expect`; or the run isn't complete, or its code isn't trusted.
+        ArtifactError: The run comes out otherwise now.
+    """
+    if run.status != "complete":
+        raise RunDirectoryError(
+            f"the run is {run.status}: only a complete run can be judged; what was expected while"
+            " it went on is in manifest['expectations']"
+        )
+    content, trust = run.manifest, Trust.of(())
+    if run.directory is not None:
+        refuse_untrusted(run.directory, content["scenario"], trust)
+    with restricted(trust) if run.directory is not None else nullcontext():
+        simulation = _simulation(content, None)
+        label = simulation.expect(expectation, JUDGED)
+        again = simulation.run()
+    differing = set(_tables(content["tables"], again.manifest["tables"])) - {TABLE}
+    if differing:
+        raise ArtifactError(
+            f"the run comes out otherwise now ({', '.join(sorted(differing))}), so it can't be"
+            " judged: `fleet2d reproduce` says what has changed"
+        )
+    verdict = simulation.verdicts()[label]
+    return replace(verdict, name=name or verdict.expectation)
+
+
 def _run_again(content: Mapping[str, Any], out: Path) -> Run:
+    return _simulation(content, out).run()
+
+
+def _simulation(content: Mapping[str, Any], out: Path | None) -> Simulation:
     # Running it at a pace of its own would only take longer; checkpoints would only cost time.
     scenario = content["scenario"]
     if not isinstance(scenario.get("simulation"), dict):
@@ -92,7 +132,9 @@ def _run_again(content: Mapping[str, Any], out: Path) -> Run:
     changed = {**scenario, "simulation": {**scenario["simulation"], "speedup": None}}
     try:
         loaded = load_scenario(changed, "artifacts.checkpoint=off")
-        return Simulation(loaded, out=out, interventions=content["interventions"]).run()
+        simulation = Simulation(loaded, out=out, interventions=content["interventions"])
+        simulation._expect_again(content["expectations"])
+        return simulation
     except RecursionError as error:
         raise InputError(f"{FILE_NAME}: the scenario is nested too deeply") from error
 

@@ -12,6 +12,7 @@ from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.expecting import expect
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
@@ -98,6 +99,9 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         path = f"script.{index}"
         with _placing(scenario, path), _named(path):
             take_up(state, entry, 0, index)
+    for name, expectation in scenario.expect.items():
+        with _placing(scenario, f"expect.{name}"):
+            expect(state, scenario, clock, name, expectation, 0)
     return state
 
 

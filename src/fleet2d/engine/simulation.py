@@ -15,6 +15,7 @@ from fleet2d.clock import Clock
 from fleet2d.engine.checkpoint import Checkpoint, Keeper
 from fleet2d.engine.garbage import rare_collections
 from fleet2d.engine.interventions import is_from_outside, read_intervention
+from fleet2d.engine.judging import Judging
 from fleet2d.engine.keeping import (
     deferred_interrupt,
     describe_end,
@@ -33,7 +34,6 @@ from fleet2d.engine.snapshot import (
     write_snapshot,
 )
 from fleet2d.engine.state import State
-from fleet2d.engine.steering import Steering
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import LEARNED_NAME, Run, run_of
 from fleet2d.scenario.model import Scenario, load_scenario
@@ -42,7 +42,7 @@ from fleet2d.scenario.model import Scenario, load_scenario
 SHORT = 100
 
 
-class Simulation(Steering):
+class Simulation(Judging):
     """A scenario under way: step it, run it until a time, look at it, branch it.
 
     Attributes:
@@ -300,6 +300,7 @@ class Simulation(Steering):
             except BaseException as error:
                 self._fail(error)
                 raise
+        self._store_verdicts(results, status)
         self._simulate_s += time.perf_counter() - began
         began = time.perf_counter()
         state.recorder.end(self.step, len(state.actors))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,9 @@ from fleet2d.events import Event, EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
+
+if TYPE_CHECKING:
+    from fleet2d.engine.expecting import Expecting
 
 # The most steps that watchers take in together: the fewer, the more bodies there are.
 MOST_STEPS = 1 << 16
@@ -61,6 +64,7 @@ class State:
         driven: Rows of the bodies that are driven from outside.
         wanted: Kinds of events at which somebody outside wants the span to end.
         awaited: Those, and the kinds that interventions wait for.
+        expecting: What is expected of the run; None if nothing is.
         notes_emitted: How many of the notes of each body's present plan have happened.
     """
 
@@ -87,6 +91,7 @@ class State:
     driven: set[int] = field(default_factory=set)
     wanted: frozenset[str] = frozenset()
     awaited: frozenset[str] = frozenset()
+    expecting: "Expecting | None" = None
     notes_emitted: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -133,6 +138,8 @@ class State:
         self.notes_emitted[row] = 0
         self.emit_notes(row, step)
         self.recorder.after_plan(row, step)
+        if self.expecting is not None:
+            self.expecting.begin_plan(self.actors[row])
 
     def emit_notes(self, row: int, step: int) -> None:
         """Emit what the plan of a body notes up to a step."""
@@ -190,6 +197,8 @@ class State:
         if EventKind.SENSOR in self.awaited:
             self.interventions.take_events(self.sensors.events_of(readings))
         self.recorder.take(first, end, observations, readings)
+        if self.expecting is not None:
+            self.expecting.take(first, end, self, observations, readings)
         if self.log is not None:
             self.log.observe(observations)
             self.log.readings += readings

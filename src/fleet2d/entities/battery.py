@@ -1,6 +1,6 @@
 """Batteries: how long a robot drives and stands on a charge, and what is left of it."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,33 @@ class Battery(Settings):
         description="where the charger is: a point, or a room, at the point farthest from its walls"
     )
     charge: Share = Field(default=1.0, description="charge when the run begins")
+
+
+class Course(NamedTuple):
+    """How a charge goes on while a motion is followed.
+
+    Attributes:
+        level: Charge at `begins[0]`, 0 to 1.
+        begins: Moments from which on it changes at another rate [us], int64 (n,).
+        rates: The rates [1/us], (n,).
+    """
+
+    level: float
+    begins: I64
+    rates: list[float]
+
+    def levels(self, moments: I64) -> NDArray[np.float64]:
+        """Return the charge at some moments, none of them before it begins [us]."""
+        level, rows = self.level, []
+        for i, rate in enumerate(self.rates):
+            rows.append(level)
+            if i + 1 < len(self.rates):
+                change = rate * int(self.begins[i + 1] - self.begins[i])
+                level = min(1.0, max(0.0, level + change))
+        piece = np.searchsorted(self.begins, moments, side="right") - 1
+        since = moments - self.begins[piece]
+        levels: NDArray[np.float64] = np.array(rows)[piece] + np.array(self.rates)[piece] * since
+        return levels.clip(0.0, 1.0)
 
 
 class Charge:
@@ -69,6 +96,10 @@ class Charge:
             if lasts > 0:
                 self.level = min(1.0, max(0.0, self.level + rate * lasts))
         self._since_us = until_us
+
+    def course(self, motion: Motion) -> Course:
+        """Return how the charge goes on from the last decision, if a motion is followed."""
+        return Course(self.level, *self._rates(motion, self._since_us))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
         """Return when a motion that begins now brings the charge down to a level [us], or None."""

@@ -13,7 +13,7 @@ from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.prefix import Prefix
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.leaves import views
+from fleet2d.leaves import judges, views
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from fleet2d.artifacts.store import RunStore
+    from fleet2d.expectations.expectation import Expectation
+    from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
 
@@ -156,6 +158,20 @@ class Run:
         from fleet2d.runs.trajectory import rebuild_path
 
         return rebuild_path(self, self.plan, entity, every)
+
+    def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
+        """Judge the run by an expectation: it is run again from its manifest, exactly as it was.
+
+        Args:
+            expectation: What is expected, from the first step on.
+            name: What it is called.
+
+        Raises:
+            InputError: It names what isn't there, or can never happen; or the run isn't complete.
+            ArtifactError: The run comes out otherwise now.
+        """
+        verdict: Verdict = judges().judge_again(self, expectation, name)
+        return verdict
 
     def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
         """Draw the run, or a moment of it; needs the extra `viz`.

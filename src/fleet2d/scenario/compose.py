@@ -13,7 +13,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.problems import did_you_mean
 
 BUNDLED = Path(__file__).parent / "bundled"
-ENTRIES = ("users", "robots", "objects", "algorithms", "metrics")
+ENTRIES = ("users", "robots", "objects", "algorithms", "metrics", "expect")
 """The sections whose entries have names and can be deleted with null."""
 
 _SLOTS = (

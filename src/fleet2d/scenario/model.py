@@ -22,6 +22,7 @@ from fleet2d.document import Document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ScenarioError
+from fleet2d.expectations.written import Written
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interventions.script import Entry
@@ -170,6 +171,9 @@ class Scenario(Settings):
     )
     metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _Named, _Typed] = Field(
         default={}, description="What is only recorded, by name."
+    )
+    expect: Annotated[dict[str, Written], _Named] = Field(
+        default={}, description="What must hold over the run, by name."
     )
     artifacts: ArtifactSettings = Field(
         default=ArtifactSettings(), description="What a run stores."

@@ -1,0 +1,199 @@
+"""`fleet2d test`: scenarios that say what they expect, run over seeds and judged."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fleet2d.arguments import file_name
+from fleet2d.errors import Fleet2DError, InputError
+
+if TYPE_CHECKING:
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.expectations.verdict import Verdict
+    from fleet2d.scenario.model import Scenario
+
+FIRST_SEED = 1
+MOST_KEPT = 5
+"""Of one scenario so many failing seeds are stored or drawn."""
+
+
+@dataclass
+class Case:
+    """A scenario with a seed, and what became of it.
+
+    Attributes:
+        source: The scenario's file, as it was named.
+        scenario: The scenario, with the seed.
+        verdicts: On each expectation, by name.
+        error: What broke the run; empty if nothing did.
+        wall_s: How long it took.
+        files: What was kept of a failure.
+    """
+
+    source: str
+    scenario: "Scenario"
+    overrides: Sequence[str]
+    verdicts: "Mapping[str, Verdict]" = field(default_factory=dict)
+    error: str = ""
+    wall_s: float = 0.0
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def seed(self) -> int:
+        """Its seed."""
+        assert self.scenario.simulation.seed is not None
+        return self.scenario.simulation.seed
+
+    @property
+    def fails(self) -> bool:
+        """Whether it broke, or violates an expectation."""
+        return bool(self.error) or not all(v.holds for v in self.verdicts.values())
+
+    @property
+    def name(self) -> str:
+        """What its directory and pictures are called."""
+        return f"{file_name(Path(self.source).stem) or 'run'}-seed-{self.seed}"
+
+    def again(self, verdict: "Verdict") -> str:
+        """Return the commands that show the moment again."""
+        changes = " ".join(f"'{override}'" for override in self.overrides)
+        run = f"fleet2d run {self.source} {changes}".rstrip()
+        worst = verdict.worst
+        moment = f" --at 'step {worst.worst}'" if worst is not None else ""
+        return f"{run} --seed {self.seed} --out {self.name} && fleet2d show {self.name}{moment}"
+
+
+def run_tests(
+    arguments: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO.yaml... [KEY.PATH=VALUE]...",
+            help="Scenarios that say what they expect, and changes to all of them.",
+        ),
+    ],
+    seeds: Annotated[int, typer.Option(min=1, help="With how many seeds each is run.")] = 1,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="The first seed; left out: the scenario's own, or 1.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="JUnit XML to write.")] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Folder for a picture of the worst moment of each failure.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the run directories of seeds that fail.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Run scenarios and judge what they expect; exit code 1 where something is violated."""
+    files = [argument for argument in arguments if "=" not in argument]
+    overrides = [argument for argument in arguments if "=" in argument]
+    if not files:
+        raise InputError("say which scenarios: fleet2d test SCENARIO.yaml…")
+    if pictures is not None:
+        _check_pictures()
+    cases = [case for file in files for case in _cases(file, overrides, seeds, seed)]
+    kept: dict[str, int] = {}
+    for case in cases:
+        _run(case)
+        if case.fails and not case.error and (pictures or out):
+            kept[case.source] = kept.get(case.source, 0) + 1
+            if kept[case.source] <= MOST_KEPT:
+                _keep(case, pictures, out)
+    if junit is not None:
+        from fleet2d.cli.junit import write_junit
+
+        write_junit(junit, cases)
+    if as_json:
+        typer.echo(json.dumps([_content(case) for case in cases]))
+    else:
+        from fleet2d.cli.verdicts import print_cases
+
+        print_cases(cases)
+    if any(case.fails for case in cases):
+        raise typer.Exit(1)
+
+
+def _cases(source: str, overrides: Sequence[str], seeds: int, seed: int | None) -> Iterator[Case]:
+    """Yield a scenario with each of its seeds; all of it is checked before anything runs.
+
+    Raises:
+        InputError: The scenario, or something that it expects, is wrong; or it expects nothing.
+    """
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.scenario.model import load_scenario
+
+    scenario = load_scenario(source, *overrides)
+    if not scenario.expect:
+        raise InputError(
+            f"{source} expects nothing: write, for example,\n"
+            "  expect: {keeps_off: 'always(distance(ana, astro) > 0.5 m)'}"
+        )
+    own = scenario.simulation.seed
+    first = seed if seed is not None else FIRST_SEED if own is None else own
+    Simulation(scenario)
+    for number in range(first, first + seeds):
+        simulation = scenario.simulation.model_copy(update={"seed": number})
+        yield Case(source, scenario.model_copy(update={"simulation": simulation}), overrides)
+
+
+def _run(case: Case) -> None:
+    """Run a case, and judge it."""
+    import time
+
+    began = time.perf_counter()
+    try:
+        simulation = _simulation(case)
+        simulation.run()
+        case.verdicts = simulation.verdicts()
+    except Fleet2DError as error:
+        case.error = str(error)
+    case.wall_s = time.perf_counter() - began
+
+
+def _simulation(case: Case, out: Path | None = None) -> "Simulation":
+    from fleet2d.engine.simulation import Simulation
+
+    return Simulation(case.scenario, out=out)
+
+
+def _keep(case: Case, pictures: Path | None, out: Path | None) -> None:
+    """Run a case that failed once more, to store it, and to draw the moments."""
+    directory = None if out is None else out / case.name
+    run = _simulation(case, directory).run()
+    if directory is not None:
+        case.files.append(directory)
+    if pictures is None:
+        return
+    from fleet2d.viewer.pictures import draw_moment
+
+    pictures.mkdir(parents=True, exist_ok=True)
+    for verdict in case.verdicts.values():
+        worst = verdict.worst
+        if worst is not None:
+            path = pictures / f"{case.name}-{file_name(verdict.name)}.png"
+            draw_moment(run, worst.worst, path)
+            case.files.append(path)
+
+
+def _check_pictures() -> None:
+    """Refuse pictures where nothing can draw them, before anything is run."""
+    from importlib.util import find_spec
+
+    if find_spec("matplotlib") is None:
+        raise InputError("--pictures needs matplotlib: pip install 'fleet2d[viz]'")
+
+
+def _content(case: Case) -> dict[str, Any]:
+    return {
+        "scenario": case.source,
+        "seed": case.seed,
+        "holds": not case.fails,
+        "error": case.error or None,
+        "wall_s": case.wall_s,
+        "expectations": {name: verdict.content() for name, verdict in case.verdicts.items()},
+        "files": [str(path) for path in case.files],
+    }

@@ -1,0 +1,309 @@
+"""Gauges: what measures the signals of expectations during a run, stretch by stretch."""
+
+from collections.abc import Callable, Sequence, Set
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.activities import ROBOT
+from fleet2d.algorithms.log import SensorRow
+from fleet2d.engine.bodies import Bodies
+from fleet2d.events import Event, EventKind
+from fleet2d.expectations import states
+from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
+from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels.look import IDENTITY, STEP
+from fleet2d.kernels.measure import rooms_at
+from fleet2d.kernels.signals import distances_between, distances_to_shape, speeds
+
+I64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Block:
+    """What is known of the steps from `first` to `end` - 1, in which the home doesn't change.
+
+    Attributes:
+        bodies: How everybody moves.
+        home: The home in these steps.
+        observations: What robots perceived, int64 (n, OBSERVATION).
+        readings: What sensors said.
+        events: What happened, in order of step.
+        sensors: Names of the sensors, in the order of their numbers.
+    """
+
+    first: int
+    end: int
+    bodies: Bodies
+    home: Home
+    observations: I64
+    readings: Sequence[SensorRow]
+    events: Sequence[Event]
+    sensors: Sequence[str]
+
+
+class Gauge:
+    """Measures a signal, block by block.
+
+    Attributes:
+        words: What each value stands for, of a signal of words.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.words: dict[int, Set[str]] = {}
+        self._parts: list[Trace] = []
+
+    def take(self, block: Block) -> None:
+        """Measure a block."""
+        self._parts.append(self._measure(block))
+
+    def trace(self, end: int) -> Trace:
+        """Return what was measured before a step, which all blocks have reached."""
+        whole = joined(self._parts)
+        self._parts = [whole]
+        return whole
+
+    def _measure(self, block: Block) -> Trace:
+        raise NotImplementedError
+
+
+class BodyGauge(Gauge):
+    """Measures a body by the runs of its pose, and goes on from where it was."""
+
+    def __init__(self, row: int) -> None:
+        super().__init__()
+        self._row = row
+
+    def _window(self, block: Block) -> Any:
+        return block.bodies.window(block.first, block.end)
+
+
+class DistanceGauge(BodyGauge):
+    """Measures how far a body is from another, or from a shape [m]."""
+
+    def __init__(self, row: int, other: int | None, shape: Callable[[Home], I64] | None) -> None:
+        super().__init__(row)
+        self._other, self._shape = other, shape
+
+    def _measure(self, block: Block) -> Trace:
+        window = self._window(block)
+        if self._other is not None:
+            start, value = distances_between(window, self._row, self._other)
+        else:
+            assert self._shape is not None
+            start, value = distances_to_shape(window, self._row, self._shape(block.home))
+        return Trace(start, value / block.home.plan.lattice.units_per_m, block.end)
+
+
+class SpeedGauge(BodyGauge):
+    """Measures how fast a body goes [m/s]: the way from the step before."""
+
+    def __init__(self, row: int, before: Sequence[int], step_us: int) -> None:
+        super().__init__(row)
+        self._before = np.array(before, np.int64)
+        self._steps_a_second = 1e6 / step_us
+
+    def _measure(self, block: Block) -> Trace:
+        start, way = speeds(self._window(block), self._row, self._before)
+        pose = block.bodies.pose_at(self._row, block.end - 1)
+        self._before = np.array([pose.x, pose.y, pose.away], np.int64)
+        metres = way / block.home.plan.lattice.units_per_m
+        return Trace(start, metres * self._steps_a_second, block.end)
+
+
+class RoomGauge(BodyGauge):
+    """Tells the room of a body; -1 where there is none, or away."""
+
+    def __init__(self, row: int, home: Home) -> None:
+        super().__init__(row)
+        self.words = {room.index: {room.name, room.type} for room in home.rooms}
+
+    def _measure(self, block: Block) -> Trace:
+        runs = block.bodies.runs(self._row, block.first, block.end)
+        room = rooms_at(block.home.plan.room_of_place, runs.x, runs.y)
+        return shortest(runs.step, np.where(runs.away != 0, -1.0, room), block.end)
+
+
+class AwayGauge(BodyGauge):
+    """Tells whether a body is away."""
+
+    def _measure(self, block: Block) -> Trace:
+        runs = block.bodies.runs(self._row, block.first, block.end)
+        return shortest(runs.step, (runs.away != 0).astype(np.float64), block.end)
+
+
+class DoorGauge(Gauge):
+    """Tells whether a door is open."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self._number = number
+
+    def _measure(self, block: Block) -> Trace:
+        is_open = self._number not in block.home.shut
+        return constant(float(is_open), block.first, block.end)
+
+
+class SwitchGauge(Gauge):
+    """Follows what changes at single steps: an activity, whether somebody is seen, a sensor."""
+
+    def __init__(self, now: float) -> None:
+        super().__init__()
+        self._now = now
+
+    def _measure(self, block: Block) -> Trace:
+        start, value = [block.first], [self._now]
+        for step, now in self._changes(block):
+            if step > start[-1]:
+                start.append(step)
+                value.append(now)
+            else:
+                value[-1] = now
+        self._now = value[-1]
+        return shortest(np.array(start, np.int64), np.array(value), block.end)
+
+    def _changes(self, block: Block) -> list[tuple[int, float]]:
+        """Return what it is from which step on, in order."""
+        raise NotImplementedError
+
+
+class SeenGauge(SwitchGauge):
+    """Follows whether a camera's owner counts somebody as seen."""
+
+    def __init__(self, signal: states.Sight, now: bool) -> None:
+        super().__init__(float(now))
+        self._body, self._by = signal.body, signal.by
+
+    def _changes(self, block: Block) -> list[tuple[int, float]]:
+        seen = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
+        lost = (EventKind.USER_LOST, EventKind.ROBOT_LOST)
+        return [
+            (event.step, float(event.event in seen))
+            for event in block.events
+            if event.entity == self._by
+            and event.detail == self._body
+            and event.event in seen + lost
+        ]
+
+
+class ActivityGauge(SwitchGauge):
+    """Follows what a user does."""
+
+    NOTHING = -1.0
+
+    def __init__(self, user: str, now: str | None) -> None:
+        super().__init__(self.NOTHING)
+        self._user = user
+        if now is not None:
+            self._now = self._code(now)
+
+    def _code(self, activity: str) -> float:
+        known = next((code for code, words in self.words.items() if activity in words), None)
+        if known is None:
+            known = len(self.words)
+            self.words[known] = {activity}
+        return float(known)
+
+    def _changes(self, block: Block) -> list[tuple[int, float]]:
+        return [
+            (event.step, self._code(event.detail))
+            for event in block.events
+            if event.event == EventKind.ACTIVITY and event.entity == self._user
+        ]
+
+
+class SensorGauge(SwitchGauge):
+    """Follows whether a sensor is on."""
+
+    def __init__(self, name: str, now: bool) -> None:
+        super().__init__(float(now))
+        self._name = name
+
+    def _changes(self, block: Block) -> list[tuple[int, float]]:
+        rows = block.readings
+        return [
+            (row.step, float(row.on)) for row in rows if block.sensors[row.sensor] == self._name
+        ]
+
+
+class EventGauge(Gauge):
+    """Counts events at each step."""
+
+    def __init__(self, signal: states.Happens) -> None:
+        super().__init__()
+        self._kind, self._entity, self._detail = signal.kind, signal.entity, signal.detail
+
+    def _measure(self, block: Block) -> Trace:
+        steps = [
+            event.step
+            for event in block.events
+            if event.event == self._kind
+            and self._entity in (None, event.entity)
+            and self._detail in (None, event.detail)
+        ]
+        return pulses(np.array(steps, np.int64), block.first, block.end)
+
+
+class PerceivedGauge(Gauge):
+    """Tells at which steps a robot perceives somebody."""
+
+    def __init__(self, robot: int, user: int) -> None:
+        super().__init__()
+        self._robot, self._user = robot, user
+
+    def _measure(self, block: Block) -> Trace:
+        rows = block.observations
+        rows = rows[(rows[:, ROBOT] == self._robot) & (rows[:, IDENTITY] == self._user)]
+        return pulses(np.unique(rows[:, STEP]), block.first, block.end)
+
+
+class NotedGauge(Gauge):
+    """Keeps a number that is handed in whenever it changes; missing before the first one."""
+
+    def __init__(self, since: int, read: Callable[[Any], float]) -> None:
+        super().__init__()
+        self._start, self._value = [since], [float("nan")]
+        self._read = read
+
+    def note(self, step: int, source: Any) -> None:
+        """Take in what it is from a step on."""
+        while self._start and self._start[-1] >= step:
+            self._start.pop()
+            self._value.pop()
+        self._start.append(step)
+        self._value.append(self._read(source))
+
+    def take(self, block: Block) -> None:
+        """Do nothing: it is told."""
+
+    def trace(self, end: int) -> Trace:
+        """Return what it was before a step."""
+        start, value = np.array(self._start, np.int64), np.array(self._value)
+        known = start < end
+        return shortest(start[known], value[known], end)
+
+
+def outline(mask: NDArray[np.bool_], side: int) -> I64:
+    """Return the edges around some cells: int64 (n, 4), from (x, y) to (x, y) [lattice units].
+
+    Args:
+        mask: bool (rows, columns), the cells.
+        side: Of a cell [lattice units].
+    """
+    padded = np.pad(mask, 1)
+    level = [(x0, y, x1, y) for y, x0, x1 in _borders(padded[1:] != padded[:-1])]
+    upright = [(x, y0, x, y1) for x, y0, y1 in _borders((padded[:, 1:] != padded[:, :-1]).T)]
+    edges = np.array(level + upright, np.int64).reshape(-1, 4)
+    return edges * side
+
+
+def _borders(differ: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
+    """Return the unbroken stretches of each row: row, first column, one past the last column."""
+    padded = np.pad(differ, ((0, 0), (1, 1)))
+    row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
+    # One column of padding is off again, as the cells themselves were padded.
+    pairs = zip(row[::2].tolist(), column[::2].tolist(), column[1::2].tolist(), strict=True)
+    return [(r, a - 1, b - 1) for r, a, b in pairs]

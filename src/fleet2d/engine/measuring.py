@@ -1,0 +1,294 @@
+"""Which gauge measures which signal, and the gauges that need more than where bodies are."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.output import to_columns
+from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.gauges import (
+    ActivityGauge,
+    AwayGauge,
+    Block,
+    DistanceGauge,
+    DoorGauge,
+    EventGauge,
+    Gauge,
+    NotedGauge,
+    PerceivedGauge,
+    RoomGauge,
+    SeenGauge,
+    SensorGauge,
+    SpeedGauge,
+    outline,
+)
+from fleet2d.engine.state import State
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.battery import Course
+from fleet2d.errors import ScenarioError
+from fleet2d.expectations import quantities, states
+from fleet2d.expectations.signals import Measured
+from fleet2d.expectations.trace import Trace, shortest
+from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.problems import did_you_mean
+
+I64 = NDArray[np.int64]
+
+# A battery is told in thousandths; rounding of sums must not make a whole one less.
+PARTS = 1000
+ROUNDING = 1e-9
+# The chance of a lens that notices everybody in view.
+CERTAIN = 2**53
+
+
+class BatteryGauge(Gauge):
+    """Tells the charge of a robot, from one plan to the next."""
+
+    def __init__(self, actor: Actor) -> None:
+        super().__init__()
+        self._courses: list[Course] = []
+        self._step_us = actor.clock.step_us
+        self.begin_plan(actor)
+
+    def begin_plan(self, actor: Actor) -> None:
+        """Take in that the robot follows a new plan."""
+        if actor.charge is not None and hasattr(actor, "motion"):
+            course = actor.charge.course(actor.motion)
+            self._courses = [c for c in self._courses if c.begins[0] < course.begins[0]]
+            self._courses.append(course)
+
+    def _measure(self, block: Block) -> Trace:
+        moments = np.arange(block.first, block.end, dtype=np.int64) * self._step_us
+        begins = np.array([course.begins[0] for course in self._courses], np.int64)
+        edges = [0, *np.searchsorted(moments, begins[1:]).tolist(), len(moments)]
+        pieces = [
+            course.levels(np.maximum(moments[a:b], course.begins[0]))
+            for course, a, b in zip(self._courses, edges, edges[1:], strict=False)
+        ]
+        level = np.floor(np.concatenate(pieces) * PARTS + ROUNDING) / PARTS
+        self._courses = self._courses[-1:]
+        return shortest(np.arange(block.first, block.end), level, block.end)
+
+
+class PerfectCameras(Cameras):
+    """Cameras that look at every step, and notice everybody who is in view, at once."""
+
+    def _set_up(self) -> None:
+        super()._set_up()
+        lenses = self.lenses
+        self.lenses = lenses._replace(
+            chance=np.full_like(lenses.chance, CERTAIN),
+            period=np.ones_like(lenses.period),
+            latency=np.zeros_like(lenses.latency),
+            errs=np.zeros_like(lenses.errs),
+        )
+        self.rule = self.rule._replace(patience=1)
+
+
+class InViewGauge(Gauge):
+    """Tells whether somebody is in view of a camera, by a look of its own."""
+
+    def __init__(self, state: State, cameras: Cameras, body: str) -> None:
+        super().__init__()
+        actors, users = state.actors, state.bodies.users
+        self._cameras = PerfectCameras(cameras.row, actors, users, cameras.method)
+        self._cameras.taken = state.settled
+        self._body, self._seen = body, False
+
+    def _measure(self, block: Block) -> Trace:
+        events = self._cameras.take(block.bodies, block.end)
+        self._cameras.collect()
+        _, seen = self._cameras.event_names
+        start, value = [block.first], [float(self._seen)]
+        for event in events:
+            if event.detail == self._body:
+                self._seen = event.event == seen
+                if event.step == start[-1]:
+                    value[-1] = float(self._seen)
+                else:
+                    start.append(event.step)
+                    value.append(float(self._seen))
+        return shortest(np.array(start, np.int64), np.array(value), block.end)
+
+
+# Which gauge
+
+
+def gauge_of(signal: Measured, state: State, step_us: int) -> Gauge:
+    """Return a gauge that measures a signal from the present step on."""
+    for kind, make in _MAKERS.items():
+        if type(signal) is kind:
+            return make(signal, state, step_us)
+    raise AssertionError(f"{signal} can't be measured")
+
+
+def row_of(state: State, name: str) -> int:
+    """Return the row of a body."""
+    return next(row for row, actor in enumerate(state.actors) if actor.name == name)
+
+
+def _distance(signal: quantities.Distance, state: State, _: int) -> Gauge:
+    row, other = row_of(state, signal.body), signal.other
+    names = [actor.name for actor in state.actors]
+    if isinstance(other, str) and other in names:
+        return DistanceGauge(row, names.index(other), None)
+    return DistanceGauge(row, None, Shape(other))
+
+
+class Shape:
+    """The outline of a room, an object or a point, as it is at present."""
+
+    def __init__(self, place: str | tuple[float, float]) -> None:
+        self._place = place
+        self._known: tuple[object, I64] | None = None
+
+    def __call__(self, home: Home) -> I64:
+        """Return its edges: int64 (n, 4) [lattice units]."""
+        plan, place = home.plan, self._place
+        if not isinstance(place, str):
+            x, y = plan.lattice.to_lattice(place).tolist()
+            return np.array([[x, y, x, y]], np.int64)
+        rooms = [room.index for room in home.rooms if place in (room.name, room.type)]
+        thing = None if rooms else home.object(place)
+        if self._known is None or self._known[0] is not thing:
+            if thing is None:
+                edges = outline(np.isin(plan.room_of_place, rooms), UNITS_PER_CELL)
+            else:
+                ring = np.array(lattice_footprint(plan, thing).exterior.coords).round()
+                edges = np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
+            self._known = thing, edges
+        return self._known[1]
+
+
+def _speed(signal: quantities.Speed | states.Moving, state: State, step_us: int) -> Gauge:
+    row, step = row_of(state, signal.body), state.settled
+    before: tuple[int, ...] = ()
+    if step > 0 and hasattr(state.actors[row], "motion"):
+        # Where it is now counts as where it was: the step before may be forgotten.
+        pose = state.bodies.pose_at(row, step)
+        before = (pose.x, pose.y, pose.away)
+    return SpeedGauge(row, before, step_us)
+
+
+def _seen(signal: states.Seen, state: State, _: int) -> Gauge:
+    cameras = _cameras_of(state, signal.by)
+    return SeenGauge(signal, signal.body in cameras.in_view)
+
+
+def _cameras_of(state: State, name: str) -> Cameras:
+    return next(c for c in [*state.gazes, *state.cameras] if c.owner.name == name)
+
+
+def _perceived(signal: states.Perceived, state: State, _: int) -> Gauge:
+    cameras = _cameras_of(state, signal.by)
+    names = [other.name for other in cameras.others]
+    return PerceivedGauge(cameras.index, names.index(signal.body))
+
+
+def _noted(signal: quantities.Output | quantities.MetricValue, state: State, _: int) -> Gauge:
+    reading = OutputReading if isinstance(signal, quantities.Output) else MetricReading
+    return NotedGauge(state.settled, reading(signal.path, state.home))
+
+
+def _activity(signal: states.ActivityOf, state: State, _: int) -> Gauge:
+    now = state.recorder.activities.now(row_of(state, signal.user))
+    return ActivityGauge(signal.user, now)
+
+
+class OutputReading:
+    """Reads a number out of what an algorithm put out, by its path."""
+
+    def __init__(self, path: str, home: Home) -> None:
+        self._path = path
+        self._rooms = [room.name for room in home.rooms]
+        kinds = [room.type for room in home.rooms]
+        self._names = {r.type: r.name for r in home.rooms if kinds.count(r.type) == 1}
+
+    def __call__(self, output: Any) -> float:
+        """Return the number.
+
+        Raises:
+            ScenarioError: There is no such number in the output, or there are several.
+        """
+        columns = to_columns(output, self._rooms, f"algorithms.{self._path.split('.')[0]}")
+        keep = np.ones(len(next(iter(columns.values()))), np.bool_)
+        words = {n: c for n, c in columns.items() if c.dtype.kind == "O"}
+        number = next((n for n, c in columns.items() if c.dtype.kind in "fiub"), None)
+        for part in self._path.split(".")[1:]:
+            if part in columns and part not in words:
+                number = part
+                continue
+            wanted = {part, self._names.get(part, part)}
+            match = [np.isin(column.astype(str), list(wanted)) for column in words.values()]
+            rows = np.any(match, axis=0) if match else np.zeros_like(keep)
+            if not rows.any():
+                known = [*columns, *dict.fromkeys(w for c in words.values() for w in c.tolist())]
+                raise ScenarioError(
+                    f'output("{self._path}"): there is no {part!r} in it'
+                    f"{did_you_mean(part, known)} There are: {', '.join(map(str, known))}"
+                )
+            keep &= rows
+        if keep.sum() != 1 or number is None:
+            raise ScenarioError(
+                f'output("{self._path}") stands for {keep.sum()} rows of it: name one, by'
+                f" {', '.join(words) or 'nothing that it has'}"
+            )
+        return float(columns[number][keep][0])
+
+
+class MetricReading:
+    """Reads a number out of a metric's result, by its path; missing while it isn't there."""
+
+    def __init__(self, path: str, home: Home) -> None:
+        self._path = path
+
+    def __call__(self, result: Any) -> float:
+        """Return the number.
+
+        Raises:
+            ScenarioError: The path leads to no number.
+        """
+        for part in self._path.split(".")[1:]:
+            if not isinstance(result, Mapping) or part not in result:
+                if isinstance(result, Mapping) and not result:
+                    return float("nan")
+                known = list(result) if isinstance(result, Mapping) else []
+                raise ScenarioError(
+                    f'metric("{self._path}"): there is no {part!r} in it'
+                    f"{did_you_mean(part, known)} There are: {', '.join(known) or 'none'}"
+                )
+            result = result[part]
+        if isinstance(result, bool | int | float):
+            return float(result)
+        if isinstance(result, Mapping) and not result:
+            return float("nan")
+        more = ", ".join(result) if isinstance(result, Mapping) else repr(result)
+        raise ScenarioError(f'metric("{self._path}") is no number: go on with one of {more}')
+
+
+_MAKERS: Mapping[type, Callable[[Any, State, int], Gauge]] = {
+    states.ActivityOf: _activity,
+    states.Away: lambda signal, state, _: AwayGauge(row_of(state, signal.body)),
+    quantities.Battery: lambda signal, state, _: BatteryGauge(
+        state.actors[row_of(state, signal.robot)]
+    ),
+    quantities.Distance: _distance,
+    states.DoorOpen: lambda signal, state, _: DoorGauge(state.changes.names.index(signal.name)),
+    states.Happens: lambda signal, *_: EventGauge(signal),
+    states.InView: lambda signal, state, _: InViewGauge(
+        state, _cameras_of(state, signal.by), signal.body
+    ),
+    quantities.MetricValue: _noted,
+    states.Moving: _speed,
+    quantities.Output: _noted,
+    states.Perceived: _perceived,
+    states.RoomOf: lambda signal, state, _: RoomGauge(row_of(state, signal.body), state.home),
+    states.Seen: _seen,
+    states.SensorOn: lambda signal, state, _: SensorGauge(
+        signal.name, state.sensors.on[signal.name]
+    ),
+    quantities.Speed: _speed,
+}

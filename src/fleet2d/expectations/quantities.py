@@ -1,0 +1,134 @@
+"""Signals that are numbers: distances, speeds, batteries, outputs, metrics."""
+
+from dataclasses import dataclass
+
+from fleet2d.expectations.scene import Scene
+from fleet2d.expectations.signals import Signal
+from fleet2d.expectations.words import call_text
+from fleet2d.units import LENGTH, SHARE, SPEED
+
+Place = str | tuple[float, float]
+"""A body, a room, an object, or a point (x, y) [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distance(Signal):
+    """How far two bodies are apart, or a body from a room, an object or a point [m].
+
+    Of bodies the centres count, of rooms and objects what they cover: inside it is 0. Infinite
+    while one of them is not at home.
+    """
+
+    body: str
+    other: Place
+
+    unit = "m"
+    quantity = LENGTH
+    __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.other, str):
+            x, y = self.other
+            object.__setattr__(self, "other", (float(x), float(y)))
+
+    def check(self, scene: Scene) -> None:
+        """Refuse unknown bodies and places."""
+        places = {*scene.rooms, *scene.things}
+        if self.body in places and self.body not in scene.bodies and self.other in scene.bodies:
+            raise scene.error(
+                f"{self}: name the body first: distance({self.other!r}, {self.body!r})"
+            )
+        scene.check_body(self.body, self)
+        if isinstance(self.other, str):
+            known = [*scene.bodies, *scene.rooms, *scene.things]
+            scene.check_name("body, room or object", self.other, known, self)
+        if self.other == self.body:
+            raise scene.error(f"{self}: a body is no distance from itself")
+
+    def __str__(self) -> str:
+        """Write it as it is read."""
+        return call_text("distance", self.body, self.other)
+
+
+@dataclass(frozen=True, eq=False)
+class Speed(Signal):
+    """How fast a body goes: the way from the step before, by the length of a step [m/s]."""
+
+    body: str
+
+    unit = "m/s"
+    quantity = SPEED
+    __hash__ = object.__hash__
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown body."""
+        scene.check_body(self.body, self)
+
+    def __str__(self) -> str:
+        """Write it as it is read."""
+        return call_text("speed", self.body)
+
+
+@dataclass(frozen=True, eq=False)
+class Battery(Signal):
+    """The charge of a robot, 0 to 1, rounded down to a tenth of a percent."""
+
+    robot: str
+
+    quantity = SHARE
+    unit = "share"
+    __hash__ = object.__hash__
+
+    def check(self, scene: Scene) -> None:
+        """Refuse what has no battery."""
+        scene.check_name("robot with a battery", self.robot, scene.batteries, self)
+
+    def __str__(self) -> str:
+        """Write it as it is read."""
+        return call_text("battery", self.robot)
+
+
+@dataclass(frozen=True, eq=False)
+class Output(Signal):
+    """A number of what an algorithm put out last, as others read it from the next step on.
+
+    `ltp.kitchen` is the probability of a room of `ltp`; `rtp.ana.kitchen` that of a user's;
+    `mine.sightings` a number of an output with names. Missing before the first output.
+    """
+
+    path: str
+
+    __hash__ = object.__hash__
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown algorithm."""
+        scene.check_name("algorithm", self.path.split(".")[0], scene.algorithms, self)
+        if "." not in self.path:
+            raise scene.error(
+                f'{self}: say which number of it, such as output("{self.path}.kitchen")'
+            )
+
+    def __str__(self) -> str:
+        """Write it as it is read."""
+        return call_text("output", self.path)
+
+
+@dataclass(frozen=True, eq=False)
+class MetricValue(Signal):
+    """A number of what a metric has come to so far, by the names that its result has.
+
+    It changes when the metric is updated, and at the last step it is that of the whole run. Missing
+    before the first update.
+    """
+
+    path: str
+
+    __hash__ = object.__hash__
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown metric."""
+        scene.check_name("metric", self.path.split(".")[0], scene.metrics, self)
+
+    def __str__(self) -> str:
+        """Write it as it is read."""
+        return call_text("metric", self.path)

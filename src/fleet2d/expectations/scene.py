@@ -1,0 +1,158 @@
+"""What there is in a run that something can be expected of, by name."""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+
+from fleet2d.errors import ScenarioError
+from fleet2d.events import KINDS, SIGHTS, EventKind
+from fleet2d.problems import did_you_mean
+from fleet2d.units import format_duration
+
+# Events that only one kind of behavior records.
+_OF_BEHAVIORS = {
+    "dock": {EventKind.DOCKS, EventKind.CHARGED},
+    "explore": {EventKind.EXPLORED},
+    "find": {
+        EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME
+    },
+    "follow": {EventKind.FOLLOWS, EventKind.LOST},
+    "hangout": {EventKind.RELOCATES},
+    "opportunistic": {
+        EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER
+    },
+    "retrace": {EventKind.RETRACES, EventKind.RETRACED},
+    "scheduled": {EventKind.VISITS},
+}  # fmt: skip
+_OF_DOORS = {EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The names of a run.
+
+    Attributes:
+        users: Names of users.
+        robots: Names of robots.
+        rooms: Names and types of rooms.
+        things: Names of objects of the home.
+        doors: Names of doors.
+        sensors: Names of sensors.
+        algorithms: Names of algorithms.
+        metrics: Names of metrics.
+        batteries: Names of robots that have a battery.
+        cameras: Whom the cameras of each body that has any look at.
+        behaviors: The types of behaviors of each body; None where any may come to it.
+        records: Kinds of events that behaviors of a user's own record.
+        left: How long the run goes on.
+    """
+
+    users: Collection[str]
+    robots: Collection[str]
+    rooms: Collection[str]
+    things: Collection[str]
+    doors: Collection[str]
+    sensors: Collection[str]
+    algorithms: Collection[str]
+    metrics: Collection[str]
+    batteries: Collection[str]
+    cameras: Mapping[str, Collection[str]]
+    behaviors: Mapping[str, Collection[str]]
+    records: Collection[str]
+    left: timedelta
+
+    @property
+    def bodies(self) -> list[str]:
+        """Users and robots."""
+        return [*self.users, *self.robots]
+
+    def error(self, message: str) -> ScenarioError:
+        """Return the error that says so."""
+        return ScenarioError(message)
+
+    def check_name(self, what: str, name: str, known: Iterable[str], of: object) -> None:
+        """Refuse a name that is none of the known ones.
+
+        Raises:
+            ScenarioError: It isn't; says which is nearest, and which there are.
+        """
+        names = list(dict.fromkeys(known))
+        if name not in names:
+            raise self.error(
+                f"{of}: there is no {what} {name!r}{did_you_mean(name, names)}"
+                f" There are: {', '.join(names) or 'none'}"
+            )
+
+    def check_body(self, name: str, of: object) -> None:
+        """Refuse what is neither a user nor a robot.
+
+        Raises:
+            ScenarioError: It isn't.
+        """
+        self.check_name("user or robot", name, self.bodies, of)
+
+    def check_within(self, within: timedelta | None, of: object) -> None:
+        """Refuse a time that is longer than the run.
+
+        Raises:
+            ScenarioError: It is.
+        """
+        if within is not None and within > self.left:
+            raise self.error(
+                f"{of}: {format_duration(within)} is beyond the run, which goes on for"
+                f" {format_duration(self.left)}"
+            )
+
+    def check_event(self, kind: str, entity: str | None, detail: str | None, of: object) -> None:
+        """Refuse an event that can never happen.
+
+        Raises:
+            ScenarioError: There is no such kind, or nobody to whom it could happen.
+        """
+        if kind == EventKind.SENSOR:
+            raise self.error(f"{of}: what sensors say is no event: write sensor(NAME)")
+        self.check_name("event", kind, sorted({*KINDS, *self.records}), of)
+        able = list(self._able(kind))
+        if entity is not None:
+            self.check_name("body or object", entity, [*self.bodies, *self.doors], of)
+        if not able or (entity is not None and entity not in able and able != [""]):
+            whom = "nobody here" if entity is None else f"not {entity}"
+            raise self.error(
+                f"{of}: it can never happen: {kind!r} happens to {_whom(kind)}, and {whom}"
+                + (f", but to {', '.join(able)}" if able and able != [""] else "")
+            )
+        if kind in SIGHTS and detail is not None:
+            self.check_name("user or robot", detail, self.bodies, of)
+
+    def _able(self, kind: str) -> Iterable[str]:
+        """Yield those to whom an event can happen; an empty name is the home."""
+        if kind in (EventKind.MOVED, EventKind.ROOM_CHANGED):
+            return [""]
+        if kind in _OF_DOORS:
+            return self.doors
+        if kind in (EventKind.USER_SEEN, EventKind.USER_LOST):
+            return [name for name in self.robots if self.cameras.get(name)]
+        if kind in (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST):
+            return [name for name in self.users if self.cameras.get(name)]
+        if kind == EventKind.BATTERY:
+            return self.batteries
+        if kind == EventKind.ACTIVITY:
+            return self.users
+        for behavior, kinds in _OF_BEHAVIORS.items():
+            if kind in kinds:
+                return [n for n in self.robots if {behavior, "own"} & set(self.behaviors[n])]
+        return self.bodies
+
+
+def _whom(kind: str) -> str:
+    """Say to whom an event can happen."""
+    if kind in _OF_DOORS:
+        return "doors"
+    if kind in SIGHTS:
+        return "who has a camera, and somebody to see"
+    if kind == EventKind.BATTERY:
+        return "robots with a battery"
+    if kind == EventKind.ACTIVITY:
+        return "users"
+    behaviors = [name for name, kinds in _OF_BEHAVIORS.items() if kind in kinds]
+    return f"robots whose behavior is {' or '.join(behaviors)}"

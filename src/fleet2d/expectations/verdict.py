@@ -1,0 +1,231 @@
+"""Verdicts: whether an expectation held, by how much, and when it was violated."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Protocol
+
+from fleet2d.clock import Clock
+from fleet2d.errors import InputError
+from fleet2d.expectations.expectation import NEXT_TO_NOTHING, And, Expectation, Known
+from fleet2d.expectations.temporal import After, Temporal
+from fleet2d.expectations.violation import Violation
+from fleet2d.expectations.words import number_text
+from fleet2d.units import format_duration
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of an expectation.
+
+    Attributes:
+        name: What the expectation is called.
+        expectation: Its text.
+        holds: Whether it holds; of a run under way, whether it isn't violated yet.
+        decided: Whether nothing that may still come changes that.
+        robustness: By how much it holds (above 0) or fails (below 0) [unit]; infinite for what is
+            merely so or not.
+        unit: Of the robustness: `m`, `m/s`, `share`, `times`, `1` for other numbers, `mixed`,
+            and empty for what is merely so or not.
+        slack_s: With a time limit: by how much it came about in time, on the worst occasion [s];
+            below 0: too late, or by so much at least if it never did. None without one.
+        occasions: How often what it waits for (`after`) happened; None where nothing is waited for.
+        violations: When it is violated, in order.
+        first: The first step that it is about.
+        end: The step before which all is taken in.
+        clock: Of the run.
+    """
+
+    name: str
+    expectation: str
+    holds: bool
+    decided: bool
+    robustness: float
+    unit: str
+    slack_s: float | None
+    occasions: int | None
+    violations: tuple[Violation, ...]
+    first: int
+    end: int
+    clock: Clock
+
+    def __bool__(self) -> bool:
+        """Return whether it holds."""
+        return self.holds
+
+    @property
+    def worst(self) -> Violation | None:
+        """The violation with the least robustness, the first of several; None if it holds."""
+        return min(self.violations, key=lambda v: v.robustness, default=None)
+
+    @property
+    def times(self) -> list[tuple[datetime, datetime]]:
+        """The local times of the first and the last step of each violation."""
+        return [(self.clock.time(v.first), self.clock.time(v.last)) for v in self.violations]
+
+    def __str__(self) -> str:
+        """Say in words whether it held, and if not, when and by how much."""
+        if self.holds:
+            return f"{self.name} {'held' if self.decided else 'holds so far'}{self._by_how_much()}"
+        return f"{self.name} is violated: {self.expectation}{self._when()}"
+
+    def _by_how_much(self) -> str:
+        if self.occasions == 0:
+            return ", for it never came to it"
+        parts = []
+        if math.isfinite(self.robustness):
+            parts.append(f"by {amount(self.robustness, self.unit)}")
+        if self.slack_s is not None:
+            parts.append(f"with {spoken(timedelta(seconds=self.slack_s))} to spare")
+        return f" {', '.join(parts)}" if parts else ""
+
+    def _when(self) -> str:
+        worst = self.worst
+        if worst is None:
+            return ""
+        day = "%a %d %b %H:%M:%S"
+        begin, end = self.clock.time(worst.first), self.clock.time(worst.last)
+        step = timedelta(microseconds=self.clock.step_us)
+        text = f", from {begin:{day}} to {end:%H:%M:%S} ({spoken(end - begin + step)})"
+        if end.date() != begin.date():
+            text = f", from {begin:{day}} to {end:{day}}"
+        if worst.first == worst.last:
+            text = f", at {begin:{day}}"
+        if math.isfinite(worst.robustness):
+            text += f", by {amount(-worst.robustness, self.unit)}"
+            if worst.worst != worst.first:
+                text += f" at {self.clock.time(worst.worst):%H:%M:%S}"
+        if len(self.violations) > 1:
+            text += f"; the worst of {len(self.violations)} times"
+        return text
+
+    def content(self) -> dict[str, Any]:
+        """Return it as plain JSON data; an infinite robustness is null."""
+        return {
+            "expectation": self.expectation,
+            "holds": self.holds,
+            "decided": self.decided,
+            "robustness": _finite(self.robustness),
+            "unit": self.unit,
+            "slack_s": self.slack_s,
+            "occasions": self.occasions,
+            "violations": len(self.violations),
+            "first": self.first,
+            "says": str(self),
+        }
+
+
+class Judged(Protocol):
+    """What can be judged: a run, or a simulation."""
+
+    def judge(self, expectation: Expectation, name: str = "") -> Verdict:
+        """Return the verdict on an expectation."""
+
+
+def judge(expectation: Expectation, run: Judged, name: str = "") -> Verdict:
+    """Return whether an expectation holds in a run, by how much, and when it doesn't.
+
+    Args:
+        expectation: What is expected.
+        run: A finished run, or a simulation: then it is expected from the first call on, and the
+            verdict is about the time until now.
+        name: What it is called.
+
+    Raises:
+        InputError: It can't be judged: it names what isn't there, or what the run didn't store.
+
+    Example:
+        >>> import fleet2d
+        >>> from fleet2d.expectations import always, distance
+        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> judge(always(distance("ana", "astro") > 0.1), run).holds
+        True
+    """
+    return run.judge(expectation, name)
+
+
+def verdict_of(name: str, expectation: Expectation, known: Known) -> Verdict:
+    """Return the verdict on what is known of a run."""
+    best = expectation.robustness(known, True).at(known.first)
+    worst = best if known.ended else expectation.robustness(known, False).at(known.first)
+    decided = known.ended or best < 0 or worst > 0
+    violations = tuple(_violations(expectation, known)) if best < 0 else ()
+    slack = expectation.slack(known) if isinstance(expectation, Temporal) else None
+    return Verdict(
+        name or str(expectation),
+        str(expectation),
+        best > 0,
+        decided,
+        worst if worst > 0 else best,
+        expectation.unit,
+        None if slack is None else slack * known.clock.step_us / 1e6,
+        len(expectation.triggered(known)) if isinstance(expectation, After) else None,
+        violations,
+        known.first,
+        known.end,
+        known.clock,
+    )
+
+
+def _violations(expectation: Expectation, known: Known) -> list[Violation]:
+    if isinstance(expectation, Temporal):
+        return expectation.violations(known)
+    value = expectation.robustness(known, True).at(known.first)
+    if value > 0:
+        return []
+    if isinstance(expectation, And):
+        return sorted(v for part in expectation.parts() for v in _violations(part, known))
+    return [Violation(known.first, known.end - 1, value, known.first)]
+
+
+def check_judged(expectation: object) -> Expectation:
+    """Return an expectation that says when it must hold.
+
+    Raises:
+        InputError: It doesn't, or it is none.
+    """
+    if not isinstance(expectation, Expectation):
+        raise InputError(
+            f"{expectation!r} is no expectation: write one like"
+            ' always(distance("ana", "astro") > 0.5)'
+        )
+    if not expectation.is_judged:
+        raise InputError(
+            f"{expectation} doesn't say when: write always(…), never(…), eventually(…), at_end(…)"
+        )
+    return expectation
+
+
+def amount(value: float, unit: str) -> str:
+    """Write how much something is beyond or inside its limit.
+
+    >>> amount(0.2138, "m"), amount(0.031, "share"), amount(2.0, "times")
+    ('0.214 m', '3.1 %', '2 times')
+    """
+    value = 0.0 if abs(value) <= NEXT_TO_NOTHING else float(f"{value:.3g}")
+    return number_text(value, "" if unit in ("1", "mixed") else unit)
+
+
+def _finite(value: float) -> float | None:
+    if not math.isfinite(value):
+        return None
+    return 0.0 if abs(value) <= NEXT_TO_NOTHING else value
+
+
+def spoken(duration: timedelta) -> str:
+    """Write a duration in the units that people use.
+
+    >>> spoken(timedelta(seconds=9514)), spoken(timedelta(seconds=40.5)), spoken(timedelta(days=2))
+    ('2 h 38 min 34 s', '40.5 s', '2 d')
+    """
+    parts, rest = [], duration
+    for unit, length in (("d", 86400), ("h", 3600), ("min", 60)):
+        count, rest = divmod(rest, timedelta(seconds=length))
+        parts += [f"{count} {unit}"] if count else []
+    return " ".join(parts + ([format_duration(rest)] if rest or not parts else []))
+
+
+def contents(verdicts: Mapping[str, Verdict]) -> dict[str, Any]:
+    """Return verdicts as plain JSON data, by name."""
+    return {name: verdict.content() for name, verdict in verdicts.items()}

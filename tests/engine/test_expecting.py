@@ -1,0 +1,381 @@
+"""Expectations in whole runs, against what the tables of the run say step by step."""
+
+import copy
+import io
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.scenes import AGENDA, OWN, digests, run, scenario, table
+
+import fleet2d
+from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
+from fleet2d.expectations import Verdict, always, distance, eventually, judge, moving, seen
+from fleet2d.runs.run import Run
+
+STEPS = 12 * 60
+EXPECTED = {
+    "keeps_off": "always(distance(ana, astro) > 1.5 m)",
+    "kitchen": "never(distance(astro, kitchen) < 0.5)",
+    "point": "always(distance(ben, [1.0, 3.0]) >= 2)",
+    "room": "never(room(astro) == bathroom)",
+    "rooms": "always(room(ben) in [living_room, kitchen])",
+    "still": "never(moving(astro))",
+    "speed": "always(speed(ana) < 0.5)",
+    "home": "never(away(ana))",
+    "seen": "never(seen(ben, by=astro))",
+    "perceived": "never(perceived(ben, by=astro))",
+    "in_view": "never(in_view(ben, by=astro))",
+    "washes": "never(activity(ana) == wash)",
+    "shut": "never(door(bath))",
+    "contact": "never(sensor(contact))",
+    "charge": "always(battery(astro) > 94 %)",
+    "few": {"at_most": 1, "of": "events(user_seen, astro)", "per": "hour"},
+    "early": {"never": "moving(astro)", "during": "07:00-07:05"},
+    "long": {"never": "not moving(astro)", "holds_for": "20 s"},
+    "share": "always(output(share.kitchen) < 0.3)",
+    "ends": "at_end(metric(distance.ben) > 1)",
+}
+
+
+def home(**changes: Any) -> dict[str, Any]:
+    return scenario(
+        "12 min",
+        users={
+            "ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"},
+            "ben": {"type": "meander", "speed": 0.7},
+        },
+        robots={
+            "astro": {
+                "type": "patrol",
+                "dwell": "30 s",
+                "camera": {"range": [0.2, 4], "angle_deg": 120, "detection": 0.7},
+                "battery": {
+                    "driving": "2 h", "standing": "4 h", "charging": "1 h", "charger": [0.5, 6.5]
+                },
+            }
+        },
+        objects={
+            "bath": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "5 s"},
+            "contact": {"type": "contact_sensor", "of": "bath"},
+        },
+        algorithms={"share": {"type": f"{OWN}:Share", "period": "2 min"}},
+        metrics={"distance": {"period": "5 min"}},
+        artifacts={"trajectories": "every step"},
+        expect=EXPECTED,
+    ) | changes  # fmt: skip
+
+
+@cache
+def finished(max_span: int | None) -> tuple[Run, dict[str, Verdict]]:
+    simulation = fleet2d.Simulation(home(), max_span=max_span)
+    return simulation.run(), simulation.verdicts()
+
+
+def stretches(wrong: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the stretches of steps that are marked, step by step."""
+    found: list[list[int]] = []
+    for step in np.flatnonzero(wrong).tolist():
+        if found and found[-1][1] == step - 1:
+            found[-1][1] = step
+        else:
+            found.append([step, step])
+    return [(a, b) for a, b in found]
+
+
+def violations(name: str) -> list[tuple[int, int]]:
+    return [(v.first, v.last) for v in finished(None)[1][name].violations]
+
+
+def body(name: str) -> dict[str, NDArray[Any]]:
+    return table(finished(None)[0], "trajectories", entity=name)
+
+
+def apart(one: str, other: str) -> NDArray[np.float64]:
+    a, b = body(one), body(other)
+    gap = np.hypot(a["x"] - b["x"], a["y"] - b["y"])
+    return np.where(a["away"] | b["away"], np.inf, gap)
+
+
+def moves(name: str) -> NDArray[np.float64]:
+    at = body(name)
+    way = np.hypot(np.diff(at["x"], prepend=at["x"][0]), np.diff(at["y"], prepend=at["y"][0]))
+    return np.nan_to_num(way)
+
+
+def room(name: str) -> NDArray[Any]:
+    return np.array([str(value).rsplit("_", 1)[0] for value in body(name)["room"]])
+
+
+def to_room(name: str, kind: str) -> NDArray[np.float64]:
+    """Return how far a body is from the cells of a room, by trying each of them."""
+    plan, at = finished(None)[0].plan, body(name)
+    index = next(r.index for r in plan.rooms if r.type == kind)
+    rows, columns = np.nonzero(plan.room_of_place == index)
+    side, (x0, y0) = plan.lattice.cell, plan.lattice.origin
+    low_x, low_y = x0 + side * columns, y0 + side * rows
+    dx = np.maximum(0, np.maximum(low_x - at["x"][:, None], at["x"][:, None] - low_x - side))
+    dy = np.maximum(0, np.maximum(low_y - at["y"][:, None], at["y"][:, None] - low_y - side))
+    return np.sqrt((dx * dx + dy * dy).min(axis=1))
+
+
+def switched(rows: dict[str, NDArray[Any]], on: Callable[[int], bool], now: bool = False) -> Any:
+    """Return what is switched by some rows, step by step."""
+    state = np.full(STEPS, now)
+    for number, step in enumerate(rows["step"].tolist()):
+        state[step:] = on(number)
+    return state
+
+
+def events(entity: str, *kinds: str) -> dict[str, NDArray[Any]]:
+    rows = table(finished(None)[0], "events", entity=entity)
+    keep = np.isin(rows["event"].astype(str), kinds)
+    return {name: column[keep] for name, column in rows.items()}
+
+
+def test_distances_are_violated_where_the_trajectories_say_so() -> None:
+    assert stretches(apart("ana", "astro") <= 1.5) == violations("keeps_off")
+    assert stretches(np.hypot(body("ben")["x"] - 1, body("ben")["y"] - 3) < 2) == violations(
+        "point"
+    )
+    assert stretches(to_room("astro", "kitchen") < 0.5 - 1e-9) == violations("kitchen")
+    worst = finished(None)[1]["keeps_off"].robustness
+    assert float(apart("ana", "astro").min()) - 1.5 == pytest.approx(worst)
+
+
+def test_rooms_moves_and_absence_are_those_of_the_trajectories() -> None:
+    assert stretches(room("astro") == "bathroom") == violations("room")
+    assert stretches(~np.isin(room("ben"), ["living_room", "kitchen"])) == violations("rooms")
+    assert stretches(moves("astro") > 0) == violations("still")
+    assert stretches(moves("ana") >= 0.5) == violations("speed")
+    assert stretches(body("ana")["away"]) == violations("home")
+    early = (moves("astro") > 0) & (np.arange(STEPS) < 300)
+    assert stretches(early) == violations("early")
+
+
+def test_what_holds_for_so_long_is_violated_from_then_on() -> None:
+    long = [(a + 19, b) for a, b in stretches(moves("astro") == 0) if b - a >= 19]
+
+    assert long
+    assert long == violations("long")
+
+
+def test_sights_are_those_of_events_and_observations() -> None:
+    rows = events("astro", "user_seen", "user_lost")
+    mine = {name: column[rows["user"] == "ben"] for name, column in rows.items()}
+    perceived = np.zeros(STEPS, bool)
+    stored = table(finished(None)[0], "observations", robot="astro", user="ben")
+    perceived[stored["step"]] = True
+    in_view = np.zeros(STEPS, bool)
+    for first, last in violations("in_view"):
+        in_view[first : last + 1] = True
+
+    assert stretches(switched(mine, lambda i: mine["event"][i] == "user_seen")) == violations(
+        "seen"
+    )
+    assert stretches(perceived) == violations("perceived")
+    assert (in_view | ~perceived).all(), "nobody is perceived who isn't in view"
+    assert 0.5 < perceived.sum() / in_view.sum() < 0.9, "and 70 % are noticed"
+
+
+def test_doors_sensors_and_activities_are_those_of_their_tables() -> None:
+    doors = events("bath", "opened", "shut")
+    readings = table(finished(None)[0], "sensors", sensor="contact")
+    doing = events("ana", "activity")
+
+    assert stretches(switched(doors, lambda i: doors["event"][i] == "opened")) == violations("shut")
+    assert stretches(switched(readings, lambda i: readings["state"][i] == "OPEN")) == violations(
+        "contact"
+    )
+    assert stretches(switched(doing, lambda i: doing["detail"][i] == "wash")) == violations(
+        "washes"
+    )
+
+
+def test_a_count_is_exceeded_from_the_next_event_on() -> None:
+    steps = events("astro", "user_seen")["step"].tolist()
+
+    assert [(steps[1], STEPS - 1)] == violations("few")
+    assert 1.0 - len(steps) == finished(None)[1]["few"].robustness
+
+
+def test_a_battery_drains_as_the_robot_moves_and_stands() -> None:
+    at, verdict = body("astro"), finished(None)[1]["charge"]
+    poses = np.stack([at["x"], at["y"], at["heading"]], axis=1)
+    moved = (poses[1:] != poses[:-1]).any(axis=1)
+    level = 1 - np.cumsum(np.where(moved, 1 / 7200, 1 / 14400))
+    first = verdict.violations[0].first
+
+    assert level[-1] - 0.94 == pytest.approx(verdict.robustness, abs=0.005)
+    assert level[first - 1] == pytest.approx(0.94, abs=0.005)
+    assert verdict.violations[0].last == STEPS - 1
+
+
+def test_outputs_hold_from_the_step_after_they_were_put_out() -> None:
+    rows = table(finished(None)[0], "share")
+    kitchen = [str(name).startswith("kitchen") for name in rows["room"]]
+    steps, share = rows["step"][kitchen], rows["share"][kitchen]
+    below = np.zeros(STEPS, bool)  # a missing value is not
+    for step, value in zip(steps.tolist(), share.tolist(), strict=True):
+        below[step + 1 :] = value < 0.3
+
+    assert stretches(~below) == violations("share")
+
+
+def test_metrics_are_judged_by_the_whole_run_at_its_end() -> None:
+    stored, verdicts = finished(None)
+
+    assert stored.metrics["distance"]["ben"] - 1 == verdicts["ends"].robustness
+
+
+@pytest.mark.parametrize("max_span", [1, 7])
+def test_spans_are_invisible(max_span: int) -> None:
+    (whole, verdicts), (cut, again) = finished(None), finished(max_span)
+
+    assert digests(whole) == digests(cut)
+    assert whole.manifest["expectations"] == cut.manifest["expectations"]
+    assert {n: v.violations for n, v in verdicts.items()} == {
+        n: v.violations for n, v in again.items()
+    }
+
+
+def test_the_table_and_the_manifest_say_what_was_violated() -> None:
+    stored, verdicts = finished(None)
+    rows = table(stored, "violations", expectation="keeps_off")
+
+    assert violations("keeps_off") == list(
+        zip(rows["step"].tolist(), rows["last_step"].tolist(), strict=True)
+    )
+    content = stored.manifest["expectations"]["keeps_off"]
+    assert (content["holds"], content["violations"]) == (False, len(violations("keeps_off")))
+    assert str(verdicts["keeps_off"]) == content["says"]
+    assert "keeps_off is violated: always(distance" in content["says"]
+
+
+def test_a_run_that_expects_nothing_stores_nothing_of_it() -> None:
+    expecting, plain = finished(None)[0], run(home(expect={}))
+
+    assert "violations" not in plain.tables
+    assert plain.manifest["expectations"] == {}
+    others = {
+        name: d for name, d in digests(expecting).items() if name not in ("run", "violations")
+    }
+    assert others == {name: d for name, d in digests(plain).items() if name != "run"}
+
+
+def test_a_run_is_reproduced_with_what_python_expected_of_it(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(home(), out=tmp_path / "run")
+    simulation.advance(100)
+    simulation.expect(always(distance("ana", "astro") > 2), "farther")
+    stored = simulation.run()
+
+    assert stored.manifest["expectations"]["farther"]["first"] == 100
+    assert not stored.manifest["expectations"]["farther"]["holds"]
+    assert fleet2d.reproduce(tmp_path / "run").same
+
+
+def test_what_is_expected_goes_on_in_copies_and_files() -> None:
+    simulation = fleet2d.Simulation(home())
+    simulation.advance(100)
+    simulation.expect(eventually(seen("ben", by="astro")), "sees")
+    file = io.BytesIO()
+    simulation.save(file)
+    file.seek(0)
+    twin, loaded = copy.deepcopy(simulation), fleet2d.Simulation.load(file)
+    expected = simulation.run().manifest["expectations"]
+
+    assert expected == twin.run().manifest["expectations"]
+    assert expected == loaded.run().manifest["expectations"]
+
+
+def test_an_expectation_in_mid_run_begins_with_what_is_so_then() -> None:
+    later = fleet2d.Simulation(home(expect={}))
+    later.advance(200)
+    for name, text in EXPECTED.items():
+        if isinstance(text, str) and name not in ("share", "ends", "speed", "still"):
+            later.expect(text, name)
+    later.run()
+
+    for name, verdict in later.verdicts().items():
+        clipped = [(max(a, 200), b) for a, b in violations(name) if b >= 200]
+        assert clipped == [(v.first, v.last) for v in verdict.violations], name
+
+
+def test_a_simulation_says_when_it_is_decided() -> None:
+    simulation = fleet2d.Simulation(home(expect={"still": "never(moving(ben))"}))
+    simulation.advance(60)
+
+    assert simulation.verdicts()["still"].decided
+    assert not judge(always(distance("ana", "ben") > 0), simulation_after(simulation)).decided
+
+
+def simulation_after(simulation: fleet2d.Simulation) -> fleet2d.Simulation:
+    """Ask once, so that something is expected, and go on."""
+    with pytest.raises(InputError, match="no step has been simulated since"):
+        judge(always(distance("ana", "ben") > 0), simulation)
+    simulation.advance(10)
+    return simulation
+
+
+def test_a_finished_run_is_judged_by_running_it_again() -> None:
+    stored, verdicts = finished(None)
+    verdict = judge(always(distance("ana", "astro") > 1.5), stored, "keeps_off")
+
+    assert verdicts["keeps_off"] == verdict
+    broken = fleet2d.Simulation(home())
+    broken.advance(10)
+    with pytest.raises(RunDirectoryError, match="only a complete run"):
+        judge(always(moving("ana")), broken.finish())
+
+
+WRONG = {
+    "always(distance(an, astro) > 1)": "no user or robot 'an': did you mean 'ana'",
+    "always(distance(kitchen, ana) > 1)": "name the body first",
+    "always(distance(ana, kitchn) > 1)": "did you mean 'kitchen'",
+    "never(room(ana) == bathrom)": "did you mean 'bathroom'",
+    "never(events(dock))": "did you mean 'docks'",
+    "never(events(docks, astro))": "it can never happen",
+    "never(events(user_seen, ben))": "it can never happen",
+    "never(seen(astro, by=ben))": "no robot or user with a camera 'ben'",
+    "never(door(bth))": "no door 'bth': did you mean 'bath'",
+    "never(sensor(contct))": "did you mean 'contact'",
+    "always(output(shre.kitchen) > 0)": "no algorithm 'shre': did you mean 'share'",
+    "at_end(metric(distanc.ana) > 0)": "no metric 'distanc': did you mean 'distance'",
+    "never(battery(ana) < 10 %)": "no robot with a battery 'ana'",
+    "eventually(moving(ana), within=2 h)": "2 h is beyond the run, which goes on for 12 min",
+    "alway(moving(ana))": "no 'alway': did you mean 'always'",
+    "moving(ana)": "doesn't say when",
+    "always(distance(ana, astro))": "compare it",
+    "always(moving(ana)": "can't be read",
+    "never(during(25:00-26:00))": "a time of day is 00:00 to 24:00",
+    "always(__import__(os))": "there is no '__import__'",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG.items())
+def test_wrong_expectations_are_refused_with_their_line(
+    text: str, message: str, tmp_path: Path
+) -> None:
+    import yaml
+
+    path = tmp_path / "home.yaml"
+    path.write_text(yaml.safe_dump(home(expect={})) + f"expect:\n  wrong: {text!r}\n")
+    lines = path.read_text().splitlines()
+    line = next(i for i, part in enumerate(lines, 1) if part.startswith("  wrong:"))
+    if "expect: {}" in path.read_text():
+        path.write_text(path.read_text().replace("expect: {}\n", ""))
+        line -= 1
+
+    with pytest.raises(ScenarioError, match=f"home.yaml:{line}: ") as caught:
+        fleet2d.Simulation(path)
+    assert message in str(caught.value)
+
+
+def test_a_mapping_with_a_wrong_key_names_the_nearest() -> None:
+    wrong = {"alwys": "moving(ana)"}
+    with pytest.raises(ScenarioError, match="unknown key 'alwys': did you mean 'always'"):
+        fleet2d.Simulation(home(expect={"wrong": wrong}))

@@ -1,0 +1,185 @@
+"""What expectations are worth, and when they are violated, against a twin that goes step by step."""
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.reference.expectations import Formula, robustness
+
+from fleet2d.clock import Clock
+from fleet2d.expectations import (
+    after,
+    always,
+    at_most,
+    events,
+    eventually,
+    holds_for,
+    metric,
+    moving,
+    never,
+    until,
+)
+from fleet2d.expectations.expectation import Expectation, Known
+from fleet2d.expectations.trace import Trace
+from fleet2d.expectations.verdict import verdict_of
+
+CLOCK = Clock(datetime(2026, 1, 5), 1_000_000, 1000)
+BUILD = {
+    "is": lambda name: moving(name),
+    "above": lambda name, limit: metric(name) > limit,
+    "not": lambda part: ~part,
+    "and": lambda one, other: one & other,
+    "or": lambda one, other: one | other,
+    "always": lambda part, steps: always(part, within=steps),
+    "eventually": lambda part, steps: eventually(part, within=steps),
+    "until": lambda hold, goal, steps: until(hold, goal, within=steps),
+    "after": lambda trigger, part, steps: after(trigger, part, within=steps),
+    "holds_for": lambda part, steps: holds_for(part, steps),
+}
+atoms: st.SearchStrategy[Any] = st.sampled_from(
+    [("is", "a"), ("is", "b"), ("above", "x", 0.5), ("above", "y", -0.5)]
+)
+some = st.integers(0, 6)
+limit = st.none() | some
+formulas = st.recursive(
+    atoms,
+    lambda part: st.one_of(
+        st.tuples(st.just("not"), part),
+        st.tuples(st.sampled_from(["and", "or"]), part, part),
+        st.tuples(st.sampled_from(["always", "eventually"]), part, limit),
+        st.tuples(st.sampled_from(["until", "after"]), part, part, limit),
+        st.tuples(st.just("holds_for"), part, st.integers(1, 4)),
+    ),
+    max_leaves=4,
+)
+truths = st.lists(st.integers(0, 1), min_size=14, max_size=14)
+numbers = st.lists(st.sampled_from([-2.0, -1.0, 0.0, 1.0, 2.0]), min_size=14, max_size=14)
+
+
+def built(formula: Any) -> Any:
+    """Return a formula of the twin as an expectation."""
+    if not isinstance(formula, tuple):
+        return formula
+    word, *parts = formula
+    if word == "above":
+        return BUILD[word](*parts)
+    return BUILD[word](*[p if isinstance(p, str) else built(p) for p in parts])
+
+
+def trace_of(values: list[float], end: int) -> Trace:
+    array = np.array(values[:end], np.float64)
+    kept = np.append(True, array[1:] != array[:-1])
+    return Trace(np.flatnonzero(kept), array[kept], end)
+
+
+def known_of(signals: dict[str, list[float]], end: int, *, over: bool) -> Known:
+    names = {"a": moving("a"), "b": moving("b"), "x": metric("x"), "y": metric("y")}
+    traces = {str(names[name]): trace_of(v, end) for name, v in signals.items() if name in names}
+    return Known(traces, {}, 0, end, over, CLOCK)
+
+
+def dense(trace: Trace) -> list[float]:
+    return np.repeat(trace.value, np.diff(np.append(trace.start, trace.end))).tolist()
+
+
+@settings(deadline=None, max_examples=200)
+@given(formulas, truths, truths, numbers, numbers, st.integers(1, 14), st.booleans(), st.booleans())
+def test_the_robustness_of_each_step_is_that_of_the_twin(
+    formula: Formula,
+    a: list[float],
+    b: list[float],
+    x: list[float],
+    y: list[float],
+    end: int,
+    over: bool,
+    high: bool,
+) -> None:
+    signals = {"a": a, "b": b, "x": x, "y": y}
+    expected = [
+        robustness(formula, signals, step, end, over=over, high=high) for step in range(end)
+    ]
+    known = known_of(signals, end, over=over)
+    assert expected == dense(built(formula).robustness(known, high))
+
+
+def violated(expectation: Expectation, signals: dict[str, list[float]]) -> list[tuple[int, int]]:
+    known = known_of(signals, 14, over=True)
+    return [(v.first, v.last) for v in verdict_of("", expectation, known).violations]
+
+
+@settings(deadline=None)
+@given(numbers)
+def test_violations_are_the_longest_stretches_that_fail(x: list[float]) -> None:
+    wrong = [step for step, number in enumerate(x) if not number > 0]
+    begins = [step for step in wrong if step - 1 not in wrong]
+    ends = [step for step in wrong if step + 1 not in wrong]
+
+    assert list(zip(begins, ends, strict=True)) == violated(always(metric("x") > 0), {"x": x})
+    assert list(zip(begins, ends, strict=True)) == violated(never(~(metric("x") > 0)), {"x": x})
+
+
+def test_a_signal_on_its_limit_is_on_the_side_of_the_comparison() -> None:
+    known = known_of({"x": [1.0] * 14}, 14, over=True)
+
+    assert verdict_of("", always(metric("x") >= 1), known).holds
+    assert not verdict_of("", always(metric("x") > 1), known).holds
+    assert verdict_of("", always(metric("x") > 1), known).content()["robustness"] == 0
+
+
+def test_a_missing_value_is_on_neither_side() -> None:
+    known = known_of({"x": [float("nan"), *[1.0] * 13]}, 14, over=True)
+
+    assert verdict_of("", always(metric("x") > 0), known).violations[0][:2] == (0, 0)
+    assert verdict_of("", never(metric("x") < 0), known).holds
+
+
+def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
+    a, b = [0] * 14, [0] * 14
+    a[1] = a[5] = 1
+    b[2] = 1
+    expectation = after(moving("a"), moving("b"), within=3)
+    verdict = verdict_of("", expectation, known_of({"a": a, "b": b}, 14, over=True))
+
+    assert [(v.first, v.last) for v in verdict.violations] == [(5, 8)]
+    assert (verdict.occasions, verdict.slack_s) == (2, -6.0)
+    b[7] = 1
+    verdict = verdict_of("", expectation, known_of({"a": a, "b": b}, 14, over=True))
+    assert (verdict.holds, verdict.slack_s) == (True, 1.0)
+
+
+def test_what_is_still_open_at_the_end_does_not_count() -> None:
+    a = [0] * 12 + [1, 0]
+    expectation = after(moving("a"), moving("b"), within=3)
+    verdict = verdict_of("", expectation, known_of({"a": a, "b": [0] * 14}, 14, over=True))
+
+    assert (verdict.holds, verdict.slack_s) == (True, None)
+
+
+def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it() -> None:
+    b = [0, 0, 0, 1] + [0] * 10
+    expectation = eventually(moving("b"), within=5)
+
+    def at(end: int) -> tuple[bool, bool]:
+        verdict = verdict_of("", expectation, known_of({"b": b}, end, over=False))
+        return verdict.holds, verdict.decided
+
+    assert [at(3), at(4)] == [(True, False), (True, True)]
+    b[3] = 0
+    assert [at(5), at(6)] == [(True, False), (False, True)]
+
+
+@pytest.mark.parametrize(("times", "holds"), [(2, False), (3, True)])
+def test_at_most_counts_each_event_of_an_hour(times: int, holds: bool) -> None:
+    steps = [0, 1, 1, 5000, 7300]
+    counts = [float(steps.count(step)) for step in range(8000)]
+    expectation = at_most(times, events("calls"), per="hour")
+    known = Known({str(events("calls")): trace_of(counts, 8000)}, {}, 0, 8000, True, CLOCK)
+    verdict = verdict_of("", expectation, known)
+
+    assert verdict.holds is holds
+    if not holds:
+        first, last, worst, _ = verdict.violations[0]
+        assert (first, last, worst) == (1, timedelta(hours=1).seconds - 1, -1.0)

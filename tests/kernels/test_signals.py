@@ -1,0 +1,127 @@
+"""Signals as stretches of equal value, against twins that go step by step."""
+
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.reference import signals as slow
+
+from fleet2d.kernels import signals
+from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels.timelines import Timelines, Window
+
+STEP_US = 1000
+STEPS = 24
+spot = st.integers(0, 40)
+track = st.lists(st.tuples(st.integers(1, 6), spot, spot, st.booleans()), min_size=1, max_size=5)
+bodies = st.lists(track, min_size=2, max_size=2)
+value = st.sampled_from([-inf, -2.0, -1.0, 0.0, 1.0, 2.0, inf])
+values = st.lists(value, min_size=1, max_size=14)
+Track = list[tuple[int, int, int, bool]]
+
+
+def timelines_of(tracks: list[Track]) -> Timelines:
+    made = Timelines(len(tracks), STEP_US)
+    for body, legs in enumerate(tracks):
+        time = np.cumsum([0, *(leg[0] for leg in legs[1:])]) * STEP_US
+        x, y, away = (np.array(column) for column in list(zip(*legs, strict=True))[1:])
+        points = Breakpoints(
+            time, x.astype(np.int64), y.astype(np.int64), np.zeros_like(time), away.astype(np.uint8)
+        )
+        made.follow(body, 0, points, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    return made
+
+
+def poses_of(window: Window, body: int) -> list[slow.Pose]:
+    x, y, _, away, _ = window.dense(body, window.first, window.end)
+    rows = zip(x.tolist(), y.tolist(), away.tolist(), strict=True)
+    return [(x, y, bool(away)) for x, y, away in rows]
+
+
+def dense(stretches: tuple[np.ndarray, np.ndarray], end: int = STEPS) -> list[float]:
+    start, found = stretches
+    assert (found[1:] != found[:-1]).all(), "neighbours differ"
+    return np.repeat(found, np.diff(np.append(start, end))).tolist()
+
+
+def stretches(numbers: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    array = np.array(numbers)
+    kept = np.append(True, array[1:] != array[:-1])
+    return np.flatnonzero(kept), array[kept]
+
+
+@settings(deadline=None)
+@given(bodies)
+def test_distances_between_bodies_are_those_of_each_step(tracks: list[Track]) -> None:
+    window = timelines_of(tracks).window(0, STEPS)
+    pairs = zip(poses_of(window, 0), poses_of(window, 1), strict=True)
+    assert [slow.distance(*pair) for pair in pairs] == dense(
+        signals.distances_between(window, 0, 1)
+    )
+
+
+@settings(deadline=None)
+@given(bodies, st.lists(st.tuples(spot, spot, spot, spot), max_size=4))
+def test_distances_to_a_shape_are_those_of_each_step(
+    tracks: list[Track], boxes: list[slow.Edge]
+) -> None:
+    edges = [
+        edge
+        for x0, y0, x1, y1 in boxes
+        for edge in ((x0, y0, x1, y0), (x1, y0, x1, y1), (x1, y1, x0, y1), (x0, y1, x0, y0))
+    ]
+    window = timelines_of(tracks).window(0, STEPS)
+    expected = [slow.distance_to_shape(pose, edges) for pose in poses_of(window, 0)]
+    rows = np.array(edges, np.int64).reshape(-1, 4)
+    assert dense(signals.distances_to_shape(window, 0, rows)) == pytest.approx(expected)
+
+
+@settings(deadline=None)
+@given(bodies, st.integers(1, STEPS - 1))
+def test_speeds_go_on_from_window_to_window(tracks: list[Track], cut: int) -> None:
+    made = timelines_of(tracks)
+    poses = poses_of(made.window(0, STEPS), 0)
+    x, y, away = poses[cut - 1]
+    nothing = np.zeros(0, np.int64)
+    first = signals.speeds(made.window(0, cut), 0, nothing)
+    second = signals.speeds(made.window(cut, STEPS), 0, np.array([x, y, away], np.int64))
+    found = dense(first, cut) + dense((second[0] - cut, second[1]), STEPS - cut)
+    assert [slow.speed(poses, step) for step in range(STEPS)] == found
+
+
+@settings(deadline=None)
+@given(values, st.integers(-6, 6), st.integers(0, 9), value, value)
+def test_the_greatest_value_of_a_window_is_that_of_its_steps(
+    numbers: list[float], low: int, length: int, before: float, after: float
+) -> None:
+    expected = slow.sliding_max(numbers, low, low + length, before, after)
+    found = signals.sliding_max(*stretches(numbers), len(numbers), low, low + length, before, after)
+    assert expected == dense(found, len(numbers))
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(value, value), min_size=1, max_size=12), value)
+def test_until_is_the_best_of_all_steps_to_wait_for(
+    pairs: list[tuple[float, float]], after: float
+) -> None:
+    hold, goal = ([pair[i] for pair in pairs] for i in (0, 1))
+    steps = np.arange(len(pairs))
+    found = signals.until(steps, np.array(hold), np.array(goal), after)
+    assert slow.until(hold, goal, after) == dense(found, len(pairs))
+
+
+def test_wrong_stretches_are_refused() -> None:
+    start, numbers = np.array([0, 2], np.int64), np.array([1.0, 2.0])
+    with pytest.raises(ValueError, match="ascend"):
+        signals.sliding_max(start[::-1].copy(), numbers, 5, 0, 1, 0.0, 0.0)
+    with pytest.raises(ValueError, match="before end"):
+        signals.sliding_max(start, numbers, 2, 0, 1, 0.0, 0.0)
+    with pytest.raises(ValueError, match="numbers"):
+        signals.until(start, numbers, np.array([1.0, np.nan]), 0.0)
+    with pytest.raises(ValueError, match="low"):
+        signals.sliding_max(start, numbers, 5, 2, 1, 0.0, 0.0)
+    window = timelines_of([[(1, 0, 0, False)]]).window(0, 4)
+    with pytest.raises(ValueError, match="no such body"):
+        signals.distances_between(window, 0, 1)

@@ -1,0 +1,65 @@
+"""Distances, speeds and windows over time, step by step, in slow and obvious Python."""
+
+from collections.abc import Sequence
+from math import inf, sqrt
+
+Edge = tuple[int, int, int, int]
+Pose = tuple[int, int, bool]
+"""x, y, away."""
+
+
+def distance(one: Pose, other: Pose) -> float:
+    """Return how far two bodies are apart."""
+    if one[2] or other[2]:
+        return inf
+    return sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2)
+
+
+def distance_to_shape(pose: Pose, edges: Sequence[Edge]) -> float:
+    """Return how far a body is from a shape, 0 inside its rings."""
+    x, y, away = pose
+    if away:
+        return inf
+    crossings = 0
+    for x0, y0, x1, y1 in edges:
+        if (y0 > y) != (y1 > y):
+            crossings += x0 + (y - y0) * (x1 - x0) / (y1 - y0) > x
+    if crossings % 2:
+        return 0.0
+    return min((_to_edge(x, y, edge) for edge in edges), default=inf)
+
+
+def _to_edge(x: int, y: int, edge: Edge) -> float:
+    x0, y0, x1, y1 = edge
+    squared = (x1 - x0) ** 2 + (y1 - y0) ** 2
+    share = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / squared if squared else 0.0
+    share = min(1.0, max(0.0, share))
+    return sqrt((x - x0 - share * (x1 - x0)) ** 2 + (y - y0 - share * (y1 - y0)) ** 2)
+
+
+def speed(poses: Sequence[Pose], step: int) -> float:
+    """Return how far a body came in a step."""
+    if not step or poses[step][2] or poses[step - 1][2]:
+        return 0.0
+    return distance(poses[step], poses[step - 1])
+
+
+def sliding_max(
+    values: Sequence[float], low: int, high: int, before: float, after: float
+) -> list[float]:
+    """Return the greatest value from `low` to `high` steps after each step."""
+
+    def at(step: int) -> float:
+        return before if step < 0 else after if step >= len(values) else values[step]
+
+    return [max(at(t) for t in range(step + low, step + high + 1)) for step in range(len(values))]
+
+
+def until(hold: Sequence[float], goal: Sequence[float], after: float) -> list[float]:
+    """Return how well one holds until the other does: by all steps at which it may."""
+    count = len(hold)
+    best = []
+    for begin in range(count):
+        ways = [min([goal[t], *hold[begin:t]]) for t in range(begin, count)]
+        best.append(max([*ways, min([after, *hold[begin:]])]))
+    return best
