@@ -1,7 +1,6 @@
 """Homes for the tests of meshes and sight: HouseExpo files, pieces of walls, shuffled meshes."""
 
 import json
-import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
+from tests.thorough import THOROUGH
 
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.kernels.mesh import Mesh, rasterize_cells
@@ -81,10 +81,10 @@ def houseexpo(path: Path) -> Home:
 
 
 def plan_files(shared_data: Path) -> list[Path]:
-    """Return every fifth of the fifty HouseExpo files, or all of them with FLEET2D_HOMES=all."""
+    """Return every fifth of the fifty HouseExpo files, or all of them in a thorough test."""
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert len(paths) == 50
-    return paths if os.environ.get("FLEET2D_HOMES") == "all" else paths[::5]
+    return paths if THOROUGH else paths[::5]
 
 
 def all_homes(shared_data: Path) -> Iterator[Home]:

@@ -265,12 +265,13 @@ def test_poses_and_observations_of_a_history_are_those_that_are_stored() -> None
         assert rows["heading"] == pytest.approx(heading)
         assert [rooms.get(r, -1) for r in rows["room"]] == room.tolist()
     assert away.size == 1200
-    seen = [np.concatenate(c) for c in zip(*(entry[2] for entry in found), strict=True)]
     rows = table(stored, "observations")
     assert len(rows["step"]) > 30
-    for column, values in zip(("step", "x", "y"), (seen[0], seen[3], seen[4]), strict=True):
-        assert rows[column].tolist() == values.tolist()
-    assert [rooms[r] for r in rows["room"]] == seen[5].tolist()
+    for column in ("step", "x", "y"):
+        seen = np.concatenate([getattr(entry[2], column) for entry in found])
+        assert rows[column].tolist() == seen.tolist()
+    seen = np.concatenate([entry[2].room for entry in found])
+    assert [rooms[r] for r in rows["room"]] == seen.tolist()
 
 
 def test_algorithms_may_ask_for_robots_but_not_for_users() -> None:

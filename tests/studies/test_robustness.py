@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 import yaml
 from tests.studies.scenes import SPEED, base, digests, run, small
+from tests.thorough import THOROUGH
 
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.execution import cores
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import count
 
-KILLS = 50
+KILLS = 50 if THOROUGH else 15
 ROOT = Path(__file__).parents[2]
 LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=12, keep={"tables": ["room_share"]})
 
@@ -44,7 +45,7 @@ def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 @pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_a_study_killed_fifty_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
+def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     _, undisturbed = run(LARGE, tmp_path / "undisturbed")
     chance = random.Random(16)
     folder, kills, before = tmp_path / "killed", 0, 0
