@@ -1,0 +1,96 @@
+"""How the code is laid out: sizes of modules, circles of imports, and the map for newcomers."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from tools import package_map
+
+ROOT = Path(package_map.ROOT)
+MODULES = dict(package_map.modules())
+MOST_LINES = 400
+LONGEST_CIRCLE = 2
+
+
+def test_no_module_is_longer_than_a_reader_can_hold() -> None:
+    sizes = {name: len(path.read_text("utf-8").splitlines()) for name, path in MODULES.items()}
+
+    assert {} == {name: lines for name, lines in sizes.items() if lines > MOST_LINES}
+
+
+def test_modules_form_no_circle_longer_than_two() -> None:
+    graph = {name: set(imports(name, path)) for name, path in MODULES.items()}
+
+    assert [] == [sorted(circle) for circle in circles(graph) if len(circle) > LONGEST_CIRCLE]
+
+
+def test_circles_are_found() -> None:
+    graph = {"a": {"b"}, "b": {"a", "c"}, "c": {"a", "d"}, "d": {"e"}, "e": {"d"}, "f": {"a"}}
+
+    assert [{"a", "b", "c"}, {"d", "e"}, {"f"}] == sorted(circles(graph), key=min)
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """Return the modules of each circle of imports; one that is in none is alone."""
+    reached = {name: reachable(graph, name) for name in graph}
+    groups = {
+        frozenset({name, *(other for other in reached[name] if name in reached[other])})
+        for name in graph
+    }
+    return [set(group) for group in groups]
+
+
+def reachable(graph: dict[str, set[str]], name: str) -> set[str]:
+    """Return the modules that a module imports, directly or not."""
+    reached: set[str] = set()
+    waiting = [name]
+    while waiting:
+        new = graph[waiting.pop()] - reached
+        reached |= new
+        waiting += new
+    return reached
+
+
+def imports(name: str, path: Path) -> Iterator[str]:
+    """Yield the modules that a module imports when it runs, now or later."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            node.body = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            targets = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = base_of(node, name, path)
+            both = ((f"{base}.{alias.name}", base) for alias in node.names)
+            targets = [inner if inner in MODULES else outer for inner, outer in both]
+        else:
+            continue
+        yield from (target for target in targets if target in MODULES and target != name)
+
+
+def base_of(node: ast.ImportFrom, name: str, path: Path) -> str:
+    """Return the absolute name of the module that an import takes names from."""
+    if not node.level:
+        return node.module or ""
+    parts = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    return ".".join(
+        [*parts[: len(parts) - node.level + 1], *([node.module] if node.module else [])]
+    )
+
+
+def test_map_of_packages_is_that_of_the_contract() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+    assert page == package_map.with_map(page), "run python tools/package_map.py"
+
+
+def test_files_that_contributing_names_are_there() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    page = page[page.index("## The way of a step") : page.index("## Add a function to the core")]
+    names = [name for name in re.findall(r"`([\w/]+(?:/|\.py|\.hpp))`", page) if "NAME" not in name]
+
+    assert len(names) > 40
+    places = [ROOT, ROOT / "src" / "fleet2d"]
+    assert [] == [name for name in names if not any((place / name).exists() for place in places)]
