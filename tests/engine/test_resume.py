@@ -14,7 +14,7 @@ from threading import Lock
 from typing import Any
 
 import pytest
-from tests.scenes import digests, everything, fleet2d_process, scenario
+from tests.scenes import OWN, digests, everything, fleet2d_process, scenario
 from tests.thorough import THOROUGH
 
 import fleet2d
@@ -26,7 +26,7 @@ from fleet2d.artifacts.seal import verify_run
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "100" if THOROUGH else "8"))
-"""Random moments at which a run is killed; more before a release."""
+"""Random moments at which a run is killed, and every other time its resumption; more before a release."""
 
 CHECKPOINTED = {"checkpoint": "10 min"}
 
@@ -186,11 +186,18 @@ def forks() -> Any:
 
 def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, forks: Any) -> None:
     found, rng = content("6 h", checkpoint="30 min"), random.Random(14)
+    own = [f"{OWN}.py"]
 
-    def begin(out: Path) -> Any:
-        run = forks.Process(target=fleet2d.run, args=(found,), kwargs={"out": out})
+    def begin(out: Path, *, again: bool = False) -> Any:
+        target, arguments = (fleet2d.resume, (out, own)) if again else (fleet2d.run, (found,))
+        run = forks.Process(target=target, args=arguments, kwargs={} if again else {"out": out})
         run.start()
         return run
+
+    def kill(run: Any) -> None:
+        time.sleep(rng.uniform(0, took))
+        run.kill()
+        run.join()
 
     began = time.perf_counter()
     begin(tmp_path / "whole").join()
@@ -199,14 +206,13 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, for
     resumed = set()
     for number in range(KILLS):
         out = tmp_path / str(number)
-        run = begin(out)
-        time.sleep(rng.uniform(0, took))
-        run.kill()
-        run.join()
+        kill(begin(out))
         if not (out / "manifest.json").exists():
             continue  # it had not begun
+        if number % 2 and fleet2d.open_run(out).status != "complete":
+            kill(begin(out, again=True))
         if fleet2d.open_run(out).status != "complete":
-            fleet2d.resume(out)
+            fleet2d.resume(out, own)
         stored = fleet2d.open_run(out)
         assert expected == digests(stored), number
         assert verify_run(out).same, number

@@ -1,4 +1,4 @@
-"""Fifty kills at random moments, and what is left each time ends in the same results."""
+"""Kills at random moments, and what is left each time ends in the same results."""
 
 import os
 import random
@@ -18,7 +18,7 @@ from fleet2d.studies.execution import cores
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import count
 
-KILLS = 50 if THOROUGH else 15
+KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "15"))
 ROOT = Path(__file__).parents[2]
 LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=12, keep={"tables": ["room_share"]})
 

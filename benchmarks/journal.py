@@ -1,0 +1,99 @@
+"""What it costs that a run survives: journal, checkpoints and seal, as a share of the base month.
+
+    python benchmarks/journal.py [--pairs 8] [--days 30]
+
+The same month with and without them, in turn in one process, by processor time: pairs, so that what
+else the machine does counts little. And how fast `verify` reads, beside reading alone.
+"""
+
+import argparse
+import hashlib
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import fleet2d
+from fleet2d.artifacts import store
+from fleet2d.artifacts.journal import JournalWriter
+from fleet2d.artifacts.ledger import Ledger
+from fleet2d.artifacts.seal import verify_run
+from fleet2d.engine.checkpoint import Keeper
+
+
+@contextmanager
+def without(*names: str) -> Iterator[None]:
+    """Leave out the journal, the checkpoints, or the seal."""
+    nothing: Callable[..., None] = lambda *_, **__: None  # noqa: E731
+    parts: dict[str, list[Any]] = {
+        "journal": [
+            patch.object(JournalWriter, "add", nothing),
+            patch.object(Ledger, "commit", nothing),
+        ],
+        "checkpoints": [patch.object(Keeper, "after_span", nothing)],
+        "seal": [patch.object(store, "make_seal", nothing)],
+    }
+    with ExitStack() as stack:
+        for name in names:
+            for part in parts[name]:
+                stack.enter_context(part)
+        yield
+
+
+def month(folder: Path, days: int) -> float:
+    """Return the processor time of a stored month [s]."""
+    began = time.process_time()
+    fleet2d.run(f"simulation.duration={days} d", seed=4, out=folder)
+    return time.process_time() - began
+
+
+def main() -> None:
+    """Measure, and print shares and rates."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pairs", type=int, default=8)
+    parser.add_argument("--days", type=int, default=30)
+    chosen = parser.parse_args()
+    left_out = {
+        "journal, checkpoints and seal": ("journal", "checkpoints", "seal"),
+        "journal and checkpoints": ("journal", "checkpoints"),
+        "seal": ("seal",),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        month(Path(folder) / "first", chosen.days)
+        for what, names in left_out.items():
+            shares = []
+            for pair in range(chosen.pairs):
+                order = (names, ()) if pair % 2 else ((), names)
+                took = {}
+                for which in order:
+                    with without(*which):
+                        took[which] = month(
+                            Path(folder) / f"{what}-{pair}-{len(which)}", chosen.days
+                        )
+                shares.append(took[()] / took[names] - 1)
+            half = statistics.median(shares)
+            low, high = min(shares), max(shares)
+            print(f"{what}: {half:.1%} of the month ({low:.1%} to {high:.1%}, {len(shares)} pairs)")
+        root = Path(folder) / "first"
+        size = sum(path.stat().st_size for path in root.rglob("*") if path.is_file())
+        rates = []
+        for _ in range(20):
+            began = time.process_time()
+            assert verify_run(root).same
+            middle = time.process_time()
+            for path in root.rglob("*"):
+                if path.is_file():
+                    hashlib.sha256(path.read_bytes())
+            rates.append((middle - began, time.process_time() - middle))
+        ours, plain = (min(each) for each in zip(*rates, strict=True))
+        print(
+            f"verify: {size / 1e6:.1f} MB in {ours * 1e3:.1f} ms, {size / 1e6 / ours:.0f} MB/s;"
+            f" SHA-256 alone {plain * 1e3:.1f} ms, {size / 1e6 / plain:.0f} MB/s"
+        )
+
+
+main()
