@@ -34,4 +34,7 @@ def run(
         >>> run.manifest["steps"], run.tables["trajectories"].num_rows
         (7200, 4)
     """
-    return Simulation(scenario, *overrides, out=out, **settings).run()
+    simulation = Simulation(scenario, *overrides, out=out, **settings)
+    finished = simulation.run()
+    simulation._release()
+    return finished

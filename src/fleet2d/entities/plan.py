@@ -44,7 +44,6 @@ class Plan:
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
         asks_us: When the behavior is asked at the latest [us since the start]; None: at its end.
-        root: The plan that it goes on with; itself, unless one was broken off.
         posture, postures: How the body stands in the end; when it takes another [us], and which.
     """
 
@@ -59,12 +58,23 @@ class Plan:
         self.notes: list[Note] = []
         self.interrupts: frozenset[str] = frozenset()
         self.asks_us: int | None = None
-        self.root, self.endless = self, False
+        self._root: Plan | None = None
+        self.endless = False
         self._posture_before = actor.posture_code(self.time_us)
         self.posture: Posture = POSTURES[self._posture_before]
         self.postures: list[tuple[int, int]] = []
         self._posture_begins, self._posture_codes = np.empty(0, np.int64), np.empty(0, np.int8)
         self._mark()
+
+    @property
+    def root(self) -> "Plan":
+        """The plan that it goes on with; itself, unless one was broken off."""
+        return self if self._root is None else self._root
+
+    @root.setter
+    def root(self, plan: "Plan") -> None:
+        # A reference to itself would keep it until Python looks for garbage.
+        self._root = None if plan is self else plan
 
     @property
     def step_us(self) -> int:

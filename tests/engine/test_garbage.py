@@ -1,0 +1,60 @@
+"""Garbage is looked for rarely during a run, so a run must leave none behind that is large."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+from tests.scenes import scenario
+
+import fleet2d
+from fleet2d.engine.garbage import OBJECTS, rare_collections
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.plan import Plan
+
+PATROL = {"astro": {"type": "patrol", "dwell": "1 min"}}
+
+
+@pytest.fixture
+def no_collector() -> Iterator[None]:
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.fixture
+def usual() -> Iterator[tuple[int, int, int]]:
+    before = gc.get_threshold()
+    yield before
+    gc.set_threshold(*before)
+
+
+def alive() -> int:
+    return sum(isinstance(thing, Actor | Plan) for thing in gc.get_objects())
+
+
+def test_what_a_run_was_made_of_is_freed_at_once(no_collector: None) -> None:
+    """A process of many runs grew by half: bodies and plans referred to each other."""
+    fleet2d.run(scenario("30 min", robots=PATROL))
+    before = alive()
+    fleet2d.run(scenario("30 min", robots=PATROL))
+    assert before == alive()
+
+
+def test_thresholds_are_as_before_once_no_run_needs_others(usual: tuple[int, int, int]) -> None:
+    with rare_collections():
+        assert (OBJECTS, *usual[1:]) == gc.get_threshold()
+        with rare_collections():
+            pass
+        assert (OBJECTS, *usual[1:]) == gc.get_threshold()
+    assert usual == gc.get_threshold()
+
+
+@pytest.mark.parametrize("own", [0, 2 * OBJECTS])
+def test_a_user_who_wants_fewer_collections_keeps_them(
+    usual: tuple[int, int, int], own: int
+) -> None:
+    gc.set_threshold(own, 5, 5)
+    with rare_collections():
+        assert (own, 5, 5) == gc.get_threshold()
+    assert (own, 5, 5) == gc.get_threshold()
