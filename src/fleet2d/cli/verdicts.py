@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 def print_expectations(console: "Console", expectations: Mapping[str, Mapping[str, Any]]) -> None:
     """Print what became of the expectations of a run, as its manifest has it."""
     for content in expectations.values():
-        mark = "held:" if content["holds"] else "VIOLATED:"
-        console.print(f"{mark} {content['says']}", highlight=False, markup=False, soft_wrap=True)
+        console.print(content["says"], highlight=False, markup=False, soft_wrap=True)
 
 
 def print_cases(cases: "Sequence[Case]") -> None:
