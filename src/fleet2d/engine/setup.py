@@ -38,8 +38,9 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         InputError: The floor plan or a place in the scenario is wrong, or names what there isn't.
     """
     home = _furnished_home(scenario)
-    users = _actors(scenario, "users", home, clock, seed)
-    robots = _actors(scenario, "robots", home, clock, seed)
+    people: dict[str, Actor | None] = dict.fromkeys(scenario.users)
+    users = _actors(scenario, "users", home, clock, seed, people)
+    robots = _actors(scenario, "robots", home, clock, seed, people)
     actors = [*users, *robots]
     bodies = Bodies(len(users), len(robots), clock.step_us)
     for row, actor in enumerate(actors):
@@ -146,13 +147,23 @@ def _named(path: str) -> Iterator[None]:
         raise type(error)(f"{path}: {error}") from error
 
 
-def _actors(scenario: Scenario, bucket: str, home: Home, clock: Clock, seed: int) -> list[Actor]:
+def _actors(
+    scenario: Scenario,
+    bucket: str,
+    home: Home,
+    clock: Clock,
+    seed: int,
+    people: dict[str, Actor | None],
+) -> list[Actor]:
+    """Return the users or the robots; `people` are told who they are."""
     entities: Mapping[str, Any] = getattr(scenario, bucket)
     actors = []
     for name, entity in entities.items():
         path = f"{bucket}.{name}"
         with _placing(scenario, path):
-            actors.append(Actor(name, path, entity, home, clock, seed))
+            actors.append(Actor(name, path, entity, home, clock, seed, people=people))
+        if name in people:
+            people[name] = actors[-1]
     return actors
 
 

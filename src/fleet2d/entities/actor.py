@@ -18,6 +18,7 @@ from fleet2d.entities.orders import Order
 from fleet2d.entities.place import ANY, Point, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
+from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws
 from fleet2d.units import micros
@@ -109,6 +110,11 @@ class Actor(Body):
         if self.order is not None:
             return False
         return self._attentive is not None and self._attentive[0].heeds(self, event, step)
+
+    def own_furniture(self, kind: str) -> PlacedObject | None:
+        """Return the piece of furniture of a kind that is its own, if its behaviors say so."""
+        names = (behavior.furniture(self, kind) for behavior in self.behaviors)
+        return next((self.home.object(name) for name in names if name is not None), None)
 
     def posture_code(self, time_us: int) -> int:
         """Return the posture at a moment, by its number in POSTURES."""

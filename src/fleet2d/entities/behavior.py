@@ -205,6 +205,10 @@ class Behavior(Component):
         """Tell whether something that it pays attention to interrupts the plan."""
         return True
 
+    def furniture(self, actor: "Actor", kind: str) -> str | None:
+        """Return the name of the piece of furniture of a kind that it uses for good, if any."""
+        return None
+
     def give_up(self, now: Situation) -> None:
         """Don't go on with what one is doing, when the next plan is made."""
 

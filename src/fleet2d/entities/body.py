@@ -1,7 +1,7 @@
 """A body in its home: where it is, where it can be, and the places that it knows."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -65,6 +65,7 @@ class Body:
         home: Where it lives.
         clock: Of the run.
         seed: Of the run.
+        people: All users of the scenario by name, None while one isn't made.
         part: The part of its space that it is in.
         row: Its row among the bodies of the run.
     """
@@ -75,6 +76,7 @@ class Body:
     home: Home
     clock: Clock
     seed: int
+    people: Mapping[str, "Body | None"] = field(default_factory=dict, kw_only=True, repr=False)
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
@@ -134,6 +136,10 @@ class Body:
         x, y = self.home.approach_of(here) or here
         part = space.part_at(x, y)
         return part if part >= 0 else space.part_near(x, y)
+
+    def own_furniture(self, kind: str) -> PlacedObject | None:
+        """Return the piece of furniture of a kind that is its own, if its behaviors say so."""
+        return None
 
     @property
     def way_out(self) -> tuple[int, int]:
@@ -282,6 +288,8 @@ class Body:
 
     def _has_any(self, names: RoomChoice | Point) -> bool:
         """Tell whether the largest part of its space has a room of these kinds."""
+        if furniture_of(self, names) is not None:
+            return True
         return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
 
     def _first_part(self, names: RoomChoice) -> int:

@@ -2,7 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, parse_place
+from fleet2d.entities.place import ANY, OF, Point, RoomChoice, is_point, parse_place
+from fleet2d.errors import PlacementError
+from fleet2d.problems import did_you_mean
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -29,7 +31,28 @@ def furniture_of(body: "Body", place: RoomChoice | Point) -> "PlacedObject | Non
         ]
         if pieces:
             return Draws(body.stream(f"object of {name}"), 0).choice(pieces)
+        if OF in str(name):
+            owned = _owned(body, *str(name).split(OF, 1))
+            if owned is not None and _gets_to(body, owned):
+                return owned
     return None
+
+
+def _owned(body: "Body", kind: str, person: str) -> "PlacedObject | None":
+    """Return the piece of furniture of a kind that a person uses for good.
+
+    Raises:
+        PlacementError: There is no such person.
+    """
+    if person not in body.people:
+        raise PlacementError(
+            f"there is no user {person!r} whose {kind} that could be"
+            f"{did_you_mean(person, body.people)}"
+        )
+    owner = body.people[person]
+    if owner is None:  # comes later in the scenario, and is asked when somebody goes there
+        owner = body
+    return owner.own_furniture(kind) or furniture_of(owner, (kind,))
 
 
 def room_of_furniture(body: "Body", place: RoomChoice | Point) -> "list[Room]":

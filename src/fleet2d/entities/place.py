@@ -1,7 +1,7 @@
 """Places as a scenario names them: rooms, kinds of rooms, furniture, lists of those, points."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Annotated
 
@@ -13,6 +13,8 @@ from fleet2d.floorplan.plan import Room
 from fleet2d.units import problem
 
 ANY = "any"
+# Between a piece of furniture and whose it is.
+OF = " of "
 
 RoomChoice = tuple[str, ...]
 Point = tuple[float, float]
@@ -21,10 +23,16 @@ Point = tuple[float, float]
 def parse_place(value: object) -> RoomChoice | Point:
     """Read a place: ``kitchen``, ``[dining_room, kitchen, any]`` or ``[x, y]`` in metres.
 
+    The furniture of a person, ``{object: bed, of: ana}``, is also written ``bed of ana``.
+
     Example:
         >>> parse_place("kitchen"), parse_place([1, 2.5])
         (('kitchen',), (1.0, 2.5))
+        >>> parse_place({"object": "bed", "of": "ana"})
+        ('bed of ana',)
     """
+    if isinstance(value, Mapping) and set(value) == {"object", "of"}:
+        value = f"{value['object']}{OF}{value['of']}"
     if isinstance(value, str) and value:
         return (value,)
     if isinstance(value, Sequence) and value and not isinstance(value, str):
@@ -36,7 +44,7 @@ def parse_place(value: object) -> RoomChoice | Point:
                 return x, y
     raise problem(
         f"found {value!r}; a place is wanted: a room, kind of room or piece of furniture like"
-        " 'kitchen' or 'sofa',"
+        " 'kitchen' or 'sofa', that of a person like {object: bed, of: ana},"
         " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in"
         " metres"
     )
@@ -58,9 +66,20 @@ Place = Annotated[
             "anyOf": [
                 {"type": "string"},
                 {"type": "array", "items": {"type": "string"}, "minItems": 1},
+                {
+                    "type": "object",
+                    "properties": {"object": {"type": "string"}, "of": {"type": "string"}},
+                    "required": ["object", "of"],
+                    "additionalProperties": False,
+                },
                 {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
             ],
-            "examples": ["kitchen", ["dining_room", "kitchen", "any"], [4.0, 2.5]],
+            "examples": [
+                "kitchen",
+                ["dining_room", "kitchen", "any"],
+                [4.0, 2.5],
+                {"object": "bed", "of": "ana"},
+            ],
         }
     ),
 ]
@@ -103,9 +122,9 @@ def matching_rooms(
         )
     choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
     choices += [thing.name for thing in objects] + sorted({thing.type for thing in objects})
-    close = difflib.get_close_matches(names[0], choices, n=1)
+    close = difflib.get_close_matches(names[0].split(OF)[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
-    if any(name in (thing.name, thing.type) for name in names for thing in objects):
+    if any(name.split(OF)[0] in (t.name, t.type) for name in names for t in objects):
         raise PlacementError(f"{wanted} has no place to use it from that can be reached")
     raise PlacementError(
         f"there is no room {wanted}{hint or '.'} The rooms are: {listed}.{_furniture(objects)}"

@@ -153,6 +153,15 @@ class Inhabitant(Behavior):
         self.last.step = clock.step_at_or_after(plan.time_us)
         return plan
 
+    def furniture(self, actor: "Actor", kind: str) -> str | None:
+        """Return the name of the furniture of a kind at which it does things; where it sleeps."""
+        sleeps = [self.settings[SLEEP]] if SLEEP in self.settings else []
+        for setting in (*sleeps, *self.settings.values()):
+            for seat in setting.seats:
+                if kind in (seat.thing, actor.home.object(seat.thing).type):
+                    return seat.thing
+        return None
+
     def give_up(self, now: Situation) -> None:
         """Rest instead of what one is doing, from the next plan on."""
         for ordinal, i, doing in self._doings(now.time):

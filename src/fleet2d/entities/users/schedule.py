@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.furniture import seat_at
 from fleet2d.entities.kinds import kept_places
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point
 from fleet2d.entities.plan import Plan
@@ -108,8 +109,10 @@ class Schedule(Behavior):
         since = now.time
         if now.actor.plan is self.plan:  # its own, which may be over later than planned
             since = self.until
-        elif (now.step or now.actor.entity.start) and (entry := self._current(self.week, now.time)):
-            _add(plan, entry)
+        elif entry := self._current(self.week, now.time):
+            seat = seat_at(now.actor, entry.place) if entry.place else None
+            if now.step or now.actor.entity.start or seat is not None:
+                _add(plan, entry)
         self.until = datetime.combine(now.time.date(), datetime.min.time()) + DAY
         for begins, entry in self._between(since, self.until):
             _add(plan.stay(until=begins), entry)
