@@ -40,6 +40,16 @@ def test_what_fails_is_not_kept() -> None:
     assert kept.get("a", lambda: 5) == 5
 
 
+def test_it_keeps_more_when_told_to_and_never_fewer() -> None:
+    kept, made = Kept(most=1), list[str]()
+    kept.keep(2)
+    kept.keep(1)
+    for key in "abab":
+        kept.get(key, lambda key=key: made.append(key))
+
+    assert list("ab") == made
+
+
 def test_second_run_shares_plan_spaces_and_ratings() -> None:
     first, second = (fleet2d.Simulation(None, SHORT, seed=seed) for seed in (4, 5))
     hangouts = [

@@ -47,6 +47,10 @@ class Kept:
                 self._values.popitem(last=False)
         return value
 
+    def keep(self, most: int) -> None:
+        """Keep so many values from now on, if that is more than before."""
+        self._most = max(self._most, most)
+
     def clear(self) -> None:
         """Drop everything."""
         with self._lock:

@@ -35,6 +35,12 @@ PLANS_KEPT = 8
 
 _PLANS = Kept(PLANS_KEPT)
 
+
+def keep_plans(count: int) -> None:
+    """Keep so many homes, read and furnished, for later runs."""
+    _PLANS.keep(count)
+
+
 Point = tuple[float, float]
 
 

@@ -312,6 +312,11 @@ class _Shapes:
 _SHAPES = Kept(HOMES_KEPT)
 
 
+def keep_homes(count: int) -> None:
+    """Keep the walls and spaces of so many homes for later runs, about 10 MB each."""
+    _SHAPES.keep(count)
+
+
 def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
     """Return the walls and spaces of a plan with doors, the same for all runs in it."""
     # The plan itself, not one like it: a state that is written to a file refers to it.

@@ -1,0 +1,69 @@
+"""What a trial costs: an evening of four hours with two people and one robot, per seed, once warm.
+
+python benchmarks/trials.py [SEEDS]
+"""
+
+import statistics
+import sys
+import time
+from typing import Any
+
+from fleet2d.expectations import always, distance, eventually, seen
+from fleet2d.testing.claim import Claim, Variant
+from fleet2d.testing.running import run_life
+
+EVENING = {
+    "simulation": {"start": "2026-01-05T17:00", "duration": "4 h", "seed": 0},
+    "floorplan": {"type": "bundled", "furnish": True},
+    "users": {
+        "ana": {"type": "routine", "persona": "works_outside"},
+        "ben": {"type": "routine", "persona": "retired"},
+    },
+    "robots": {
+        "astro": {
+            "camera": {"range": [0.3, 4.5], "angle_deg": 108},
+            "behaviors": [
+                {"type": "find", "user": "ana"},
+                {"type": "patrol", "cooldown": "30 min"},
+            ],
+        }
+    },
+    "objects": {"bath_door": {"type": "door", "doorway": "bathroom_1", "open": True}},
+}
+
+
+def bare(trial: Any) -> None:
+    """An evening, and nothing expected of it."""
+    trial.advance(trial.clock.steps)
+
+
+def expecting(trial: Any) -> None:
+    """The evening of the docs."""
+    trial.run_until("19:00")
+    trial.put("ana", "kitchen")
+    trial.send("ana", to="sofa")
+    trial.shut("bath_door")
+    trial.call("astro", find="ana")
+    trial.expect(eventually(seen("ana", by="astro"), within="4 min"))
+    trial.expect(always(distance("astro", "ana") > 0.3), name="keeps off")
+
+
+def main() -> None:
+    """Print the time of the processor per seed, by median."""
+    seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    variant: Variant = Claim(EVENING).variants[0]
+    for name, body in (("evening", bare), ("with expectations", expecting)):
+        spent = []
+        for seed in range(seeds):
+            began = time.process_time()
+            run_life(variant.with_seed(seed), body)
+            spent.append(1e3 * (time.process_time() - began))
+        first, warm = spent[0], statistics.median(spent[1:])
+        print(
+            f"{name:18} first {first:6.0f} ms, then {warm:5.1f} ms a seed (median of {seeds - 1})"
+        )
+    print("bound: 60 ms, aim 20 ms")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+"""The command `fleet2d falsify`."""
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+import yaml
+
+from fleet2d.errors import InputError, RunDirectoryError
+
+if TYPE_CHECKING:
+    from fleet2d.testing.search import Failing, Search, Subject, TryJob
+
+TRIES_WITHOUT_END = 1_000_000  # where the budget is a time
+SHRINKING = 40
+FOUND = 1
+"""The exit code where something fails, as that of a test."""
+
+
+def falsify(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO.yaml|TEST.py::NAME",
+            help="A scenario that expects something, or a test with a trial.",
+        ),
+    ],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="What varies: a YAML file of axes, or one axis, 'home={synthetic: 50}'; again"
+            " for more."
+        ),
+    ],
+    budget: Annotated[
+        str, typer.Option(metavar="N|TIME", help="How many lives, or for how long, '5 min'.")
+    ] = "200",
+    out: Annotated[
+        Path, typer.Option(help="The scenario to write that fails; a run beside it.")
+    ] = Path("falsified.yaml"),
+    seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; left out: one per core.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Look for a home, a household, a timing or a seed that breaks what is expected."""
+    from fleet2d.studies.api import make_executor
+    from fleet2d.testing.search import Search, TryJob
+    from fleet2d.testing.space import parse_over, read_space
+
+    if out.exists():
+        raise RunDirectoryError(f"{out} exists already: name another file by --out")
+    tries, seconds = parse_budget(budget)
+    subject = subject_of(what)
+    _check_expects(subject, what)
+    space = read_space(parse_over(over))
+    space.check(subject.base, subject.folder)
+    job = TryJob(subject, space)
+    search = Search(job, tries, seed=seed)
+    show = sys.stderr.isatty() and not quiet
+    failure = search.run(make_executor("local", workers), seconds, _progress if show else None)
+    if failure is None:
+        _print_nothing(search, job)
+        return
+    for line in describe_failure(failure, job, what, out):
+        if not quiet:
+            typer.echo(line)
+    raise typer.Exit(FOUND)
+
+
+def parse_budget(text: str) -> tuple[int, float | None]:
+    """Return how many lives may be run, and for how many seconds.
+
+    Raises:
+        InputError: It is neither a number nor a time.
+
+    >>> parse_budget("200"), parse_budget("5 min")
+    ((200, None), (1000000, 300.0))
+    """
+    from pydantic_core import PydanticCustomError
+
+    from fleet2d.units import parse_duration
+
+    if re.fullmatch(r"[1-9]\d{0,6}", text.strip()):
+        return int(text), None
+    try:
+        if not text.strip()[-1:].isalpha():  # a bare number is one of lives
+            raise ValueError
+        return TRIES_WITHOUT_END, parse_duration(text).total_seconds()
+    except (PydanticCustomError, ValueError):
+        raise InputError(
+            f"--budget {text}: a number of lives is wanted, like 200, or a time, like '5 min'"
+        ) from None
+
+
+def subject_of(what: str) -> "Subject":
+    """Return what is to be searched.
+
+    Raises:
+        InputError: There is no such scenario or test.
+    """
+    from fleet2d.scenario.compose import compose
+    from fleet2d.testing.search import Subject, claimed_test
+
+    path, separator, name = what.partition("::")
+    if separator:
+        _, claim = claimed_test(Path(path), name)
+        scenario = claim.scenario
+        return Subject(scenario._document, scenario.folder, (Path(path), name))
+    return Subject(compose(path), Path(path).absolute().parent)
+
+
+def _check_expects(subject: "Subject", what: str) -> None:
+    from fleet2d.scenario.model import scenario_of
+
+    if subject.test is None and not scenario_of(subject.base, subject.folder).expect:
+        raise InputError(f"{what} expects nothing: give it a section `expect`, or name a test")
+    subject.body()
+
+
+def describe_failure(failure: "Failing", job: "TryJob", what: str, out: Path) -> list[str]:
+    """Write the scenario that fails, and its run beside it; return what there is to say."""
+    from fleet2d.testing.failure import describe_life
+
+    words = job.space.words(failure.point)
+    life = job.life(failure.point, failure.seed)
+    again = f"fleet2d test {out}"
+    if job.subject.test is not None:
+        again = f"pytest {what} --fleet2d-scenario {out}"
+    lines = [f"fails at try {failure.number}: {words}, seed {failure.seed}"]
+    folder = out.with_suffix("")
+    folder.mkdir(parents=True, exist_ok=True)
+    lines += describe_life(life, job.subject.body(), folder, SHRINKING, again)
+    first = life.failures[0].words.splitlines()[0]
+    out.write_text(_written(failure, job, what, out, first), encoding="utf-8")
+    return [*lines, "", f"kept: {out}"]
+
+
+def _written(failure: "Failing", job: "TryJob", what: str, out: Path, first: str) -> str:
+    """Return the text of a scenario that fails: what it extends, and what was changed."""
+    from fleet2d.document import Document
+    from fleet2d.scenario.compose import assignment, merge
+
+    content = Document()
+    for keys, value in [(("simulation", "seed"), failure.seed), *job.space.changes(failure.point)]:
+        content = merge(content, assignment(keys, value, ""))
+    source = what.partition("::")[0]
+    data: dict[str, Any]
+    if job.subject.test is None:
+        data = {"extends": os.path.relpath(source, out.parent), **content.data}
+    else:
+        scenario = job.space.scenario(
+            job.subject.base, job.subject.folder, failure.point, failure.seed
+        )
+        data = scenario.resolved()
+    body = yaml.safe_dump(_plain(data), sort_keys=False, allow_unicode=True)
+    return f"# Fails, found by fleet2d falsify {what}: {first}\n{body}"
+
+
+def _plain(value: Any) -> Any:
+    """Return data without the types that YAML doesn't know."""
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return str(value) if isinstance(value, str) else value
+
+
+def _print_nothing(search: "Search", job: "TryJob") -> None:
+    typer.echo(f"nothing fails in {search.tries} lives")
+    if search.narrowest is not None:
+        margin, point = search.narrowest
+        typer.echo(f"narrowest: margin {margin:.3g} at {job.space.words(point)}")
+    for words, number in search.errors.items():
+        typer.echo(f"{number} could not be run: {words}", err=True)
+
+
+def _progress(search: "Search") -> None:
+    narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
+    print(f"\r{search.tries} lives{narrowest}   ", end="", file=sys.stderr, flush=True)  # noqa: T201

@@ -1,0 +1,151 @@
+"""The plugin of pytest: calls a test with a `trial` once a life, and reports what was decided.
+
+pytest loads it by the entry point of the package; nothing else in Fleet2D imports pytest.
+"""
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from fleet2d.testing.claim import Claim
+    from fleet2d.testing.running import Body
+
+PROPERTY = "fleet2d"
+"""The property of a test, in JUnit XML, too, that says what was decided."""
+TRIAL = "trial"
+CLAIM = "fleet2d_claim"  # the attribute of a function that claims something
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options."""
+    group = parser.getgroup("fleet2d", "Fleet2D: tests of robots in simulated homes")
+    group.addoption(
+        "--fleet2d-artifacts",
+        metavar="DIR",
+        type=Path,
+        help="where runs and pictures of failures go; left out: the cache of pytest",
+    )
+    group.addoption(
+        "--fleet2d-seed",
+        metavar="SEED",
+        type=int,
+        help="run each trial with this seed alone, to see it again",
+    )
+    group.addoption(
+        "--fleet2d-scenario",
+        metavar="FILE",
+        help="run each trial in this scenario alone, such as one that `fleet2d falsify` wrote",
+    )
+    group.addoption(
+        "--fleet2d-set",
+        metavar="KEY.PATH=VALUE",
+        action="append",
+        default=[],
+        help="change the scenario of each trial, such as its robot; again for more",
+    )
+    group.addoption(
+        "--fleet2d-shrink",
+        metavar="RUNS",
+        type=int,
+        default=40,
+        help="how many runs may be spent to make a failure smaller; 0: none",
+    )
+
+
+@pytest.fixture
+def trial() -> None:
+    """Stand for the trial of each life, which a function with @fleet2d.testing.trial gets."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Call a test with a claim once a life, until it is decided."""
+    claim = getattr(pyfuncitem.obj, CLAIM, None)
+    if claim is None:
+        if TRIAL in pyfuncitem.fixturenames and _is_ours(pyfuncitem):
+            pytest.fail("a test with `trial` wants @fleet2d.testing.trial(…)", pytrace=False)
+        return None
+    from fleet2d.testing.claim import SetUpError
+    from fleet2d.testing.failure import Places, explain
+    from fleet2d.testing.running import run_claim
+
+    __tracebackhide__ = True
+    claim = _chosen(claim, pyfuncitem.config)
+    body = _body(pyfuncitem)
+    try:
+        claim.prepare()
+        outcome = run_claim(claim, body)
+    except SetUpError as error:
+        pytest.fail(str(error), pytrace=False)
+    pyfuncitem.user_properties.append((PROPERTY, outcome.words))
+    if not outcome.holds:
+        tries = pyfuncitem.config.getoption("--fleet2d-shrink")
+        places = Places(_folder(pyfuncitem), pyfuncitem.nodeid)
+        text = explain(outcome, body, places, tries)
+        failure = outcome.shown.error
+        if failure is None:
+            pytest.fail(text, pytrace=False)
+        failure.add_note(text)  # pytest shows what was compared
+        raise failure
+    return True
+
+
+def _chosen(claim: "Claim", config: pytest.Config) -> "Claim":
+    """Return a claim as the options change it."""
+    scenario = config.getoption("--fleet2d-scenario")
+    if scenario is not None:
+        claim = claim.of_scenario(scenario)
+    claim = replace(claim, overrides=(*claim.overrides, *config.getoption("--fleet2d-set")))
+    return replace(claim, only=config.getoption("--fleet2d-seed"))
+
+
+def _body(item: pytest.Function) -> "Body":
+    """Return the test with all of its fixtures filled in but the trial."""
+    names = item._fixtureinfo.argnames
+    if TRIAL not in names:
+        pytest.fail("@fleet2d.testing.trial wants a test with an argument `trial`", pytrace=False)
+    arguments = {name: item.funcargs[name] for name in names if name != TRIAL}
+    function = item.obj
+
+    @functools.wraps(function)
+    def body(trial: Any) -> Any:
+        __tracebackhide__ = True
+        return function(trial=trial, **arguments)
+
+    return body
+
+
+def _is_ours(item: pytest.Function) -> bool:
+    definitions = item._fixtureinfo.name2fixturedefs.get(TRIAL) or ()
+    return any(one.func.__module__ == __name__ for one in definitions[-1:])
+
+
+def _folder(item: pytest.Function) -> Path:
+    """Return the folder for what a test leaves behind."""
+    chosen = item.config.getoption("--fleet2d-artifacts")
+    if chosen is not None:
+        return Path(chosen)
+    cache = getattr(item.config, "cache", None)
+    if cache is not None:
+        return Path(cache.mkdir("fleet2d"))
+    return Path(".fleet2d")
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say of each trial over several lives what was decided."""
+    lines = []
+    for reports in terminalreporter.stats.values():
+        for report in reports:
+            if getattr(report, "when", None) != "call":
+                continue
+            words = dict(report.user_properties).get(PROPERTY)
+            if words not in (None, "held", "failed"):
+                lines.append(f"{report.nodeid}: {words}")
+    if lines:
+        terminalreporter.section("trials")
+        for line in sorted(lines):
+            terminalreporter.line(line)

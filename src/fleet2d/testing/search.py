@@ -1,0 +1,295 @@
+"""Searching for a failure: random first, then guided by how narrowly expectations held."""
+
+import importlib.util
+import pickle
+import random
+import sys
+import time
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from inspect import signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.document import Document
+from fleet2d.errors import InputError
+from fleet2d.problems import did_you_mean
+from fleet2d.studies.engine import describe_error
+from fleet2d.studies.execution import Executor, Lost
+from fleet2d.studies.record import Task
+from fleet2d.studies.schedule import Schedule
+from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
+from fleet2d.testing.life import Life, Trial
+from fleet2d.testing.running import Body, run_life
+from fleet2d.testing.space import Space
+
+if TYPE_CHECKING:
+    import optuna
+
+RANDOM_SHARE = 0.25  # of the budget, before the search is guided
+LEAST_RANDOM = 10
+CANDIDATES = 64
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is searched for a failure: a scenario that expects something, or a test.
+
+    Attributes:
+        base: The composed scenario.
+        folder: The folder that its paths start from.
+        test: The file of a test and its name; None for the expectations of the scenario.
+    """
+
+    base: Document
+    folder: Path
+    test: tuple[Path, str] | None = None
+
+    def body(self) -> Body:
+        """Return what is done in each life.
+
+        Raises:
+            InputError: There is no such test.
+        """
+        return _nothing if self.test is None else load_test(*self.test)
+
+
+@dataclass(frozen=True)
+class TryTask(Task):
+    """One life.
+
+    Attributes:
+        point: Where in the space.
+        seed: Of the life.
+    """
+
+    point: dict[str, Any] = field(default_factory=dict)
+    seed: int = 0
+
+
+@dataclass
+class TryJob:
+    """Runs lives, and returns by how much all held in each."""
+
+    subject: Subject
+    space: Space
+    _body: Body | None = None
+
+    def life(self, point: dict[str, Any], seed: int) -> Life:
+        """Run a life.
+
+        Raises:
+            Fleet2DError: The scenario is wrong, or a component failed.
+        """
+        if self._body is None:
+            self._body = self.subject.body()
+        subject = self.subject
+        scenario = self.space.scenario(subject.base, subject.folder, point, seed)
+        return run_life(Variant(scenario, {"seed": seed}), self._body)
+
+    def __call__(self, task: Task) -> bytes:
+        """Return (margin, error), pickled; one of them is None."""
+        assert isinstance(task, TryTask)
+        try:
+            return pickle.dumps((self.life(task.point, task.seed).margin, None))
+        except Exception as error:  # noqa: BLE001 - a point may be no home; it is reported
+            return pickle.dumps((None, describe_error(error)))
+
+
+class TrySchedule(Schedule):
+    """Lives to run: random points at first, then those that Optuna asks for.
+
+    Attributes:
+        done: How many lives are over.
+    """
+
+    def __init__(self, search: "Search", budget: int, deadline: float | None) -> None:
+        """Ask nothing yet."""
+        super().__init__(())
+        self._search, self._budget, self._deadline = search, budget, deadline
+        self._again: list[TryTask] = []
+        self.begun = 0
+
+    def __len__(self) -> int:
+        """Return how many lives there may be."""
+        return self._budget - self.begun + len(self._again)
+
+    def __bool__(self) -> bool:
+        """Return whether there is anything left to run."""
+        if self._search.failure is not None:
+            return False
+        late = self._deadline is not None and time.monotonic() > self._deadline
+        return bool(self._again) or (self.begun < self._budget and not late)
+
+    def take(self, worker: Hashable) -> Task | None:
+        """Return the next life."""
+        if not self:
+            return None
+        if self._again:
+            return self._again.pop()
+        task = self._search.ask(self.begun)
+        self.begun += 1
+        return task
+
+    def put_back(self, task: Task) -> None:
+        """Let a life be run again."""
+        assert isinstance(task, TryTask)
+        self._again.append(task)
+
+
+@dataclass(frozen=True)
+class Failing:
+    """A life that fails.
+
+    Attributes:
+        number: Which of the tries it was, from 1.
+        point: Where in the space.
+        seed: Of the life.
+        margin: Below 0.
+    """
+
+    number: int
+    point: dict[str, Any]
+    seed: int
+    margin: float
+
+
+class Search:
+    """A search for a life in which an expectation fails.
+
+    Attributes:
+        failure: The first failure; None so far.
+        tries: How many lives are over.
+        narrowest: The least margin so far, and its point.
+        errors: What went wrong in lives that could not be run, and how often.
+    """
+
+    def __init__(self, job: TryJob, budget: int, *, seed: int = 0, is_guided: bool = True) -> None:
+        """Prepare; with is_guided=False all points are random, to compare with."""
+        self._job, self._budget, self._seed = job, budget, seed
+        self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
+        self._random = max(LEAST_RANDOM, round(RANDOM_SHARE * budget)) if is_guided else budget
+        self._study = _optuna(seed, self._random) if is_guided else None
+        self._asked: dict[int, Any] = {}
+        self.failure: Failing | None = None
+        self.tries = 0
+        self.narrowest: tuple[float, dict[str, Any]] | None = None
+        self.errors: dict[str, int] = {}
+
+    def run(
+        self,
+        executor: Executor,
+        seconds: float | None = None,
+        observer: Callable[["Search"], None] | None = None,
+    ) -> Failing | None:
+        """Search until something fails, or the budget is spent.
+
+        Args:
+            executor: Runs the lives.
+            seconds: Wall time after which no life is begun.
+            observer: Called after each life.
+        """
+        deadline = None if seconds is None else time.monotonic() + seconds
+        schedule = TrySchedule(self, self._budget, deadline)
+        events = executor.run(self._job, schedule)
+        try:
+            for event in events:
+                assert isinstance(event.task, TryTask)
+                margin, error = (
+                    (None, event.reason) if isinstance(event, Lost) else pickle.loads(event.payload)  # noqa: S301 - from our own workers
+                )
+                self._take(event.task, margin, error)
+                if observer is not None:
+                    observer(self)
+                if self.failure is not None:
+                    break
+        finally:
+            events.close()
+        return self.failure
+
+    def ask(self, number: int) -> TryTask:
+        """Return the life of a number: its point, and a seed of its own."""
+        if self._study is None:
+            point = self._job.space.draw(self._generator)
+        else:
+            trial = self._study.ask()
+            self._asked[number] = trial
+            point = self._job.space.ask(trial)
+        return TryTask(number, number, "", point=point, seed=self._seed + number)
+
+    def _take(self, task: TryTask, margin: float | None, error: str | None) -> None:
+        self.tries += 1
+        trial = self._asked.pop(task.number, None)
+        if margin is None:
+            words = error or "it could not be run"
+            self.errors[words] = self.errors.get(words, 0) + 1
+        elif self.narrowest is None or margin < self.narrowest[0]:
+            self.narrowest = margin, task.point
+        if self._study is not None and trial is not None:
+            from optuna.trial import TrialState
+
+            state = TrialState.FAIL if margin is None else None
+            self._study.tell(trial, margin, state=state)
+        if margin is not None and margin < 0:
+            self.failure = Failing(self.tries, task.point, task.seed, margin)
+
+
+def _optuna(seed: int, startup: int) -> "optuna.Study":
+    try:
+        import optuna
+    except ImportError:
+        raise InputError('this needs Optuna: pip install "fleet2d[tune]"') from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    sampler = optuna.samplers.TPESampler(
+        seed=seed, n_startup_trials=startup, n_ei_candidates=CANDIDATES, constant_liar=True
+    )
+    return optuna.create_study(sampler=sampler)
+
+
+def _nothing(trial: Trial) -> None:
+    """Do nothing: what is expected stands in the scenario."""
+
+
+def load_test(path: Path, name: str) -> Body:
+    """Return a test of a file.
+
+    Raises:
+        InputError: There is no such file or test, or it takes more than a trial.
+    """
+    function, _ = claimed_test(path, name)
+    return function
+
+
+def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
+    """Return a test of a file, and its claim.
+
+    Raises:
+        InputError: There is no such file or test, or it takes more than a trial.
+    """
+    if not path.is_file():
+        raise InputError(f"there is no {path}: name a scenario, or a test as FILE.py::NAME")
+    module_name = f"fleet2d_test_{path.stem}"
+    specification = importlib.util.spec_from_file_location(module_name, path)
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[module_name] = module
+    sys.path.insert(0, str(path.parent.absolute()))  # as pytest has it
+    try:
+        specification.loader.exec_module(module)
+    finally:
+        sys.path.pop(0)
+    tests = [n for n, value in vars(module).items() if hasattr(value, ATTRIBUTE)]
+    if name not in tests:
+        raise InputError(
+            f"{path} has no test {name!r} with a trial{did_you_mean(name, tests)} It has:"
+            f" {', '.join(tests) or 'none'}"
+        )
+    function = getattr(module, name)
+    more = [name for name in signature(function).parameters if name != "trial"]
+    if more or hasattr(function, "pytestmark"):
+        raise InputError(
+            f"{path}::{name} takes {', '.join(more) or 'parameters'} beside the trial: only a test"
+            " of a trial alone can be searched"
+        )
+    return lambda trial: function(trial=trial), getattr(function, ATTRIBUTE)

@@ -1,0 +1,141 @@
+"""Searching for failures: what is found fails, is kept as a scenario, and wrong input is refused."""
+
+import random
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+import yaml
+from tests.scenes import AGENDA, scenario
+from typer.testing import CliRunner
+
+import fleet2d
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.studies.execution import SerialExecutor
+from fleet2d.testing import command
+from fleet2d.testing.search import Search
+from fleet2d.testing.space import parse_over, read_space
+
+pytest.importorskip("optuna")
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+OVER = "robots.astro.speed={low: 0.05, high: 0.6}"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with flat.yaml: a robot that is to be in the bathroom within a minute."""
+    agenda = {"type": "schedule", "days": AGENDA, "rest": "living_room"}
+    content = scenario(
+        "4 min",
+        users={"ana": agenda, "ben": agenda},
+        robots={"astro": {"type": "patrol", "waypoints": [[1, 1], [7, 6]], "dwell": "1 min"}},
+    )
+    content["expect"] = {"comes": "eventually(distance(astro, bathroom) < 1 m, within=2 min)"}
+    (tmp_path / "flat.yaml").write_text(yaml.safe_dump(content))
+    (tmp_path / "test_flat.py").write_text(
+        "from fleet2d.expectations import eventually, room\n"
+        "from fleet2d.testing import trial\n"
+        "@trial('flat.yaml')\n"
+        "def test_comes(trial):\n"
+        "    trial.put('astro', 'kitchen')\n"
+        "    trial.expect(eventually(room('astro') == 'bathroom', within='2 min'), name='enters')\n"
+        "@trial('flat.yaml')\n"
+        "def test_more(trial, tmp_path): pass\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def falsify(*arguments: str) -> Any:
+    app = typer.Typer()
+    app.command()(command.falsify)
+    return CliRunner().invoke(app, [*arguments, "--workers", "1"])
+
+
+def test_what_it_keeps_is_a_scenario_that_fails(folder: Path) -> None:
+    done = falsify("flat.yaml", "--over", OVER, "--budget", "30", "--out", "found.yaml")
+    assert 1 == done.exit_code, done.output
+    assert "comes is violated" in done.output
+    assert "kept: found.yaml" in done.output
+    kept = yaml.safe_load((folder / "found.yaml").read_text())
+    assert "flat.yaml" == kept["extends"]
+    simulation = fleet2d.Simulation("found.yaml")
+    simulation.run()
+    assert not simulation.verdicts()["comes"].holds
+    assert fleet2d.reproduce(folder / "found" / "run").same
+    smaller = fleet2d.open_run(folder / "found" / "smaller")
+    assert [] == smaller.manifest["entities"]["users"]
+
+
+def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
+    done = falsify("test_flat.py::test_comes", "--over", OVER, "--budget", "30", "--quiet")
+    assert (1, "") == (done.exit_code, done.output)
+    kept = fleet2d.load_scenario("falsified.yaml")
+    assert kept.robots["astro"].speed < 0.3
+
+
+def test_where_nothing_fails_it_says_how_narrowly(folder: Path) -> None:
+    slow = "robots.astro.speed={low: 0.5, high: 0.6}"
+    done = falsify("flat.yaml", "--over", slow, "--budget", "5")
+    assert 0 == done.exit_code
+    assert "nothing fails in 5 lives" in done.output
+    assert "narrowest: margin" in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["flat.yaml", "--over", "robots.astro.sped={low: 1, high: 2}"], "speed"),
+        (["flat.yaml", "--over", "home={synthetik: 5}"], "synthetic"),
+        (["flat.yaml", "--over", "axis.yaml"], "no such file"),
+        (["flat.yaml", "--over", "robots.astro.speed={low: 2, high: 1}"], "low below high"),
+        (["bundled:base", "--over", OVER], "expects nothing"),
+        (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget soon"),
+        (["test_flat.py::test_come", "--over", OVER], "did you mean 'test_comes'"),
+        (["test_flat.py::test_more", "--over", OVER], "takes tmp_path"),
+        (["flat.yaml", "--over", OVER, "--out", "flat.yaml"], "exists already"),
+    ],
+)
+def test_wrong_input_is_refused_in_words(folder: Path, arguments: list[str], words: str) -> None:
+    done = falsify(*arguments)
+    assert isinstance(done.exception, Fleet2DError), done.output
+    assert words in str(done.exception)
+
+
+def test_a_planted_fault_is_found_that_random_search_misses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import falsify as benchmark
+
+    job = benchmark.job("load and slope")
+    guided, blind = (Search(job, 110, seed=1, is_guided=guided) for guided in (True, False))
+    failure = guided.run(SerialExecutor())
+    assert failure is not None
+    assert job.life(failure.point, failure.seed).margin < 0
+    assert blind.run(SerialExecutor()) is None
+    assert 110 == blind.tries
+    sys.modules.pop("falsify")
+
+
+def test_a_search_is_the_same_again() -> None:
+    space = read_space({"a.b": {"low": 0, "high": 1}, "c": {"key": "d.e", "values": [1, 2]}})
+    draws = [space.draw(random.Random(3)) for _ in range(2)]
+    assert draws[0] == draws[1]
+    assert [(("a", "b"), draws[0]["a.b"]), (("d", "e"), 1 + draws[0]["c"])] == space.changes(
+        draws[0]
+    )
+
+
+def test_axes_come_from_files_and_texts(folder: Path) -> None:
+    (folder / "axes.yaml").write_text("axes: {home: {synthetic: 2}}\n")
+    assert {"home": {"synthetic": 2}, "a.b": [1]} == parse_over(["axes.yaml", "a.b=[1]"])
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "1.5", "12345678", ""])
+def test_a_budget_is_a_number_or_a_time(text: str) -> None:
+    with pytest.raises(InputError, match="a number of lives is wanted"):
+        command.parse_budget(text)

@@ -1,0 +1,224 @@
+"""The plugin of pytest: tests with a trial run as other tests do, and say what was decided."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import pytest
+import yaml
+from tests.scenes import AGENDA, process, scenario
+
+import fleet2d
+
+INSTALLED = bool(entry_points(group="pytest11", name="fleet2d"))
+LOAD = [] if INSTALLED else ["-p", "fleet2d.testing.plugin"]
+QUIET = ["-p", "no:xdist", "-p", "no:hypothesispytest", "--capture=no"]
+
+HEAD = """
+import pytest
+from fleet2d.testing import trial
+"""
+
+
+@dataclass
+class Result:
+    """What a run of pytest within this one came to."""
+
+    text: str
+    outcomes: dict[str, int]
+
+
+class Counter:
+    """Counts outcomes of tests."""
+
+    def __init__(self) -> None:
+        self.outcomes: dict[str, int] = {}
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        if report.when == "call":
+            self.outcomes[report.outcome] = self.outcomes.get(report.outcome, 0) + 1
+
+
+Suite = Callable[..., Result]
+
+
+@pytest.fixture
+def suite(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Suite:
+    """Runs tests in a folder with flat.yaml: Ana and Ben with an agenda, and a robot on its rounds."""
+    agenda = {"type": "schedule", "days": AGENDA, "rest": "living_room"}
+    people = {"ana": agenda, "ben": agenda}
+    content = scenario("10 min", users=people, robots={"astro": "patrol"})
+    (tmp_path / "flat.yaml").write_text(yaml.safe_dump(content))
+    (tmp_path / "pytest.ini").write_text("[pytest]")
+    monkeypatch.chdir(tmp_path)
+
+    def run(code: str, *options: str) -> Result:
+        (tmp_path / "test_suite.py").write_text(HEAD + code)
+        sys.modules.pop("test_suite", None)
+        counter = Counter()
+        more = ["--fleet2d-artifacts", "left", *options]
+        pytest.main([*LOAD, *QUIET, *more, "test_suite.py"], plugins=[counter])
+        return Result(capsys.readouterr().out, counter.outcomes)
+
+    return run
+
+
+def test_each_seed_is_a_life_and_the_decision_is_reported(suite: Suite) -> None:
+    result = suite("""
+seeds = []
+@trial("flat.yaml", seeds=12)
+def test_all(trial):
+    seeds.append(trial.seed)
+    trial.run_until("07:01")
+    assert trial.step == 60
+def test_seeds():
+    assert seeds == list(range(12))
+""", "--junit-xml=report.xml")  # fmt: skip
+    assert {"passed": 2} == result.outcomes
+    assert "test_suite.py::test_all: held in 12 of 12 seeds" in result.text
+    report = ET.parse("report.xml")
+    assert [{"name": "fleet2d", "value": "held in 12 of 12 seeds"}] == [
+        element.attrib for element in report.iter("property")
+    ]
+
+
+def test_a_rate_is_decided_before_all_seeds_are_used(suite: Suite) -> None:
+    result = suite("""
+@trial("flat.yaml", seeds=200, holds=0.5)
+def test_never(trial):
+    assert trial.seed < 0
+@trial("flat.yaml", seeds=200, holds=0.5)
+def test_mostly(trial):
+    assert trial.seed % 5
+""", "--fleet2d-shrink=0")  # fmt: skip
+    assert {"passed": 1, "failed": 1} == result.outcomes
+    text = result.text
+    assert "test_never: held in 0 of" in text
+    assert "50 % refused after" in text
+    assert "50 % accepted after" in text
+    assert "after 200" not in text
+
+
+def test_a_failure_leaves_a_run_that_reproduces_a_picture_and_the_command(
+    suite: Suite, tmp_path: Path
+) -> None:
+    result = suite("""
+@trial("flat.yaml", seeds=3)
+def test_ana_stays(trial):
+    trial.put("astro", "kitchen")
+    trial.run_until("07:02")
+    trial.put("ana", "bathroom")
+    trial.advance(5)
+    assert trial.state["ana"]["room"] == "kitchen_0"
+""", "-q")  # fmt: skip
+    assert {"failed": 1} == result.outcomes
+    text = result.text
+    assert "assert 'bathroom_0' == 'kitchen_0'" in text
+    assert "again: pytest test_suite.py::test_ana_stays --fleet2d-seed 0" in text
+    folder = tmp_path / "left" / "test_suite.py-test_ana_stays"
+    for name in ("run", "smaller"):
+        assert (folder / f"{name}.png").stat().st_size > 10_000
+        stored = fleet2d.reproduce(folder / name)
+        assert stored.same, stored.differing
+    whole, smaller = (fleet2d.open_run(folder / name) for name in ("run", "smaller"))
+    assert (600, 2) == (whole.manifest["steps"], len(whole.manifest["interventions"]))
+    assert (5, 1) == (smaller.manifest["steps"], len(smaller.manifest["interventions"]))
+    assert [] == smaller.manifest["entities"]["robots"]
+    assert ["ana"] == smaller.manifest["entities"]["users"]
+    assert "see it: fleet2d view" in (folder / "failure.txt").read_text()
+
+
+def test_fixtures_parameters_and_choices_of_tests_work(suite: Suite) -> None:
+    code = """
+@pytest.fixture
+def place():
+    return "bedroom"
+@pytest.mark.parametrize("name", ["ana", "ben"])
+@trial("flat.yaml", seeds=2)
+def test_put(trial, name, place, tmp_path):
+    trial.put(name, place)
+    trial.advance()
+    assert name == "ana"
+class TestClass:
+    @trial("flat.yaml")
+    def test_method(self, trial):
+        assert trial.seed == 4
+"""
+    assert {"passed": 2, "failed": 1} == suite(code).outcomes
+    assert {"failed": 1} == suite(code, "--lf").outcomes
+    assert {"passed": 2} == suite(code, "-k", "ana or method").outcomes
+
+
+def test_one_seed_can_be_run_again(suite: Suite) -> None:
+    result = suite("""
+@trial("flat.yaml", seeds=50, holds=0.9)
+def test_seed(trial):
+    assert trial.seed == 17
+""", "--fleet2d-seed=17")  # fmt: skip
+    assert {"passed": 1} == result.outcomes
+
+
+def test_lives_go_round_homes_households_and_axes(suite: Suite) -> None:
+    result = suite("""
+lives = []
+@trial("flat.yaml", seeds=8, homes=["flat.json"], households={"one": {"ana": "meander"},
+       "other": {"vera": {"type": "meander", "speed": 0.5}}}, axes={"robots.astro.speed": [0.3, 0.6]})
+def test_axes(trial):
+    lives.append((*trial.scenario.users, trial.scenario.robots["astro"].speed, trial.seed))
+def test_lives():
+    assert lives[:4] == [("ana", .3, 0), ("vera", .3, 1), ("ana", .6, 2), ("vera", .6, 3)]
+    assert lives[4:] == [("ana", .3, 4), ("vera", .3, 5), ("ana", .6, 6), ("vera", .6, 7)]
+""".replace("flat.json", scenario()["floorplan"]["path"]))  # fmt: skip
+    assert {"passed": 2} == result.outcomes
+    assert "held in 8 of 8 lives" in result.text
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("def test_x(trial): pass", "wants @fleet2d.testing.trial"),
+        ("@trial('flat.yaml')\ndef test_x(): pass", "wants a test with an argument `trial`"),
+        ("@trial('flat.yml')\ndef test_x(trial): pass", "flat.yml"),
+        (
+            "@trial('flat.yaml', 'users.ana.start=atttic')\ndef test_x(trial): pass",
+            "seed 4: …no room…'atttic'",
+        ),
+        ("@trial('flat.yaml')\ndef test_x(trial): trial.put('anna', 'attic')", "did you mean 'ana'…trial.put"),
+        ("@trial('flat.yaml', seeds=3, holds=.5)\ndef test_x(trial): pass", "take 5 seeds or more"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_test_is_said(suite: pytest.Pytester, code: str, words: str) -> None:
+    result = suite(code)
+    assert {"failed": 1} == result.outcomes
+    assert all(word in result.text for word in words.split("…")), result.text
+    assert "plugin.py" not in result.text
+
+
+def test_it_runs_in_several_processes(suite: Suite, tmp_path: Path) -> None:
+    code = """
+@pytest.mark.parametrize("number", range(4))
+@trial("flat.yaml", seeds=5)
+def test_many(trial, number):
+    trial.advance(3)
+"""
+    (tmp_path / "test_suite.py").write_text(HEAD + code)
+    done = process("-m", "pytest", *LOAD, "-n", "2", "-p", "no:cacheprovider", cwd=tmp_path)
+    assert "4 passed" in done.stdout
+    assert 4 == done.stdout.count("held in 5 of 5 seeds")
+
+
+def test_nothing_else_imports_pytest_and_the_plugin_is_light() -> None:
+    code = (
+        "import sys, fleet2d, fleet2d.testing; fleet2d.testing.trial; assert 'pytest' not in sys.modules;"
+        "[sys.modules.pop(n) for n in list(sys.modules) if n.split('.')[0] in ('fleet2d', 'numpy')];"
+        "import fleet2d.testing.plugin;"
+        "assert not [n for n in sys.modules if n.startswith(('fleet2d.engine', 'numpy'))]"
+    )
+    done = process("-c", code)
+    assert (0, "") == (done.returncode, done.stderr)
