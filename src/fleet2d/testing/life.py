@@ -109,7 +109,9 @@ def finding_of(verdict: Verdict) -> Finding:
     margin = comparable(value, SCALES.get(unit, 1.0))
     if (margin > 0) != verdict.holds:  # it came just in time, or just too late
         margin = math.copysign(NEXT_TO_NOTHING, 1.0 if verdict.holds else -1.0)
-    return Finding(verdict.name, str(verdict), verdict.holds, margin, step)
+    twice = f"{verdict.expectation} is violated: {verdict.expectation}"  # one without a name
+    words = str(verdict).replace(twice, f"{verdict.expectation} is violated")
+    return Finding(verdict.name, words, verdict.holds, margin, step)
 
 
 def comparable(value: float, scale: float) -> float:

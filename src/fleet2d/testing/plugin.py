@@ -73,7 +73,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     from fleet2d.testing.failure import Places, explain
     from fleet2d.testing.running import run_claim
 
-    __tracebackhide__ = True
+    # pytest shows the lines of the test; what `fail` says has none.
+    __tracebackhide__ = _is_error
     claim = _chosen(claim, pyfuncitem.config)
     body = _body(pyfuncitem)
     try:
@@ -92,6 +93,10 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
         failure.add_note(text)  # pytest shows what was compared
         raise failure
     return True
+
+
+def _is_error(info: Any) -> bool:
+    return not info.errisinstance(pytest.fail.Exception)
 
 
 def _chosen(claim: "Claim", config: pytest.Config) -> "Claim":
