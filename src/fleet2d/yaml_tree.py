@@ -131,14 +131,14 @@ def _check_events(text: str) -> None:
 
 
 def parse(text: str) -> Any:
-    r"""Return a YAML text as plain data.
+    """Return a YAML text as plain data.
 
     Raises:
         yaml.YAMLError: It is no YAML.
         InputError: It is beyond a bound, or a value in it can't be read.
 
     Example:
-        >>> parse("a: &x [1, 2]\\nb: {<<: {c: 12:30}, d: *x}")
+        >>> parse("{a: &x [1, 2], b: {<<: {c: 12:30}, d: *x}}")
         {'a': [1, 2], 'b': {'c': '12:30', 'd': [1, 2]}}
     """
     node = compose(text)
