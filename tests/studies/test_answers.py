@@ -1,5 +1,6 @@
 """Answers on made-up variants, where the truth is known; and on a robot that hangs out or not."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -111,30 +112,40 @@ def test_the_ratio_of_variances_is_that_of_unpaired_to_paired() -> None:
     assert 5.0 == pytest.approx(variance_ratio(new, old), rel=0.1)  # 2 × 1.25 / (2 × 0.25)
 
 
-def test_hanging_out_or_not_is_told_with_fewer_runs_in_pairs(tmp_path: Path) -> None:
-    """The same lives in the same homes: most of what differs between runs is out of the pairs."""
-    patrol = {"type": "patrol", "dwell": "10 min"}
-    hangout = {"type": "hangout", "source": "ltp", "near": "view", "period": "1 h"}
+def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path: Path) -> None:
+    """The same lives in the same homes; compared with runs whose home and seed are another's."""
+    patrol = {"type": "patrol", "cooldown": "1 h"}
+    hangout = {"type": "hangout", "source": "ltp", "near": "view", "period": "30 min"}
     study = fleet2d.study(
         {
-            "base": {"extends": "bundled:base", "simulation": {"duration": "1 d"}},
+            "base": {
+                "extends": "bundled:base",
+                "simulation": {"start": "2026-01-05T17:00", "duration": "5 h"},
+            },
             "axes": {
                 "robot": {
                     "options": {
-                        "patrol": {"robots.astro.behaviors": [patrol]},
-                        "hangout": {"robots.astro.behaviors": [hangout, patrol]},
+                        "off": {"robots.astro.behaviors": [patrol]},
+                        "on": {"robots.astro.behaviors": [hangout, patrol]},
                     }
                 },
                 "home": {"synthetic": 3, "settings": {"furnish": True}},
             },
-            "replicates": 3,
+            "replicates": 6,
             "keep": {"metrics": ["sightings.*", "distance.*"]},
         },
         tmp_path / "hangout",
         executor="serial",
     )
-    (walked,) = study.paired("distance.ana", {"robot": "patrol"}).to_dicts()
-    assert 0 == walked["difference"]  # her life is the same, whatever the robot does
-    (seen,) = study.paired("sightings.ana", {"robot": "patrol"}).to_dicts()
-    assert 9 == seen["pairs"]
-    assert 0.0 < seen["variance_ratio"]
+    (walked,) = study.paired("distance.ana", {"robot": "off"}).to_dicts()
+    # Her life is the same, whatever the robot does.
+    assert (0, math.inf) == (walked["difference"], walked["variance_ratio"])
+    frame = study.variants.sort("home", "seed")
+    for metric in ("sightings.ana", "distance.astro"):
+        (row,) = study.paired(metric, {"robot": "off"}).to_dicts()
+        on, off = (
+            frame.filter(frame["robot"] == name)[metric].to_numpy() for name in ("on", "off")
+        )
+        others = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
+        assert 18 == row["pairs"] == len(on)
+        assert others.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)
