@@ -1,8 +1,11 @@
 """Small studies for the tests: some minutes in the flat of four rooms."""
 
+import importlib
+import os
 from pathlib import Path
 from typing import Any
 
+import pytest
 from tests.scenes import scenario
 
 from fleet2d.studies.driver import RunOptions, check_study, run_study
@@ -44,3 +47,10 @@ def digests(study: Study) -> list[str]:
     """The digests of all variants, in order."""
     found: list[str] = study.arrow_variants.column("digest").to_pylist()
     return found
+
+
+def optional(name: str) -> Any:
+    """Return a module that only the extra `cluster` installs; skip what needs it elsewhere."""
+    if os.environ.get("FLEET2D_REQUIRE_CLUSTER") == "1":
+        return importlib.import_module(name)
+    return pytest.importorskip(name, reason=f"{name} is not installed: see .ci/cluster")

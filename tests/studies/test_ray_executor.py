@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studies.scenes import base, digests, run, small
+from tests.studies.scenes import base, digests, optional, run, small
 
 from fleet2d.studies import api
 from fleet2d.studies.driver import SilentObserver
 from fleet2d.studies.record import Record
 
-ray = pytest.importorskip("ray")
+ray = optional("ray")
 pytestmark = [
     pytest.mark.filterwarnings("ignore"),  # Ray's own
 ]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pyarrow.fs as pafs
 import pytest
-from tests.studies.scenes import digests, run, small
+from tests.studies.scenes import digests, optional, run, small
 
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.studies import driver
@@ -34,7 +34,7 @@ class Interrupted(SerialExecutor):
 @pytest.fixture(scope="module")
 def server() -> Iterator[str]:
     """An S3 server on this machine: its address."""
-    moto = pytest.importorskip("moto.server")
+    moto = optional("moto.server")
     running = moto.ThreadedMotoServer(port=0, verbose=False)
     running.start()
     _, port = running.get_host_and_port()
