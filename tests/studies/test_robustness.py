@@ -14,21 +14,37 @@ from tests.studies.scenes import SPEED, base, digests, run, small
 from tests.thorough import THOROUGH
 
 from fleet2d.studies.directory import StudyDirectory
+from fleet2d.studies.driver import SilentObserver
 from fleet2d.studies.execution import cores
 from fleet2d.studies.reader import open_study
+from fleet2d.studies.record import Record
 from fleet2d.studies.results import count
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "15"))
 ROOT = Path(__file__).parents[2]
-LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=12, keep={"tables": ["room_share"]})
+MOST = 3  # variants until a study is killed: something is left for all kills
+SEEDS = KILLS * MOST // 4 + 1
+LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=SEEDS, keep={"tables": ["room_share"]})
 
 
-def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
-    """Run a study in a copy of this process and kill it; return whether it came to its end."""
+class Dies(SilentObserver):
+    """Kills its own process after some variants."""
+
+    def __init__(self, variants: int) -> None:
+        self.left = variants
+
+    def ended(self, record: Record) -> None:
+        self.left -= 1
+        if not self.left:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None:
+    """Run a study in a copy of this process, and kill it after a time or some variants."""
     child = os.fork()
     if not child:
         try:
-            run(LARGE, folder)
+            run(LARGE, folder, observer=Dies(variants))
             os._exit(0)
         finally:
             os._exit(1)
@@ -36,11 +52,11 @@ def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
     while time.monotonic() < deadline:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
-            return status == 0
+            assert os.WTERMSIG(status) == signal.SIGKILL
+            return
         time.sleep(0.005)
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return False
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
@@ -48,18 +64,14 @@ def run_in_a_child_and_kill(folder: Path, after_s: float) -> bool:
 def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     _, undisturbed = run(LARGE, tmp_path / "undisturbed")
     chance = random.Random(16)
-    folder, kills, before = tmp_path / "killed", 0, 0
-    # As long as anything is left to run, killed while it begins, runs or writes.
-    while kills < KILLS:
-        if run_in_a_child_and_kill(folder, chance.uniform(0.0, 0.12)):
-            break
-        kills += 1
+    folder, before = tmp_path / "killed", 0
+    for _ in range(KILLS):  # while it begins, runs or writes
+        run_in_a_child_and_kill(folder, chance.uniform(0.0, 0.12), chance.randint(1, MOST))
         if (folder / "study.json").exists():
             now = count(StudyDirectory(folder)).complete
             assert now >= before  # nothing that was there is lost
             before = now
     _, study = run(LARGE, folder)
-    assert kills > 1
     assert digests(undisturbed) == digests(study)
     tables = [one.arrow("room_share").to_table() for one in (undisturbed, study)]
     assert tables[0].sort_by("variant") == tables[1].sort_by("variant")
