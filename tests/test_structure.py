@@ -82,8 +82,14 @@ def base_of(node: ast.ImportFrom, name: str, path: Path) -> str:
 
 def test_map_of_packages_is_that_of_the_contract() -> None:
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    drawn = page.split(package_map.BEGIN)[1].split(package_map.END)[0]
 
-    assert page == package_map.with_map(page), "run python tools/package_map.py"
+    assert names_in(drawn) == names_in(package_map.picture()), "run python tools/package_map.py"
+
+
+def names_in(picture: str) -> list[str]:
+    """Return the first word of each line; what a package is may be said anew."""
+    return [line.split()[0] for line in picture.splitlines()]
 
 
 def test_files_that_contributing_names_are_there() -> None:

@@ -344,6 +344,9 @@ print("ready", flush=True)
 for round in range(3):
     for spec in specs:
         store.append(spec.name, **rows)
+    print("storing", flush=True)
+    if sys.argv[3] == "storing":
+        sys.stdin.read()
 print("closing", flush=True)
 store.close()
 print("closed", flush=True)
@@ -353,15 +356,19 @@ sys.stdin.read()
 
 @pytest.mark.skipif(os.name != "posix", reason="kill -9 is a matter of POSIX")
 def test_crash_never_leaves_a_file_that_looks_whole(tmp_path: Path) -> None:
-    """Killed in the middle of storing, of closing, and just after."""
+    """Killed in the middle of storing, of closing, and just after.
+
+    The child waits for its end in the first case and in the last, whatever the machine is doing;
+    the others die somewhere between.
+    """
     helper = (Path(__file__).parent / "tables.py").read_text(encoding="utf-8")
     (tmp_path / "tests_of_artifacts.py").write_text(helper, encoding="utf-8")
     seen = set()
     for k, (word, delay) in enumerate(
-        [("ready", 0), ("ready", 0.02), ("closing", 0), ("closing", 0.01), ("closed", 0)]
+        [("storing", 0), ("ready", 0.02), ("closing", 0), ("closing", 0.01), ("closed", 0)]
     ):
         directory = tmp_path / f"run{k}"
-        command = [sys.executable, "-c", CRASH, str(directory), str(tmp_path)]
+        command = [sys.executable, "-c", CRASH, str(directory), str(tmp_path), word]
         with subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         ) as child:
