@@ -171,6 +171,10 @@ def errors() -> ErrorTables:
     return error_tables([c.lens(1280, SECOND) for c in CAMERAS], [ERRS, None], scene())
 
 
+def signal() -> tuple[np.ndarray, np.ndarray]:
+    return np.array([0, 3, 7]), np.array([1.0, 2.0, 0.5])
+
+
 def window() -> _core.Window:
     x = np.array([[100, 100, 110, 120, 200, 200, 200, 100, 100]] * 3)
     x[1:] += [[150], [700]]
@@ -318,6 +322,11 @@ CALLS: dict[str, Args] = {
     ),
     "count_rooms": lambda: (poses(), np.zeros((3, 4), np.int16), np.zeros(2, np.int64)),
     "sum_moves": lambda: (poses(),),
+    "distances_between": lambda: (window(), 0, 1),
+    "distances_to_shape": lambda: (window(), 0, np.array([[0, 0, 9, 0], [9, 0, 0, 9]])),
+    "speeds": lambda: (window(), 0, np.array([5, 5, 0])),
+    "sliding_max": lambda: (*signal(), 9, -1, 4, 0.0, 1.0),
+    "until": lambda: (*signal(), np.array([0.5, 2.0, -1.0]), 0.0),
     "points_in_sight": lambda: (MESH, 100, 100, POINTS.copy()),
     "points_in_reach": lambda: (100, 100, 5, Reach(0, 90_000, 800), POINTS.copy()),
     "questions": lambda: (
