@@ -240,7 +240,8 @@ def _type_of(value: Mapping[str, Any]) -> str:
     if value.get("type") == "array":
         return f"list of {_type_of(value.get('items', {}))}"
     if value.get("type") == "object":
-        return f"mapping to {_type_of(value.get('additionalProperties') or {})}"
+        inner = value.get("additionalProperties")
+        return f"mapping to {_type_of(inner if isinstance(inner, Mapping) else {})}"
     words = {"integer": "whole number", "string": "text", "boolean": "true | false"}
     found = value.get("type", "any")
     kinds = found if isinstance(found, list) else [found]
