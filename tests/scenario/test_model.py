@@ -138,7 +138,7 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
         (["simulation.start=2026-02-31"], "simulation.start: found '2026-02-31'; a date and time"),
         (["simulation.seed=-1"], "simulation.seed: found -1; 0 or more is wanted"),
         (["simulation.max_span=0"], "simulation.max_span: found 0; 1 or more is wanted"),
-        (["simulation.speedup=0"], "simulation.speedup: found 0; more than 0 is wanted"),
+        (["simulation.speedup=0"], "simulation.speedup: found 0; 0.001 or more is wanted"),
         (["simulation.speedup=.inf"], "simulation.speedup: found inf; a finite number is wanted"),
         (["users.9x=drift"], "users.9x: the name '9x' must be letters"),
         (["robots.ana=drift"], "robots.ana: there is a user named 'ana' already"),

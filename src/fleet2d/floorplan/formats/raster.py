@@ -144,7 +144,8 @@ def _read_png(content: bytes) -> GreyPicture:
             'is PNG, and to read that takes Pillow: pip install "fleet2d[viz]", or convert the'
             " image to PGM"
         ) from None
-    _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
+    if len(content) >= 24:  # else it is cut off, as Pillow says
+        _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size
