@@ -158,6 +158,7 @@ public:
             is_prompt_ &= lenses.latency[c] == 0 && memory.waiting(c, 1) == 0;
             is_haunted_ |= errors.haunted[c] != 0;
         }
+        is_haunted_ |= errors.injected.size() > 0;
         run_ = window.start[onlooker.body];
     }
 
@@ -172,6 +173,7 @@ public:
                     if (looks) look_at(active_[i]);
                 }
                 if (looks && errors_.haunted[c] != 0) imagine(c);
+                if (looks) inject(c);
             }
             if (!is_prompt_) deliver();
             if (result_.sightings.size() > before || identities_in_view_ > 0) {
@@ -218,6 +220,8 @@ private:
         const i64 camera = target.camera;
         const View<i64> about = memory_.about[camera][target.user];
         ++at(about, About::IN_VIEW);
+        const i64 forced = at(about, About::FORCED);
+        if (forced == FORCED_MISS) return;
         const bool errs = lenses_.errs[camera] != 0;
         if (errs ? !pays_attention(target) : !is_detected(camera, target.user)) return;
         ++at(about, About::NOTICED);
@@ -235,6 +239,7 @@ private:
                           target.faces,
                           target.posture};
         if (errs) perceive(target, sighting);
+        if (forced != 0) sighting.identity = forced - FORCED_IDENTITY;
         record(camera, sighting);
     }
 
@@ -302,6 +307,18 @@ private:
             const i64 identity = person < users_ ? person : NOBODY;
             record(camera, {now_ + lenses_.latency[camera], camera, NOBODY, identity, place.x, place.y, heading, 0,
                             place.x, place.y, heading, 0});
+        }
+    }
+
+    // Record what somebody outside lets a camera perceive.
+    void inject(i64 camera) {
+        for (i64 i = 0; i < errors_.injected.size(); ++i) {
+            const View<const i64> row = errors_.injected[i];
+            const auto value = [&](Injected column) { return row[static_cast<i64>(column)]; };
+            if (value(Injected::CAMERA) != camera) continue;
+            const i64 x = value(Injected::X), y = value(Injected::Y), heading = value(Injected::HEADING);
+            record(camera, {now_ + lenses_.latency[camera], camera, NOBODY, value(Injected::IDENTITY), x, y, heading, 0,
+                            x, y, heading, 0});
         }
     }
 

@@ -74,6 +74,7 @@ struct ErrorTables {
     View<const i64, 2> looks_like;  // (cameras, users + 1): identity of a false positive, nobody last, cumulative
     View<const u64, 3> keys;        // (cameras, users, USER_DRAWS): streams
     View<const u64, 2> ghost_keys;  // (cameras, GHOST_DRAWS): streams
+    View<const i64, 2> injected;    // (n, INJECTED): false positives in every look of a camera, wherever it looks
 };
 
 // What a camera carries along about one user from look to look: columns of `Memory::about`.
@@ -84,8 +85,16 @@ enum class About : i64 {
     TRACK_STEP,  // the last step at which the user was noticed; -1: never
     IN_VIEW,     // looks at which the user was in view
     NOTICED,     // looks at which the user was noticed
+    FORCED,      // what somebody outside makes of a user in view: 0 nothing, or one of the below
 };
-inline constexpr i64 ABOUT = static_cast<i64>(About::NOTICED) + 1;
+inline constexpr i64 ABOUT = static_cast<i64>(About::FORCED) + 1;
+
+inline constexpr i64 FORCED_MISS = 1;      // in view, and not noticed
+inline constexpr i64 FORCED_IDENTITY = 3;  // taken for identity 0, and so on; one less: for somebody unknown
+
+// The columns of a row of `ErrorTables::injected`.
+enum class Injected : i64 { CAMERA, IDENTITY, X, Y, HEADING };
+inline constexpr i64 INJECTED = static_cast<i64>(Injected::HEADING) + 1;
 
 inline i64& at(View<i64> about, About column) { return about[static_cast<i64>(column)]; }
 inline u64 stream(View<const u64> keys, UserDraw draw) { return keys[static_cast<i64>(draw)]; }

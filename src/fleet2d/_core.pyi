@@ -820,6 +820,15 @@ class About(enum.IntEnum):
     NOTICED = 5
     """Looks at which the user was noticed."""
 
+    FORCED = 6
+    """
+    What somebody outside makes of a user in view: 0 nothing, FORCED_MISS, or FORCED_IDENTITY + identity.
+    """
+
+FORCED_MISS: int = 1
+
+FORCED_IDENTITY: int = 3
+
 def random_share(key: int, counter: int) -> int:
     """Return an integer in [0, ONE)."""
 

@@ -67,12 +67,14 @@ void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables&
     require(memory.waiting.shape == std::array{cameras, i64{2}}, "waiting must be (cameras, 2)");
     const i64 rows = memory.backlog.shape[1];
     for (i64 c = 0; c < cameras; ++c) {
-        const i64 burst = users + (errors.haunted[c] != 0 ? MOST_GHOSTS : 0);
+        const i64 burst = users + (errors.haunted[c] != 0 ? MOST_GHOSTS : 0) + errors.injected.size();
         require((lenses.latency[c] / lenses.period[c] + 1) * burst <= rows,
                 "backlog must have room for all that waits");
         for (i64 u = 0; u < users; ++u) {
             const i64 identity = at(memory.about[c][u], About::TAKEN_FOR);
             require(NOBODY <= identity && identity < users, "about must hold numbers of users, or NOBODY");
+            const i64 forced = at(memory.about[c][u], About::FORCED);
+            require(0 <= forced && forced < users + FORCED_IDENTITY, "FORCED must stand for a user, or for less");
         }
         const i64 begin = memory.waiting(c, 0), length = memory.waiting(c, 1);
         require(0 <= begin && begin < std::max(rows, i64{1}) && 0 <= length && length <= rows,

@@ -70,7 +70,11 @@ void bind_perception(nb::module_& m) {
         .value("TAKEN_FOR", About::TAKEN_FOR, "For whom the user was taken last, or NOBODY.")
         .value("TRACK_STEP", About::TRACK_STEP, "The last step at which the user was noticed; -1: never.")
         .value("IN_VIEW", About::IN_VIEW, "Looks at which the user was in view.")
-        .value("NOTICED", About::NOTICED, "Looks at which the user was noticed.");
+        .value("NOTICED", About::NOTICED, "Looks at which the user was noticed.")
+        .value("FORCED", About::FORCED,
+               "What somebody outside makes of a user in view: 0 nothing, FORCED_MISS, or FORCED_IDENTITY + identity.");
+    m.attr("FORCED_MISS") = FORCED_MISS;
+    m.attr("FORCED_IDENTITY") = FORCED_IDENTITY;
 
     m.def("random_share", &random_share, "key"_a, "counter"_a, "Return an integer in [0, ONE).");
     m.def(

@@ -9,9 +9,10 @@ namespace fleet2d {
 template <>
 struct border::Fields<ErrorTables> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&ErrorTables::table, &ErrorTables::whom, &ErrorTables::haunted,
-                                               &ErrorTables::ghosts, &ErrorTables::source, &ErrorTables::spot,
-                                               &ErrorTables::looks_like, &ErrorTables::keys, &ErrorTables::ghost_keys);
+    static constexpr auto members =
+        std::tuple(&ErrorTables::table, &ErrorTables::whom, &ErrorTables::haunted, &ErrorTables::ghosts,
+                   &ErrorTables::source, &ErrorTables::spot, &ErrorTables::looks_like, &ErrorTables::keys,
+                   &ErrorTables::ghost_keys, &ErrorTables::injected);
 };
 
 // A camera's table as far as it decides where another entry is read.
@@ -36,6 +37,12 @@ inline void check_errors(const ErrorTables& errors, View<const i64> errs, i64 us
     require(errors.ghosts.shape[1] == MOST_GHOSTS, "ghosts must be (cameras, MOST_GHOSTS)");
     require(sources > 0 && errors.spot.shape[1] == sources && errors.spot.shape[2] == 3,
             "source must be (cameras, sources), spot (cameras, sources, 3)");
+    require(errors.injected.shape[1] == INJECTED, "injected must be (n, INJECTED)");
+    for (i64 i = 0; i < errors.injected.size(); ++i) {
+        const i64 camera = errors.injected(i, 0), identity = errors.injected(i, 1);
+        require(0 <= camera && camera < cameras, "injected must hold numbers of cameras");
+        require(NOBODY <= identity && identity < users, "injected must hold numbers of users, or NOBODY");
+    }
     for (i64 c = 0; c < cameras; ++c) {
         require(errors.source(c, sources - 1) >= ONE, "source must end at ONE");
         if (errs[c] != 0) check_table(errors.table[c]);

@@ -10,6 +10,11 @@ from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.change import HomeChanges
 from fleet2d.problems import did_you_mean
 
+WITHHELD = "withheld"
+"""What stands for an output that nobody is to read."""
+FROZEN = "frozen"
+"""What stands for the newest output, as it is when somebody asks that it stay."""
+
 # The columns of every table.
 RESERVED = frozenset({"step", "time"})
 

@@ -9,6 +9,14 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.activities import ActivitySense
 from fleet2d.blame import blame
 from fleet2d.engine.bodies import Bodies, poses_of
+from fleet2d.engine.disturbing import (
+    carried_over,
+    dark_cameras,
+    forced_of,
+    injected_by,
+    present_errors,
+    worsen,
+)
 from fleet2d.engine.verdicts import points_seen
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
@@ -32,6 +40,7 @@ from fleet2d.kernels.look import (
     look,
 )
 from fleet2d.kernels.perception import MOST_GHOSTS, About, GhostDraw, UserDraw
+from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
@@ -100,8 +109,11 @@ class Cameras:
         is_robot = row >= users
         self.index = row - users if is_robot else row
         self._first = 0 if is_robot else users
+        self.disturbances: list[Disturbance] = []
+        self.activity_senses: list[ActivitySense] = []
+        self.may_err = False  # by what somebody outside does
         self.others = actors[:users] if is_robot else actors[users:]
-        self._set_up()
+        self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
         self.taken = 0
@@ -110,7 +122,18 @@ class Cameras:
         self._sightings: list[I64] = []  # not collected yet
         self._ahead: _Look | None = None
 
-    def _set_up(self) -> None:
+    def prepare_to_err(self) -> None:
+        """Let what they perceive be kept beside the truth: somebody outside will disturb them."""
+        self.may_err = self.errs = True
+
+    def disturb(self, disturbances: Sequence[Disturbance]) -> None:
+        """Let somebody outside disturb them from the step before which they have looked."""
+        self.disturbances = list(disturbances)
+        made, people = self._set_up(), [other.name for other in self.others]
+        forced = forced_of(self.disturbances, self.names, people)
+        self.memory = carried_over(made, self.memory, forced)
+
+    def _set_up(self) -> Memory:
         owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
@@ -121,10 +144,13 @@ class Cameras:
         except ValueError as error:
             raise ScenarioError(f"{owner.path}: {error}") from None
         common = getattr(owner.entity, "perception", None)  # users see what is there
-        perceptions = [camera.perception or common for camera in cameras.values()]
+        perceptions = [
+            present_errors(self.disturbances, name) or camera.perception or common
+            for name, camera in cameras.items()
+        ]
         wrong = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
-        self.errs = any(wrong) or self.drift is not None
+        self.errs = self.may_err or any(wrong) or self.drift is not None
         scene = Scene(
             [other.name for other in self.others],
             [other.entity.radius * lattice.units_per_m for other in self.others],
@@ -136,10 +162,16 @@ class Cameras:
         self.errors = error_tables(
             lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], scene
         )
+        self._dark = dark_cameras(self.disturbances, self.names)
+        worsen(self.lenses, self.disturbances, self.names)
+        self.errors.haunted[self._dark] = 0
+        injected = injected_by(self.disturbances, self.names, scene)
+        self.errors = self.errors._replace(injected=injected)
         self._draw_streams()
-        self._sense_activities(perceptions)
+        if not self.activity_senses:  # the tables of the run go by the first ones
+            self._sense_activities(perceptions)
         count = len(self.others)
-        bursts = count + MOST_GHOSTS * self.errors.haunted
+        bursts = count + MOST_GHOSTS * self.errors.haunted + len(self.errors.injected)
         midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
         since_midnight = clock.start - midnight
         self.rule = Rule(
@@ -151,7 +183,7 @@ class Cameras:
             stop_seen=False,
         )
         looks = self.lenses.latency // self.lenses.period + 2
-        self.memory = new_memory(len(lenses), count, int((looks * bursts).max()))
+        return new_memory(len(lenses), count, int((looks * bursts).max()))
 
     def _draw_streams(self) -> None:
         """Give every draw a stream of its own, by name: a user more leaves the others' alone."""
@@ -168,7 +200,6 @@ class Cameras:
 
     def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
         """Note which cameras perceive activities, and for what they take them."""
-        self.activity_senses: list[ActivitySense] = []
         for c, (name, perception) in enumerate(zip(self.names, perceptions, strict=True)):
             keys = [
                 stream_key(self.owner.seed, self.owner.path, f"{name}: activity {other.name}")
@@ -305,9 +336,9 @@ class Cameras:
             poses = poses_of(block, self.row)
             step_us = self.owner.clock.step_us
             with blame("sight.method", self.taken):
-                shown = points_seen(
-                    self.method, home, self.lenses, poses, crowd, self.taken, step_us
-                )
+                lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
+                shown = points_seen(self.method, home, lenses, poses, crowd, self.taken, step_us)
+                shown[self._dark] = 0
         done, sightings, step, identity, kind = look(
             home.walls,
             self.lenses,

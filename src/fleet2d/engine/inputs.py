@@ -58,6 +58,7 @@ def components_of(scenario: Scenario) -> Iterator[Component]:
     outer += scenario.objects.values()
     outer += scenario.algorithms.values()
     outer += scenario.metrics.values()
+    outer += [entry.act for entry in scenario.script]
     while outer:  # components may have others within: an algorithm its model
         component = outer.pop()
         yield component

@@ -6,13 +6,18 @@ it again.
 """
 
 from bisect import insort
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fleet2d.clock import Clock
 from fleet2d.events import Event
-from fleet2d.interventions.intervention import Intervention, dump_intervention, parse_intervention
+from fleet2d.interventions.intervention import (
+    Intervention,
+    Lasting,
+    dump_intervention,
+    parse_intervention,
+)
 from fleet2d.interventions.when import Trigger
 from fleet2d.units import micros
 
@@ -89,11 +94,13 @@ class Interventions:
     Attributes:
         done: What was done, in order, as the manifest keeps it.
         waiting: What waits for an event.
+        lasting: What was begun and isn't over, in order.
     """
 
     def __init__(self, clock: Clock) -> None:
         self.done: list[dict[str, Any]] = []
         self.waiting: list[Waiting] = []
+        self.lasting: list[Lasting] = []
         self._clock = clock
         self._queue: list[Due] = []
         self._count = 0
@@ -123,6 +130,11 @@ class Interventions:
         """Yield what is due by a step, in order; keep what is begun, and let it end in time."""
         while self._queue and self._queue[0].step <= step:
             due = self._queue.pop(0)
+            if isinstance(due.act, Lasting):
+                if due.ends:
+                    self._forget(due.act)
+                else:
+                    self.lasting.append(due.act)
             yield due
             if due.ends:
                 continue
@@ -130,6 +142,20 @@ class Interventions:
             if due.act.lasts is not None:
                 ends = due.step * self._clock.step_us + micros(due.act.lasts)
                 self.add(due.act, max(self._clock.step_at_or_after(ends), due.step + 1), ENDS)
+
+    def undo(self, is_meant: Callable[[Lasting], bool]) -> list[Lasting]:
+        """Take what is under way and meant out of it, and return it."""
+        meant = [act for act in self.lasting if is_meant(act)]
+        for act in meant:
+            self._forget(act)
+            self._queue = [due for due in self._queue if not (due.ends and due.act is act)]
+        return meant
+
+    def _forget(self, act: Lasting) -> None:
+        """Drop what is over: that very one, for another may be just like it."""
+        place = next((i for i, other in enumerate(self.lasting) if other is act), None)
+        if place is not None:
+            del self.lasting[place]
 
     @property
     def kinds(self) -> frozenset[str]:

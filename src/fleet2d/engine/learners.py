@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.learned import load_learned, save_learned
-from fleet2d.algorithms.output import Outputs, to_columns
+from fleet2d.algorithms.output import FROZEN, WITHHELD, Outputs, to_columns
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.blame import blame
@@ -34,6 +34,8 @@ class Learner:
     """An algorithm or a metric in a run.
 
     Attributes:
+        component: The component with what it has learned.
+        origin: The component as the scenario has it.
         every: Steps between two updates; 0 if events update it.
         table: The name of the table of what it puts out.
         kinds: The kinds of that table's columns; empty before the first output.
@@ -45,6 +47,7 @@ class Learner:
     name: str
     path: str
     component: Algorithm | Metric
+    origin: Algorithm | Metric
     every: int
     table: str
     kinds: dict[str, Kind] = field(default_factory=dict)
@@ -72,6 +75,7 @@ class Learners:
     Attributes:
         outputs: The newest output of each algorithm.
         fresh: Those of the last update.
+        replaced: What all but metrics read of an algorithm instead; WITHHELD for nothing.
     """
 
     def __init__(
@@ -88,6 +92,7 @@ class Learners:
         self.users, self.robots = tuple(names[0]), tuple(names[1])
         self.outputs: dict[str, Any] = {}
         self.fresh: dict[str, Any] = {}
+        self.replaced: dict[str, Any] = {}
         self.all: list[Learner] = []
         self._known = tuple(algorithms)
         _check_reads(metrics, algorithms)
@@ -102,7 +107,48 @@ class Learners:
     @property
     def readable(self) -> Mapping[str, Any]:
         """The outputs, for others to read."""
-        return Outputs(self.outputs, self._known)
+        return Outputs(self._as_read(self.outputs), self._known)
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The names of all algorithms."""
+        return self._known
+
+    def _as_read(self, outputs: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return outputs as all but metrics read them."""
+        if not self.replaced:
+            return outputs
+        seen = {**outputs, **self.replaced}
+        return {name: output for name, output in seen.items() if not _is(output, WITHHELD)}
+
+    def replace(self, name: str, output: Any) -> None:
+        """Let all but metrics read something else of an algorithm from now on.
+
+        Args:
+            name: The algorithm.
+            output: What they read; FROZEN: its newest output, as it is now; WITHHELD: nothing;
+                None: what it puts out, as before.
+        """
+        self.replaced = {key: value for key, value in self.replaced.items() if key != name}
+        if _is(output, FROZEN):
+            output = self.outputs.get(name, WITHHELD)
+        if output is not None:
+            self.replaced[name] = output
+
+    def reset(self, name: str, learned: Path | None) -> None:
+        """Let an algorithm begin anew, with what a file holds.
+
+        Raises:
+            InputError: The file holds nothing that it can begin with.
+        """
+        learner = next(each for each in self.all if each.path == f"algorithms.{name}")
+        component = learner.origin.model_copy(deep=True)
+        assert isinstance(component, Algorithm)
+        with blame(learner.path, None):
+            component.start(self.home)
+            if learned is not None:
+                component.recall(load_learned(learned))
+        learner.component = component
 
     def next_due(self) -> int | None:
         """Return the step before which somebody is due; None if there is nobody."""
@@ -125,6 +171,8 @@ class Learners:
                 component = learner.component  # metrics come last, and see all
                 reads = component.reads if isinstance(component, Algorithm) else fresh
                 seen = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
+                if isinstance(component, Algorithm):
+                    seen = dict(self._as_read(seen))
                 output = self._update(learner, end, log, seen)
                 learner.since = end
                 if isinstance(learner.component, Algorithm) and output is not None:
@@ -185,7 +233,7 @@ class Learners:
                 f"{path}.period is {component.period}, which is no multiple of simulation.step"
                 f" ({self.clock.step_us / 1e6:g} s): choose a multiple"
             )
-        component = component.model_copy(deep=True)
+        origin, component = component, component.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
             if isinstance(component, Algorithm) and component.learned is not None:
@@ -197,7 +245,7 @@ class Learners:
         while table.casefold() in taken:
             table = f"{path.partition('.')[0]}_{table}"
         back = -(micros(component.looks_back) // -self.clock.step_us)
-        self.all.append(Learner(name, path, component, every, table, back=back))
+        self.all.append(Learner(name, path, component, origin, every, table, back=back))
 
     def _update(self, learner: Learner, end: int, log: Log, outputs: Mapping[str, Any]) -> Any:
         knows_truth = isinstance(learner.component, Metric)
@@ -300,3 +348,8 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     except CycleError as error:
         circle = " reads ".join(reversed(error.args[1]))
         raise ScenarioError(f"algorithms read each other in a circle: {circle}") from None
+
+
+def _is(output: Any, word: str) -> bool:
+    """Tell whether an output is a word: no algorithm puts out a bare text."""
+    return isinstance(output, str) and output == word

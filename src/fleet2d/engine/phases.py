@@ -147,7 +147,7 @@ def _update(state: State, log: Log, end: int) -> None:
         if state.expecting is not None:
             state.expecting.learned(end, state)
         for name, output in learners.fresh.items():
-            if isinstance(output, HomeChanges):
+            if isinstance(output, HomeChanges) and name not in learners.replaced:
                 for change in output.changes:
                     state.changes.ask(change, end, f"algorithms.{name}")
         state.forget(learners.earliest_needed())

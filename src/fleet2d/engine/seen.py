@@ -1,6 +1,6 @@
 """The seen area of a robot in a run: what its cameras have had in view, cell by cell."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,9 @@ class SeenArea:
         lattice, step_us = plan.lattice, robot.clock.step_us
         lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
         scene = Scene([], [], lattice, step_us, robot.path)
+        self._names = tuple(robot.entity.eyes)
         self._lenses = stack_lenses(lenses, [False] * len(lenses), scene)
+        self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
         bins = (LONGEST // bin_steps + 2 if bin_steps else 0, len(patches.room))
         self._record = Record(
@@ -94,6 +96,14 @@ class SeenArea:
         )
         self._glances.last[:] = self._glances.settled[:] = NEVER
         self._glances.used[0] = 0
+
+    def darken(self, cameras: Collection[str]) -> None:
+        """Let these cameras see nothing from the present step on, and all others what they see."""
+        self._settle()
+        dark = [name in cameras for name in self._names]
+        near, far = self._open_lenses.near_squared, self._open_lenses.far_squared
+        self._lenses = self._open_lenses._replace(near_squared=np.where(dark, far + 1, near))
+        self._face(self.robot.home.walls)
 
     @property
     def waits(self) -> bool:

@@ -14,7 +14,14 @@ from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.objects.contact_sensor import ContactSensor
 from fleet2d.entities.objects.home_object import HomeObject
-from fleet2d.entities.objects.sensor import Memory, Sensor, SensorView, in_order
+from fleet2d.entities.objects.sensor import (
+    Memory,
+    Reading,
+    Sensor,
+    SensorFault,
+    SensorView,
+    in_order,
+)
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.home.home import Home
@@ -42,6 +49,7 @@ class Sensors:
     ) -> None:
         self.home, self.users = home, len(users)
         self.taken = 0
+        self.stuck: dict[str, SensorFault] = {}  # what somebody outside lets them say
         self.awaited = False  # whether an algorithm waits for readings
         self._rows: list[SensorRow] = []
         self.sensors: list[Sensor] = []
@@ -76,8 +84,8 @@ class Sensors:
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
             self._before = before
-            for sensor, memory in zip(self.sensors, self._memories, strict=True):
-                readings = copy(memory).read(*sensor.sense(view, self.home), end)
+            for number, memory in enumerate(self._memories):
+                readings = self._read(number, copy(memory), view, end)
                 end = min([end, *(reading.step + 1 for reading in readings)])
         return end
 
@@ -89,16 +97,25 @@ class Sensors:
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
             readings = []
-            for number, (sensor, memory) in enumerate(
-                zip(self.sensors, self._memories, strict=True)
-            ):
-                steps, users = sensor.sense(view, self.home)
-                readings += [(number, reading) for reading in memory.read(steps, users, end)]
+            for number, memory in enumerate(self._memories):
+                readings += [(number, each) for each in self._read(number, memory, view, end)]
         self._rows += [
             SensorRow(reading.step, number, reading.on, self._activity(reading.user, reading.step))
             for number, reading in in_order(readings)
         ]
         return ()
+
+    def _read(self, number: int, memory: Memory, view: SensorView, end: int) -> list[Reading]:
+        """Return what a sensor says up to step `end` - 1, and carry on its memory."""
+        steps, users = self.sensors[number].sense(view, self.home)
+        fault = self.stuck.get(self.names[number])
+        if fault == "on":
+            steps = np.arange(view.first, end)
+            users = np.full(len(steps), -1)
+        elif fault == "off":
+            steps, users = steps[:0], users[:0]
+        readings = memory.read(steps, users, end)
+        return [] if fault == "silent" else readings
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
         """Return nothing: no plan waits for a sensor."""

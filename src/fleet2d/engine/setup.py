@@ -27,6 +27,7 @@ from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.home import OfHome
+from fleet2d.interventions.robots import makes_wrong
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 
@@ -49,6 +50,9 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     method = scenario.sight.method.model_copy()
     gazes, cameras = open_cameras(actors, len(users), method)
     _check_reads(scenario, actors)
+    for those in cameras:
+        if any(makes_wrong(entry.act, those.owner.name) for entry in scenario.script):
+            those.prepare_to_err()
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
     changes = Changes(scenario.objects, home, clock)
     for index, change in enumerate(scenario.changes):

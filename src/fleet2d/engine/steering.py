@@ -94,8 +94,8 @@ class Steering(Verbs):
 
     @property
     def outputs(self) -> dict[str, Any]:
-        """The newest output of each algorithm, by name."""
-        return dict(self._state.learners.outputs)
+        """The newest output of each algorithm, by name, as behaviors read it."""
+        return dict(self._state.learners.readable)
 
     @property
     def algorithms(self) -> dict[str, Algorithm]:

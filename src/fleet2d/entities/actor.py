@@ -57,6 +57,7 @@ class Actor(Body):
             self._attentive = next((pair for pair in pays if pair[1] is not None), None)
         self.arbiter = Arbiter(self.behaviors)
         self.order: Order | None = None  # what it does in place of its behaviors
+        self.is_stuck = False  # it can't move, whatever it or an order wants
         self.command: Command | None = None  # what it was called to do, and hasn't taken up
         self._chosen: Plan | None = None
         self._waiting: Waiting | None = None
@@ -132,7 +133,7 @@ class Actor(Body):
             self.charge.follow(self.motion, now.step * self.clock.step_us)
             if self.charge.is_empty:
                 return False
-        if self._chosen is not None or self.order is not None:  # from outside
+        if self._chosen is not None or self.order is not None or self.is_stuck:  # from outside
             return False
         with blame(self.path, now.step):
             found = self.arbiter.goes_on(now, self.plan, self._asked)
@@ -145,7 +146,7 @@ class Actor(Body):
     def decide(self, now: Situation) -> None:
         """Ask the behaviors, in order, for a plan that begins now."""
         step, (plan, self._chosen) = now.step, (self._chosen, None)
-        if self.charge is not None and self.charge.is_empty:
+        if self.is_stuck or (self.charge is not None and self.charge.is_empty):
             plan = now.plan().stay()
         waiting, self._waiting = self._waiting, None
         if waiting is not None:
@@ -223,7 +224,7 @@ class Actor(Body):
         if self.charge is not None and self.charge.is_empty:
             self.ask(None)  # it stands there for good
             return
-        if self.order is None:
+        if self.order is None and not self.is_stuck:
             self.arbiter.watch(now, self.plan, fresh=fresh)
         steps = [s for s in (self.plan.over_at, self.arbiter.wake_step) if s is not None]
         if self.charge is not None:

@@ -25,6 +25,7 @@ class Arbiter:
         active: The behavior whose plan is followed, by number; None: nobody's.
         wake_step: The step at which those before it are asked, though the plan isn't over.
         own: What the plan that is followed wants to hear of itself.
+        off: The behaviors that are switched off, by number.
     """
 
     def __init__(self, behaviors: Sequence[Behavior]) -> None:
@@ -35,6 +36,7 @@ class Arbiter:
         # Plans to go on with, since when, and what they want to hear of.
         self._broken: dict[int, tuple[Plan, int, frozenset[str]]] = {}
         self.own: frozenset[str] = frozenset()
+        self.off: frozenset[int] = frozenset()
         self._heard: frozenset[str] = frozenset()  # what only those before it want to hear of
 
     def goes_on(self, now: Situation, plan: Plan, ask: Ask) -> bool | Plan:
@@ -95,7 +97,7 @@ class Arbiter:
         active = len(self.behaviors) if self.active is None else self.active
         times, heard = [self._closes_at(active, now)], self.own
         for number, behavior in enumerate(self.behaviors[:active]):
-            if not behavior.preempts:
+            if not behavior.preempts or number in self.off:
                 continue
             opens = self._opens_at(number, now)
             if opens is not None:
@@ -112,6 +114,8 @@ class Arbiter:
     def _may(self, number: int, now: Situation) -> bool:
         """Tell whether it is a behavior's time."""
         behavior = self.behaviors[number]
+        if number in self.off:
+            return False
         if not (behavior.when or behavior.cooldown) or behavior.busy():
             return True
         return self._opens_at(number, now) is None

@@ -87,6 +87,11 @@ class Charge:
         """The charge for the table of events."""
         return f"{100 * self.level:.1f} %"
 
+    def set(self, level: float, motion: Motion, now_us: int) -> None:
+        """Have another charge from a moment on, at which a motion is being followed."""
+        self.follow(motion, now_us)
+        self.level = level
+
     def follow(self, motion: Motion, until_us: int) -> None:
         """Take in that a motion was followed from the last decision to a moment."""
         begins, rates = self._rates(motion, self._since_us)

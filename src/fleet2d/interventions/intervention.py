@@ -58,10 +58,10 @@ class Intervention(Component):
 
 
 class Lasting(Intervention):
-    """Base of what holds for a while, and is undone then."""
+    """Base of what holds for a while: `begin` and `end` go by all that is under way then."""
 
     duration: PositiveDuration | None = Field(
-        default=None, description="for how long; left out: until it is undone"
+        default=None, description="for how long; left out: until it is undone by `restore`"
     )
 
     @property

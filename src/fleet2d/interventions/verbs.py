@@ -1,154 +1,19 @@
 """The interventions as methods: what a simulation, and a trial of one, may be told to do."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from datetime import timedelta
 from typing import Any
 
-from pydantic import ValidationError
-
-from fleet2d.interventions import bodies, home, people, robots
-from fleet2d.interventions.intervention import Intervention, refused
-
-Time = str | timedelta
-"""A duration: '90 s', '1 h', or a timedelta."""
+from fleet2d.entities.objects.sensor import SensorFault
+from fleet2d.interventions import algorithms, home, perception, robots, sensors
+from fleet2d.interventions.body_verbs import BodyVerbs, Time
 
 
-class Verbs(ABC):
+class Verbs(BodyVerbs):
     """What may be done to a run from outside, at the present step.
 
     Each method does what the entry of the same name in a scenario's `script` does. What is done is
     kept in the manifest, and done again by `fleet2d.reproduce`.
     """
-
-    @abstractmethod
-    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
-        """Do something at the present step.
-
-        Args:
-            act: An intervention, or one as a script has it: ``{"put": "ana", "to": "kitchen"}``.
-
-        Raises:
-            ScenarioError: It is none, or there is nothing of that name.
-            PlacementError: There is no such place, or nobody gets there.
-            InputError: The run is finished.
-        """
-
-    # Bodies
-
-    def put(self, name: str, to: Any, heading_deg: float | None = None) -> None:
-        """Put a body somewhere at the present step, as if it were carried; it decides anew there.
-
-        Args:
-            name: The person or robot.
-            to: A room, furniture, a list of those to try in turn, or a point (x, y) [m].
-            heading_deg: Where it faces, counter-clockwise from +x; None: as before.
-
-        Raises:
-            ScenarioError: There is nobody of that name.
-            PlacementError: There is no such place, or its body doesn't fit there.
-
-        Example:
-            >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.put("ana", "kitchen")
-            >>> simulation.advance()
-            >>> simulation.state["ana"]["room"].startswith("kitchen")
-            True
-        """
-        self._do(bodies.Put, entity=name, to=to, heading_deg=heading_deg)
-
-    def send(
-        self,
-        name: str,
-        to: Any,
-        heading_deg: float | None = None,
-        *,
-        duration: Time | None = None,
-    ) -> None:
-        """Send a body somewhere on foot; there it stays.
-
-        Args:
-            name: The person or robot.
-            to: A room, furniture, a list of those to try in turn, or a point (x, y) [m].
-            heading_deg: Where it faces then, counter-clockwise from +x; None: as it came.
-            duration: For how long it stays there; None: until it is released.
-
-        Raises:
-            ScenarioError: There is nobody of that name.
-            PlacementError: There is no such place, or it can't get there.
-
-        Example:
-            >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.send("ana", to="kitchen", duration="1 h")
-            >>> simulation.advance(600)
-            >>> simulation.state["ana"]["room"]
-            'kitchen_0'
-        """
-        self._do(bodies.Send, entity=name, to=to, heading_deg=heading_deg, duration=duration)
-
-    def hold(self, name: str, *, duration: Time | None = None) -> None:
-        """Let a body stand still where it is, for so long, or until it is released.
-
-        Raises:
-            ScenarioError: There is nobody of that name.
-        """
-        self._do(bodies.Hold, entity=name, duration=duration)
-
-    def release(self, name: str) -> None:
-        """Hand a body back to its own behaviors.
-
-        Raises:
-            ScenarioError: There is nobody of that name.
-        """
-        self._do(bodies.Release, entity=name)
-
-    def replan(self, name: str) -> None:
-        """Let a body's behaviors decide anew at the present step, whatever it is doing.
-
-        Raises:
-            ScenarioError: There is nobody of that name.
-        """
-        self._do(bodies.Replan, entity=name)
-
-    # People
-
-    def away(self, name: str, *, duration: Time | None = None) -> None:
-        """Send a person out of the home, for so long, or until called home or released.
-
-        Raises:
-            ScenarioError: There is no such person.
-        """
-        self._do(people.Away, entity=name, duration=duration)
-
-    def call_home(
-        self, name: str, to: Any = ("living_room", "any"), *, duration: Time | None = None
-    ) -> None:
-        """Call a person home, who stays for so long, or until released.
-
-        Raises:
-            ScenarioError: There is no such person.
-            PlacementError: There is no such place, or nobody gets there.
-        """
-        self._do(people.CallHome, entity=name, to=to, duration=duration)
-
-    def activity(
-        self, name: str, what: str, to: Any = None, *, duration: Time | None = None
-    ) -> None:
-        """Let a person do something, for so long, or until released.
-
-        Args:
-            name: The person.
-            what: Its name in the persona or agenda.
-            to: Where; None: where the person does it by its own behavior.
-            duration: For how long; None: until released.
-
-        Raises:
-            ScenarioError: There is no such person, or it has no place for that activity.
-            PlacementError: There is no such place, or nobody gets there.
-        """
-        self._do(people.Activity, entity=name, what=what, to=to, duration=duration)
 
     # Robots
 
@@ -176,7 +41,183 @@ class Verbs(ABC):
         """
         self._do(robots.Call, entity=name, to=to, find=find, dock=dock, command=command)
 
-    # The home
+    def battery(self, name: str, charge: float | str) -> None:
+        """Set the charge of a robot's battery: 0.2, or "20 %".
+
+        Raises:
+            ScenarioError: There is no such robot, or it has no battery.
+        """
+        self._do(robots.SetBattery, entity=name, charge=charge)
+
+    def switch_off(
+        self,
+        name: str,
+        *,
+        camera: bool | str | None = None,
+        behavior: str | None = None,
+        duration: Time | None = None,
+    ) -> None:
+        """Switch a camera or a behavior off, for so long, or until it is switched on.
+
+        Args:
+            name: The robot; of behaviors, a person, too.
+            camera: Its camera: True for all, or the name of one.
+            behavior: The type of the behavior instead.
+            duration: For how long.
+
+        Raises:
+            ScenarioError: There is nothing of that name.
+        """
+        fields = {"camera": camera, "behavior": behavior, "duration": duration}
+        self._do(robots.SwitchOff, entity=name, **fields)
+
+    def switch_on(
+        self, name: str, *, camera: bool | str | None = None, behavior: str | None = None
+    ) -> None:
+        """Switch a camera or a behavior on that was switched off; see `switch_off`.
+
+        Raises:
+            ScenarioError: There is nothing of that name.
+        """
+        self._do(robots.SwitchOn, entity=name, camera=camera, behavior=behavior)
+
+    def fault(
+        self,
+        name: str,
+        *,
+        wheels: bool = False,
+        dark: bool | str = False,
+        detection: float | str = 1.0,
+        errs: Any = None,
+        duration: Time | None = None,
+    ) -> None:
+        """Let something of a robot fail, for so long, or until it is restored.
+
+        Args:
+            name: The robot.
+            wheels: Whether its wheels are stuck.
+            dark: Whether its cameras see nothing, or the name of one that doesn't.
+            detection: Factor of the probability that a user in view is noticed.
+            errs: How its cameras err instead, as `perception` of a robot in a scenario.
+            duration: For how long.
+
+        Raises:
+            ScenarioError: There is no such robot or camera, or nothing fails.
+        """
+        fields = {"wheels": wheels, "dark": dark, "detection": detection, "errs": errs}
+        self._do(robots.Fault, entity=name, duration=duration, **fields)
+
+    def restore(self, name: str) -> None:
+        """End all that lasts on a robot, a sensor or an algorithm: faults, switches and the like.
+
+        Raises:
+            ScenarioError: There is nothing of that name.
+        """
+        self._do(sensors.Restore, name=name)
+
+    # What robots perceive
+
+    def suppress(
+        self, name: str, user: str, *, camera: str | None = None, duration: Time | None = None
+    ) -> None:
+        """Let a robot not notice a person who is in view, for so long, or until it is restored.
+
+        Raises:
+            ScenarioError: There is no such robot, camera or person.
+        """
+        self._do(perception.Suppress, entity=name, user=user, camera=camera, duration=duration)
+
+    def mistake(
+        self,
+        name: str,
+        user: str,
+        taken_for: str,
+        *,
+        camera: str | None = None,
+        duration: Time | None = None,
+    ) -> None:
+        """Let a robot take a person whom it notices for another one, or for "unknown".
+
+        Raises:
+            ScenarioError: There is no such robot, camera or person.
+        """
+        fields = {"camera": camera, "duration": duration}
+        self._do(perception.Mistake, entity=name, user=user, taken_for=taken_for, **fields)
+
+    def inject(
+        self,
+        name: str,
+        user: str,
+        spot: tuple[float, float],
+        *,
+        heading_deg: float = 0.0,
+        camera: str | None = None,
+        duration: Time | None = None,
+    ) -> None:
+        """Let a robot perceive somebody who isn't there, in every look, wherever it looks.
+
+        Args:
+            name: The robot.
+            user: For whom it takes what isn't there, or "unknown".
+            spot: Where, (x, y) [m].
+            heading_deg: Where it seems to face, counter-clockwise from +x.
+            camera: The camera; None: all.
+            duration: For how long; None: until it is restored.
+
+        Raises:
+            ScenarioError: There is no such robot, camera or person.
+            PlacementError: The spot is outside the home.
+        """
+        fields = {"heading_deg": heading_deg, "camera": camera, "duration": duration}
+        self._do(perception.Inject, entity=name, user=user, spot=spot, **fields)
+
+    # Algorithms
+
+    def reset(self, algorithm: str, learned: Any = None) -> None:
+        """Let an algorithm forget what it has learned, or go on from a file of another run.
+
+        Raises:
+            ScenarioError: There is no such algorithm.
+        """
+        self._do(algorithms.Reset, algorithm=algorithm, learned=learned)
+
+    def replace(
+        self,
+        algorithm: str,
+        *,
+        rooms: Mapping[str, float] | None = None,
+        values: Mapping[str, float | str] | None = None,
+        frozen: bool = False,
+        withheld: bool = False,
+        duration: Time | None = None,
+    ) -> None:
+        """Let behaviors and other algorithms read something else of an algorithm.
+
+        Args:
+            algorithm: The algorithm.
+            rooms: Weights of rooms; those left out have none.
+            values: Or numbers and texts by name, as of an output that is a mapping.
+            frozen: Or its newest output, as it is now.
+            withheld: Or nothing, as before its first output.
+            duration: For how long; None: until it is restored.
+
+        Raises:
+            ScenarioError: There is no such algorithm or room, or not one of these is given.
+        """
+        fields = {"rooms": rooms, "values": values, "frozen": frozen, "withheld": withheld}
+        self._do(algorithms.Replace, algorithm=algorithm, duration=duration, **fields)
+
+    # The home and its sensors
+
+    def stick(
+        self, sensor: str, says: SensorFault = "silent", *, duration: Time | None = None
+    ) -> None:
+        """Let a sensor be "on", "off" or "silent", for so long, or until it is restored.
+
+        Raises:
+            ScenarioError: There is no such sensor.
+        """
+        self._do(sensors.Stick, sensor=sensor, says=says, duration=duration)
 
     def open(self, door: str) -> None:
         """Open a door, even a locked one.
@@ -225,10 +266,3 @@ class Verbs(ABC):
             ScenarioError: There is no such room, or no such type of rooms.
         """
         self._do(home.Room, name=name, type=type)
-
-    def _do(self, verb: type[Intervention], **fields: Any) -> None:
-        try:
-            act = verb(**{key: value for key, value in fields.items() if value is not None})
-        except ValidationError as error:
-            raise refused(f"{verb.type_name}()", error) from None
-        self.intervene(act)

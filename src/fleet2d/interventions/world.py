@@ -1,14 +1,17 @@
 """What interventions act upon: the part of a run that they may see and touch."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Protocol
 
 from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.motion import Pose
+from fleet2d.entities.objects.sensor import SensorFault
 from fleet2d.events import EventKind
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home
+from fleet2d.sight.disturbance import Disturbance
 
 
 class World(Protocol):
@@ -41,6 +44,32 @@ class World(Protocol):
     @property
     def sensors(self) -> Sequence[str]:
         """The names of the sensors."""
+
+    @property
+    def algorithms(self) -> Sequence[str]:
+        """The names of the algorithms."""
+
+    @property
+    def lasting(self) -> Sequence[object]:
+        """What was begun and isn't over, in order."""
+
+    def undo(self, is_meant: Callable[[object], bool]) -> None:
+        """End what is under way and meant."""
+
+    def keeps_truth(self, robot: str) -> bool:
+        """Tell whether the run keeps what is true beside what a robot perceives."""
+
+    def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
+        """Disturb the cameras of a robot by these alone from the present step on."""
+
+    def stick(self, sensor: str, says: SensorFault | None) -> None:
+        """Let a sensor say what it doesn't sense from the present step on; None: as it senses."""
+
+    def reset(self, algorithm: str, learned: Path | None) -> None:
+        """Let an algorithm begin anew with nothing learned, or with what a file holds."""
+
+    def replace(self, algorithm: str, output: object) -> None:
+        """Let all but metrics read something else of an algorithm; see `Learners.replace`."""
 
     def move(self, actor: Actor, pose: Pose, part: int) -> None:
         """Put a body elsewhere, in a part of its space; it decides anew there."""

@@ -23,6 +23,8 @@ from fleet2d._core import (
     BEARING_NOISE,
     BINS,
     DOUBLINGS,
+    FORCED_IDENTITY,
+    FORCED_MISS,
     HEADING_NOISE,
     KEEPS,
     MINUTES,
@@ -64,6 +66,8 @@ __all__ = [
     "BEARING_NOISE",
     "BINS",
     "DOUBLINGS",
+    "FORCED_IDENTITY",
+    "FORCED_MISS",
     "HEADING_NOISE",
     "KEEPS",
     "MINUTES",
@@ -111,3 +115,4 @@ class ErrorTables(NamedTuple):
     looks_like: I64  # (cameras, users + 1): identity of a false positive, nobody last, cumulative
     keys: U64  # (cameras, users, len(UserDraw)): streams
     ghost_keys: U64  # (cameras, len(GhostDraw)): streams
+    injected: I64 = np.zeros((0, 5), np.int64)  # (n, 5): camera, identity, x, y, heading

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,10 @@ from fleet2d.floorplan.home.home import Home
 
 I64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+
+SensorFault = Literal["on", "off", "silent"]
+"""What a sensor says instead of what it senses: excited all the time, never, or nothing at all."""
 
 
 class Reading(NamedTuple):

@@ -1,0 +1,90 @@
+"""Disturbed cameras: what somebody outside does to the tables by which the kernel looks."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.kernels.lens import Lenses
+from fleet2d.kernels.look import SIGHTING, Memory
+from fleet2d.kernels.perception import FORCED_IDENTITY, FORCED_MISS, About
+from fleet2d.sight.disturbance import Disturbance, of_camera
+from fleet2d.sight.perception import Perception
+from fleet2d.sight.tables import Scene
+
+I64 = NDArray[np.int64]
+# Squared distance beyond which a dark camera sees nobody.
+NOT_EVEN_AT_0 = -1
+
+
+def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
+    """Return how a camera errs at present, by the latest that says so; None: as before."""
+    errs = [each.errs for each in of_camera(disturbances, camera) if each.errs is not None]
+    return errs[-1] if errs else None
+
+
+def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> list[int]:
+    """Return the cameras that see nothing, by number."""
+    return [
+        c
+        for c, camera in enumerate(cameras)
+        if any(each.dark for each in of_camera(disturbances, camera))
+    ]
+
+
+def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
+    """Let dark cameras see nobody, and others notice people less often."""
+    lenses.widest[dark_cameras(disturbances, cameras)] = NOT_EVEN_AT_0
+    for c, camera in enumerate(cameras):
+        for each in of_camera(disturbances, camera):
+            chance = Fraction(int(lenses.chance[c])) * Fraction(each.detection)
+            lenses.chance[c] = round(chance)
+
+
+def forced_of(
+    disturbances: Sequence[Disturbance], cameras: Sequence[str], people: Sequence[str]
+) -> I64:
+    """Return what is made of each person in view, (cameras, people); see About.FORCED."""
+    index = {name: u for u, name in enumerate(people)} | {"": -1}
+    forced = np.zeros((len(cameras), len(people)), np.int64)
+    for c, camera in enumerate(cameras):
+        for each in of_camera(disturbances, camera):
+            if each.missed is not None:
+                forced[c, index[each.missed]] = FORCED_MISS
+            if each.mistaken is not None:
+                user, other = each.mistaken
+                forced[c, index[user]] = FORCED_IDENTITY + index[other]
+    return forced
+
+
+def injected_by(disturbances: Sequence[Disturbance], cameras: Sequence[str], scene: Scene) -> I64:
+    """Return the false sightings of cameras that aren't dark, (n, 5): see ErrorTables."""
+    dark = dark_cameras(disturbances, cameras)
+    index = {name: u for u, name in enumerate(scene.users)} | {"": -1}
+    rows = [
+        (c, index[false.user], *scene.lattice.to_lattice((false.x, false.y)), false.heading)
+        for c, camera in enumerate(cameras)
+        for each in of_camera(disturbances, camera)
+        if (false := each.injected) is not None and c not in dark
+    ]
+    return np.array(rows, np.int64).reshape(-1, 5)
+
+
+def carried_over(memory: Memory, before: Memory, forced: I64) -> Memory:
+    """Return what cameras carried before, in a memory that is made for other errors.
+
+    Args:
+        memory: The memory, of a robot that has seen nobody.
+        before: What was carried, by the same cameras.
+        forced: What is made of each user in view from now on, (cameras, users).
+    """
+    about = before.about.copy()
+    about[..., About.FORCED.value] = forced
+    rows = max(memory.backlog.shape[1], int(before.waiting[:, 1].max(initial=0)))
+    backlog = np.zeros((len(about), rows, SIGHTING), np.int64)
+    waiting = np.zeros_like(before.waiting)
+    for c, (begin, length) in enumerate(before.waiting.tolist()):
+        places = (begin + np.arange(length)) % max(1, before.backlog.shape[1])
+        backlog[c, :length], waiting[c, 1] = before.backlog[c, places], length
+    return Memory(before.noticed, before.seen, about, backlog, waiting)

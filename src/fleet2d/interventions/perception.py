@@ -1,0 +1,112 @@
+"""What is done to what a robot perceives: suppress, mistake, inject."""
+
+from pydantic import Field
+
+from fleet2d.component import register
+from fleet2d.errors import PlacementError
+from fleet2d.interventions.bodies import heading_of
+from fleet2d.interventions.intervention import Lasting, robot, user
+from fleet2d.interventions.robots import check_camera, check_truth, disturb
+from fleet2d.interventions.world import World
+from fleet2d.sight.disturbance import Disturbance, FalseSighting
+from fleet2d.units import AngleDeg
+
+UNKNOWN = "unknown"
+
+
+class OfPerception(Lasting):
+    """Base of what is done to what a robot perceives; the other draws of its cameras stay."""
+
+    entity: str = Field(description="the robot")
+    camera: str | None = Field(
+        default=None, description="the camera, by name where it has several; left out: all"
+    )
+
+    @property
+    def disturbance(self) -> Disturbance:
+        """What it does to cameras."""
+        raise NotImplementedError
+
+    def check(self, world: World) -> None:
+        """Refuse a robot or a camera that there isn't."""
+        check_camera(robot(world, self.entity), self.camera)
+
+    def begin(self, world: World) -> None:
+        """Disturb its cameras."""
+        disturb(world, self.entity)
+
+    def end(self, world: World) -> None:
+        """Leave them alone."""
+        disturb(world, self.entity)
+
+
+@register("intervention", "suppress")
+class Suppress(OfPerception):
+    """Let a robot not notice a person who is in view."""
+
+    user: str = Field(description="the person")
+
+    @property
+    def disturbance(self) -> Disturbance:
+        """What it does to cameras."""
+        return Disturbance(self.camera, missed=self.user)
+
+    def check(self, world: World) -> None:
+        """Refuse a person that there isn't."""
+        super().check(world)
+        user(world, self.user)
+
+
+@register("intervention", "mistake")
+class Mistake(OfPerception):
+    """Let a robot take a person whom it notices for another one."""
+
+    user: str = Field(description="the person")
+    taken_for: str = Field(description="for whom, or 'unknown'")
+
+    @property
+    def disturbance(self) -> Disturbance:
+        """What it does to cameras."""
+        other = "" if self.taken_for == UNKNOWN else self.taken_for
+        return Disturbance(self.camera, mistaken=(self.user, other))
+
+    def check(self, world: World) -> None:
+        """Refuse people that there aren't."""
+        super().check(world)
+        user(world, self.user)
+        if self.taken_for == UNKNOWN:
+            check_truth(world, self.entity)
+        else:
+            user(world, self.taken_for)
+
+
+@register("intervention", "inject")
+class Inject(OfPerception):
+    """Let a robot perceive somebody who isn't there, in every look, wherever it looks.
+
+    In the table of observations it is a false positive: its true user is nobody.
+    """
+
+    user: str = Field(description="for whom it is taken, or 'unknown'")
+    spot: tuple[float, float] = Field(description="where, [x, y] in metres")
+    heading_deg: AngleDeg = Field(
+        default=0.0, description="where it seems to face, counter-clockwise from +x"
+    )
+
+    @property
+    def disturbance(self) -> Disturbance:
+        """What it does to cameras."""
+        name = "" if self.user == UNKNOWN else self.user
+        heading = heading_of(self.heading_deg) or 0
+        return Disturbance(self.camera, injected=FalseSighting(name, *self.spot, heading))
+
+    def check(self, world: World) -> None:
+        """Refuse a person that there isn't, and a place outside the home."""
+        super().check(world)
+        if self.user == UNKNOWN:
+            check_truth(world, self.entity)
+        else:
+            user(world, self.user)
+        if world.home.plan.room_at(*self.spot) is None:
+            x, y = self.spot
+            raise PlacementError(f"({x:g}, {y:g}) m is outside the home")
