@@ -133,6 +133,15 @@ class BodyVerbs(ABC):
         """
         self._do(people.CallHome, entity=name, to=to, duration=duration)
 
+    def guest(self, name: str, to: Any = ("living_room", "any"), *, duration: Time = "2 h") -> None:
+        """Let a guest come, who stays for so long, and leaves: a user with the behavior `guest`.
+
+        Raises:
+            ScenarioError: There is no such person, or it is no guest.
+            PlacementError: There is no such place, or nobody gets there.
+        """
+        self._do(people.LetIn, entity=name, to=to, duration=duration)
+
     def activity(
         self, name: str, what: str, to: Any = None, *, duration: Time | None = None
     ) -> None:

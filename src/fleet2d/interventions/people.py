@@ -1,10 +1,13 @@
 """What is done to people: away, call_home, guest, activity."""
 
+from datetime import timedelta
+
 from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.orders import DoActivity, GoOut, GoTo
 from fleet2d.entities.place import Place
+from fleet2d.entities.users.guest import Guest
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.bodies import check_reach
 from fleet2d.interventions.intervention import Intervention, user
@@ -53,6 +56,32 @@ class CallHome(OfPerson):
 
     def begin(self, world: World) -> None:
         """Set out."""
+        user(world, self.entity).obey(GoTo(self.to, None, self.duration), world.step)
+
+
+@register("intervention", "guest")
+class LetIn(OfPerson):
+    """Let a guest come, stay for a while, and leave: somebody with the behavior `guest`."""
+
+    to: Place = Field(
+        default=("living_room", "any"), description="where to: a room, furniture, or a point"
+    )
+    duration: PositiveDuration = Field(
+        default=timedelta(hours=2), description="for how long the guest stays there"
+    )
+
+    def check(self, world: World) -> None:
+        """Refuse somebody who lives here, and a place that there isn't."""
+        actor = user(world, self.entity)
+        if not any(isinstance(behavior, Guest) for behavior in actor.behaviors):
+            raise ScenarioError(
+                f"{self.entity} is no guest: a guest is a user with that behavior, like users:"
+                " {gina: guest}; call_home is for who lives here"
+            )
+        check_reach(actor, self.to)
+
+    def begin(self, world: World) -> None:
+        """Come in."""
         user(world, self.entity).obey(GoTo(self.to, None, self.duration), world.step)
 
 

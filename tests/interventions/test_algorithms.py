@@ -1,0 +1,105 @@
+"""What is done to algorithms and sensors, beside the same run in which nothing is done."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import OWN, scenario, table
+
+import fleet2d
+from fleet2d.errors import ScenarioError
+
+
+def home(*script: dict[str, Any]) -> dict[str, Any]:
+    return scenario(
+        "1 h",
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol"}},
+        objects={
+            "door": {"type": "door", "doorway": "bathroom_0"},
+            "motion": {"type": "motion_sensor", "at": [1.0, 3.0], "range": "6 m"},
+        },
+        algorithms={
+            "smooth": {"type": f"{OWN}:Smooth", "reads": ["share"], "period": "10 min"},
+            "share": {"type": f"{OWN}:Share", "period": "10 min"},
+        },
+        script=list(script),
+    )
+
+
+def shares(run: fleet2d.Run, name: str) -> Any:
+    rows = table(run, name)
+    return rows["share" if name == "share" else "mean"].reshape(6, -1)
+
+
+def test_what_is_reset_begins_anew() -> None:
+    run = fleet2d.Simulation(home())
+    run.advance(1800)
+    run.reset("share")
+    run.advance(1)
+    fresh = fleet2d.Simulation(home()).algorithms["share"]
+    now = run.algorithms["share"].remember()
+    assert str(fresh.remember()) == str(now)
+    plain, stored = fleet2d.run(home()), run.run()
+    assert (shares(plain, "share")[:3] == shares(stored, "share")[:3]).all()
+    assert (shares(plain, "share")[3:] != shares(stored, "share")[3:]).any()
+
+
+def test_a_replaced_output_is_read_by_others_and_its_own_table_stays() -> None:
+    script = {"at": "15 min", "replace": "share", "rooms": {"kitchen_0": 1}, "duration": "20 min"}
+    plain, run = fleet2d.run(home()), fleet2d.run(home(script))
+    assert (shares(plain, "share") == shares(run, "share")).all()
+    differs = (shares(plain, "smooth") != shares(run, "smooth")).any(axis=1)
+    assert [False, True, True] == differs[:3].tolist()
+
+
+def test_an_output_may_be_withheld_or_stay_as_it_is() -> None:
+    run = fleet2d.Simulation(home())
+    run.advance(700)
+    run.replace("share", withheld=True, duration="5 min")
+    run.advance(1)
+    assert "share" not in run.outputs
+    run.advance(400)
+    before = run.outputs["share"].share.copy()
+    run.replace("share", frozen=True)
+    run.advance(1500)
+    np.testing.assert_array_equal(before, run.outputs["share"].share)
+    run.restore("share")
+    run.advance(1)
+    assert (before != run.outputs["share"].share).any()
+
+
+def readings(run: fleet2d.Run) -> list[tuple[int, str]]:
+    rows = table(run, "sensors")
+    return list(zip(rows["step"].tolist(), rows["state"].tolist(), strict=True))
+
+
+@pytest.mark.parametrize("max_span", [None, 1])
+def test_a_sensor_says_what_it_is_told_to_say(max_span: int | None) -> None:
+    plain = readings(fleet2d.run(home(), max_span=max_span))
+    times = {"at": "20 min", "duration": "10 min"}
+    silent = readings(fleet2d.run(home({**times, "stick": "motion"}), max_span=max_span))
+    assert [row for row in plain if not 1200 <= row[0] < 1800] == silent
+    on = readings(fleet2d.run(home({**times, "stick": "motion", "says": "on"}), max_span=max_span))
+    assert 1 >= sum(1200 <= step < 1800 for step, _ in on)
+    assert [row for row in plain if row[0] < 1200] == [row for row in on if row[0] < 1200]
+    off = readings(
+        fleet2d.run(home({**times, "stick": "motion", "says": "off"}), max_span=max_span)
+    )
+    assert 1 >= sum(1200 <= step < 1800 for step, _ in off)
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"reset": "shar"}, "did you mean 'share'"),
+        ({"replace": "share"}, "one of 'rooms', 'values'"),
+        ({"replace": "share", "rooms": {"kitchn_0": 1}}, "did you mean 'kitchen_0'"),
+        ({"replace": "share", "rooms": {"kitchen_0": -1}}, "0 or more"),
+        ({"stick": "motio"}, "did you mean 'motion'"),
+        ({"restore": "motio"}, "did you mean 'motion'"),
+    ],
+)
+def test_what_can_not_be_is_refused(entry: dict[str, Any], words: str) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        fleet2d.Simulation(home({"at": "1 min", **entry}))
