@@ -33,6 +33,7 @@ from fleet2d.expectations.signals import Measured
 from fleet2d.expectations.trace import Trace, shortest
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.kernels.look import Memory
 from fleet2d.problems import did_you_mean
 
 I64 = NDArray[np.int64]
@@ -76,8 +77,8 @@ class BatteryGauge(Gauge):
 class PerfectCameras(Cameras):
     """Cameras that look at every step, and notice everybody who is in view, at once."""
 
-    def _set_up(self) -> None:
-        super()._set_up()
+    def _set_up(self) -> Memory:
+        memory = super()._set_up()
         lenses = self.lenses
         self.lenses = lenses._replace(
             chance=np.full_like(lenses.chance, CERTAIN),
@@ -86,6 +87,7 @@ class PerfectCameras(Cameras):
             errs=np.zeros_like(lenses.errs),
         )
         self.rule = self.rule._replace(patience=1)
+        return memory
 
 
 class InViewGauge(Gauge):
