@@ -110,6 +110,12 @@ class Interventions:
         self._count += 1
         return self._count
 
+    def repeat(self, records: Sequence[Mapping[str, Any]]) -> None:
+        """Let be done again what records of another run say."""
+        for record in records:
+            step, intervention = read_intervention(record)
+            self.add(intervention, step)
+
     def add(
         self,
         act: Intervention,

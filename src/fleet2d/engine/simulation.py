@@ -14,7 +14,7 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.checkpoint import Checkpoint, Keeper
 from fleet2d.engine.garbage import rare_collections
-from fleet2d.engine.interventions import is_from_outside, read_intervention
+from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.judging import Judging
 from fleet2d.engine.keeping import (
     deferred_interrupt,
@@ -105,9 +105,7 @@ class Simulation(Judging):
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         # What the scenario's own script did, it does again.
         outside = [dict(record) for record in interventions if is_from_outside(record)]
-        for record in outside:
-            step, act = read_intervention(record)
-            self._state.interventions.add(act, step)
+        self._state.interventions.repeat(outside)
         self._pace: Pace | None = None
         self._stopping = self._broken = False
         self._run: Run | None = None  # once it is finished
@@ -157,10 +155,8 @@ class Simulation(Judging):
     def catch_up(self, interventions: Sequence[Mapping[str, Any]]) -> None:
         """Let be done again what was done to the run after its checkpoint."""
         known = self._state.interventions.records
-        for record in interventions:
-            if is_from_outside(record) and record not in known:
-                step, act = read_intervention(record)
-                self._state.interventions.add(act, step)
+        outside = [record for record in interventions if is_from_outside(record)]
+        self._state.interventions.repeat([record for record in outside if record not in known])
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return a simulation that goes on by itself.
@@ -341,10 +337,8 @@ class Simulation(Judging):
         began, stored = time.perf_counter(), self._state.recorder.wall_s
         self._began = began
         self._set_pace()
-        # A few steps are over before anybody could press Ctrl-C.
-        short = end - self.step < SHORT
         with ExitStack() as stack:
-            if not short:
+            if end - self.step >= SHORT:  # fewer are over before anybody could press Ctrl-C
                 stack.enter_context(rare_collections())
                 stack.enter_context(deferred_interrupt(self._stop))
             try:
