@@ -322,6 +322,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
     (User, "color"): "tests/view: pictures",
+    (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/view: pictures",
     (User, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/test_clearance: it meets nobody on its way here",

@@ -83,8 +83,8 @@ def test_unlisted_error_is_told_in_pydantics_words() -> None:
     ("override", "said"),
     [
         (
-            "robots.bo.type=find",
-            "low.yaml:4, changed by override 'robots.bo.type=find': robots.bo:",
+            "robots.bo.type=scheduled",
+            "low.yaml:4, changed by override 'robots.bo.type=scheduled': robots.bo.visits: missing",
         ),
         (
             "simulation.duration.dys=1",

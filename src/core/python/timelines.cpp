@@ -115,11 +115,9 @@ public:
         return nb::make_tuple(timelines_.bodies(), timelines_.step_us(), bodies);
     }
 
-    void restore(nb::handle bodies) {
-        require(nb::isinstance<nb::list>(bodies) && nb::len(bodies) == static_cast<std::size_t>(timelines_.bodies()),
-                NO_STATE);
+    void restore(const nb::list& bodies) {
         i64 body = 0;
-        for (nb::handle pieces : nb::borrow<nb::list>(bodies)) {
+        for (nb::handle pieces : bodies) {
             require(nb::isinstance<nb::list>(pieces), NO_STATE);
             for (nb::handle piece : nb::borrow<nb::list>(pieces)) {
                 require(nb::isinstance<nb::tuple>(piece), NO_STATE);
@@ -405,8 +403,11 @@ Args:
             "__setstate__",
             [](OwnedTimelines& self, nb::tuple state) {
                 require(state.size() == 3, NO_STATE);
-                OwnedTimelines made(Part<i64>{state[0]}.value(), Part<i64>{state[1]}.value());
-                made.restore(state[2]);
+                const i64 bodies = Part<i64>{state[0]}.value();
+                // Checked before so many are made room for.
+                require(nb::isinstance<nb::list>(state[2]) && static_cast<i64>(nb::len(state[2])) == bodies, NO_STATE);
+                OwnedTimelines made(bodies, Part<i64>{state[1]}.value());
+                made.restore(nb::borrow<nb::list>(state[2]));
                 new (&self) OwnedTimelines(std::move(made));
             },
             nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));

@@ -6,7 +6,7 @@ with many people.
 """
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from threading import Lock
 
@@ -41,3 +41,12 @@ def rare_collections() -> Iterator[None]:
             _runs -= 1
             if _runs == 0:
                 gc.set_threshold(*_usual)
+
+
+def free_bodies(actors: Iterable[object]) -> None:
+    """Free the bodies of a run that is over, and with them all of it but its results.
+
+    A body and its plan refer to each other, and would stay until Python looks for garbage.
+    """
+    for actor in actors:
+        vars(actor).clear()

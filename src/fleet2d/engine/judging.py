@@ -34,7 +34,7 @@ class Judging(Steering):
             >>> simulation = fleet2d.Simulation(None, "simulation.duration=4 h", seed=4)
             >>> simulation.expect("eventually(room(ana) == kitchen, within=2 h)", name="eats")
             'eats'
-            >>> simulation.run_until("02:00")
+            >>> simulation.run_until("02:01")
             >>> simulation.verdicts()["eats"].decided
             True
         """

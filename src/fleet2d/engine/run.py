@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fleet2d.engine.garbage import free_bodies
 from fleet2d.engine.simulation import Simulation
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
@@ -36,5 +37,5 @@ def run(
     """
     simulation = Simulation(scenario, *overrides, out=out, **settings)
     finished = simulation.run()
-    simulation._release()
+    free_bodies(simulation._state.actors)
     return finished

@@ -313,14 +313,6 @@ class Simulation(Judging):
         self._run.plan = self.home.plan
         return self._run
 
-    def _release(self) -> None:
-        """Let go of all but the run, at once: nothing can be asked of the simulation any more.
-
-        Bodies and their plans refer to each other, and would stay until Python looks for garbage.
-        """
-        for actor in self._state.actors:
-            vars(actor).clear()
-
     def _keep_learned(self) -> None:
         """Store what algorithms have learned; of one that can't be kept, the run says so."""
         if self._store.directory is not None and self.scenario.artifacts.learned:

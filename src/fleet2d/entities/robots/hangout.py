@@ -97,8 +97,7 @@ class Hangout(Behavior):
                 f"{actor.path}: there is no place to hang out at, off doorways by"
                 f" {self.off_doors:g} m and out of: {', '.join(self.avoid) or 'no room'}"
             )
-        nearness = self.places.nearness(self.near, self.tau.total_seconds())
-        self.nearness = np.asfortranarray(nearness)  # it is read by room
+        self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
         self.ways: tuple[Space, dict[tuple[int, int], NDArray[np.float64]]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]

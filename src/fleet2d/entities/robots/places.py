@@ -73,7 +73,10 @@ class Places:
         """
         actor = self._actor
         key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), actor.speed)
-        return actor.home.kept(key, lambda: read_only(self._find_nearness(by, tau)))
+        # It is read by room.
+        return actor.home.kept(
+            key, lambda: read_only(np.asfortranarray(self._find_nearness(by, tau)))
+        )
 
     def _find_nearness(self, by: Nearness, tau: float) -> F64:
         rooms = self._actor.home.rooms
