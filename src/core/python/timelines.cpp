@@ -405,7 +405,8 @@ Args:
                 require(state.size() == 3, NO_STATE);
                 const i64 bodies = Part<i64>{state[0]}.value();
                 // Checked before so many are made room for.
-                require(nb::isinstance<nb::list>(state[2]) && static_cast<i64>(nb::len(state[2])) == bodies, NO_STATE);
+                require(nb::isinstance<nb::list>(state[2]) && static_cast<i64>(nb::len(nb::handle(state[2]))) == bodies,
+                        NO_STATE);
                 OwnedTimelines made(bodies, Part<i64>{state[1]}.value());
                 made.restore(nb::borrow<nb::list>(state[2]));
                 new (&self) OwnedTimelines(std::move(made));
