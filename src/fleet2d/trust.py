@@ -176,7 +176,8 @@ def _types(value: object, where: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     """Yield every text that may name a component of a scenario's own, with its place."""
     if isinstance(value, Mapping):
         for key, entry in value.items():
-            yield from _types(entry, (*where, str(key)))
+            if key != "extends":  # files of data, such as bundled:base, whose own types are listed
+                yield from _types(entry, (*where, str(key)))
     elif isinstance(value, list | tuple):
         for index, entry in enumerate(value):
             yield from _types(entry, (*where, str(index)))

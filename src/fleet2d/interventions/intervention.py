@@ -160,7 +160,7 @@ def verbs() -> dict[str, type[Intervention]]:
 
 def _of_name(name: object) -> type[Intervention]:
     known = verbs()
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         text = f"there is no intervention {name!r}{did_you_mean(name, known)}"
         raise problem_at(("do",), f"{text} There are: {', '.join(known)}", name)
     return known[str(name)]
