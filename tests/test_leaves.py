@@ -1,5 +1,6 @@
 """Leaves: packages that nothing needs, and that can be deleted without a trace elsewhere."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import fleet2d
+from fleet2d import _core
 from fleet2d.cli import app, plugins
 
 SOURCE = Path(fleet2d.__file__).parent
@@ -38,20 +40,35 @@ app()
 """
 
 
-@pytest.mark.parametrize(("folders", "command"), LEAVES.items())
-def test_rest_works_without_a_leaf(folders: str, command: str, tmp_path: Path) -> None:
+def copied(folder: Path) -> Path:
+    """Copy Fleet2D with its core."""
     skipped = shutil.ignore_patterns("__pycache__", "page")
-    shutil.copytree(SOURCE, tmp_path / "fleet2d", ignore=skipped)
-    for folder in folders.split():
-        shutil.rmtree(tmp_path / "fleet2d" / folder)
+    copy = shutil.copytree(SOURCE, folder / "fleet2d", ignore=skipped)
+    shutil.copy(_core.__file__, copy)
+    return copy
 
-    done = subprocess.run(
-        [sys.executable, "-c", REST],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)},
+
+def process(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    """Run Python with the copy, and without what an editable install puts in its place."""
+    libraries = [path for path in sys.path if path.endswith("site-packages")]
+    return subprocess.run(
+        [sys.executable, "-S", *arguments],
+        cwd=folder,
+        env={"PYTHONPATH": os.pathsep.join([str(folder), *libraries]), "HOME": str(folder)},
         capture_output=True,
         text=True,
+        timeout=120,
+        check=False,
     )
+
+
+@pytest.mark.parametrize(("folders", "command"), LEAVES.items())
+def test_rest_works_without_a_leaf(folders: str, command: str, tmp_path: Path) -> None:
+    copy = copied(tmp_path)
+    for folder in folders.split():
+        shutil.rmtree(copy / folder)
+
+    done = process(tmp_path, "-c", REST)
 
     assert (done.returncode, done.stderr) == (0, "")
     commands = [line.split()[0] for line in done.stdout.splitlines() if line.startswith("  ")]
@@ -60,15 +77,9 @@ def test_rest_works_without_a_leaf(folders: str, command: str, tmp_path: Path) -
 
 
 def test_command_of_a_missing_leaf_is_unknown(tmp_path: Path) -> None:
-    shutil.copytree(SOURCE, tmp_path / "fleet2d", ignore=shutil.ignore_patterns("paper", "page"))
+    shutil.rmtree(copied(tmp_path) / "paper")
 
-    done = subprocess.run(
-        [sys.executable, "-m", "fleet2d.cli", "reproduce-paper"],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-    )
+    done = process(tmp_path, "-m", "fleet2d.cli", "reproduce-paper")
 
     assert done.returncode == 2
     assert "No such command 'reproduce-paper'" in done.stderr

@@ -108,7 +108,6 @@ def _by_verb(
         "type": "object",
         "properties": {verb: act["properties"][subject], **when, **rest},
         "required": [verb, *required],
-        "oneOf": [{"required": ["at"]}, {"required": ["on"]}],
         "additionalProperties": False,
     }
 
