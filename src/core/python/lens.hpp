@@ -33,6 +33,8 @@ inline void check_lenses(const Lenses& lenses) {
     require(all_in_range(lenses.pan_count, 0, lenses.pans.shape[1] + 1), "pan_count must be at most that of pans");
     require(all_in_range(lenses.points, 0, lenses.bodies.shape[2]), "points must be below that of bodies");
     require(all_in_range(lenses.period, 1, INT64_MAX), "period must be 1 or more");
+    require(all_in_range(lenses.near_squared, 0, i64{1} << 52) && all_in_range(lenses.far_squared, 0, i64{1} << 52),
+            "near_squared and far_squared must be in 0 to 2**52 - 1");
     for (i64 i = 0; i < cameras; ++i) {
         require(lenses.pan_count[i] == 0 || lenses.pan_us[i] > 0, "pan_us must be above 0 where a camera pans");
     }

@@ -140,6 +140,7 @@ Args:
         [](i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
             check_offset(dx, dy);
             require(0 < distance && distance < (i64{1} << 40), "distance must be in 1 to 2**40 - 1");
+            require(0 <= wanted && wanted < (i64{1} << 21), "wanted must be in 0 to 2**21 - 1");
             const Offset offset = turn_and_stretch(dx, dy, turn, distance, wanted);
             return std::tuple(offset.dx, offset.dy);
         },
