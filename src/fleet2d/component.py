@@ -286,8 +286,31 @@ def _checked(kind: str, name: str, found: object) -> type[Component]:
     return found
 
 
+class Codec:
+    """Declares how a field is read from a mapping and written as one."""
+
+    def validate(self, value: Any, info: ValidationInfo) -> Any:
+        """Build the value that a mapping describes."""
+        raise NotImplementedError
+
+    def dump(self, value: Any, info: SerializationInfo) -> dict[str, Any]:
+        """Write the value as a mapping that validates to an equal one."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Validate and dump by this class alone."""
+        return core_schema.with_info_plain_validator_function(
+            self.validate,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                self.dump, info_arg=True, return_schema=core_schema.dict_schema()
+            ),
+        )
+
+
 @dataclass(frozen=True)
-class OneOf:
+class OneOf(Codec):
     """Declares a field for any component of a kind: ``Annotated[Component, OneOf("metric")]``.
 
     Its input is a mapping with ``type``, the bare name of a type, or an instance; it dumps to the
@@ -327,17 +350,6 @@ class OneOf:
             exclude_unset=info.exclude_unset,
         )
         return {"type": value.type_name, **fields}
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate and dump by this class alone."""
-        return core_schema.with_info_plain_validator_function(
-            self.validate,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                self.dump, info_arg=True, return_schema=core_schema.dict_schema()
-            ),
-        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from fleet2d.clock import Clock
-from fleet2d.expectations.expectation import INFINITE, Expectation, Known
+from fleet2d.expectations.expectation import INFINITE, Expectation, Known, OfOne
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import Comparison, Measured, Signal
 from fleet2d.expectations.temporal import Always
@@ -17,20 +17,10 @@ from fleet2d.expectations.words import call_text
 
 
 @dataclass(frozen=True, eq=False)
-class HoldsFor(Expectation):
+class HoldsFor(OfOne):
     """That something has held for at least so long, at this step and those before."""
 
-    part: Expectation
     duration: timedelta
-
-    @property
-    def unit(self) -> str:  # type: ignore[override]
-        """That of the part."""
-        return self.part.unit
-
-    def parts(self) -> Iterator[Expectation]:
-        """Yield what holds."""
-        yield self.part
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""

@@ -130,21 +130,26 @@ class Expectation(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Not(Expectation):
-    """That something doesn't hold."""
+class OfOne(Expectation):
+    """What is expected of one other thing, in its unit."""
 
     part: Expectation
 
-    is_call = False
-
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """That of what mustn't hold."""
+        """That of the part."""
         return self.part.unit
 
     def parts(self) -> Iterator[Expectation]:
-        """Yield what mustn't hold."""
+        """Yield the part."""
         yield self.part
+
+
+@dataclass(frozen=True, eq=False)
+class Not(OfOne):
+    """That something doesn't hold."""
+
+    is_call = False
 
     def robustness(self, known: Known, high: bool) -> Trace:
         """Return the opposite; what is best for it is worst for its part."""

@@ -10,6 +10,7 @@ from fleet2d.expectations.expectation import (
     INFINITE,
     Expectation,
     Known,
+    OfOne,
     common_unit,
 )
 from fleet2d.expectations.scene import Scene
@@ -43,20 +44,10 @@ class Temporal(Expectation):
 
 
 @dataclass(frozen=True, eq=False)
-class Window(Temporal):
+class Window(Temporal, OfOne):
     """Something about the time from a step on, up to so long after it, or to the run's end."""
 
-    part: Expectation
     within: timedelta | None = None
-
-    @property
-    def unit(self) -> str:  # type: ignore[override]
-        """That of the part."""
-        return self.part.unit
-
-    def parts(self) -> Iterator[Expectation]:
-        """Yield what holds."""
-        yield self.part
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
@@ -129,19 +120,8 @@ class Eventually(Window):
 
 
 @dataclass(frozen=True, eq=False)
-class AtEnd(Temporal):
+class AtEnd(Temporal, OfOne):
     """That something holds at the last step of the run."""
-
-    part: Expectation
-
-    @property
-    def unit(self) -> str:  # type: ignore[override]
-        """That of the part."""
-        return self.part.unit
-
-    def parts(self) -> Iterator[Expectation]:
-        """Yield what holds."""
-        yield self.part
 
     def robustness(self, known: Known, high: bool) -> Trace:
         """Return what it is at the last step."""

@@ -1,22 +1,20 @@
 """The base of interventions, and how they are written: `{put: ana, to: kitchen}`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import timedelta
 from typing import Annotated, Any, ClassVar
 
 from pydantic import (
     Field,
-    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     SerializationInfo,
     TypeAdapter,
     ValidationError,
     ValidationInfo,
 )
-from pydantic_core import CoreSchema, InitErrorDetails, core_schema
+from pydantic_core import CoreSchema, InitErrorDetails
 
-from fleet2d.component import Component, components
+from fleet2d.component import Codec, Component, components
 from fleet2d.entities.actor import Actor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
@@ -106,8 +104,7 @@ def _named(name: str, nobody: str, actors: Mapping[str, Actor]) -> Actor:
     return actors[name]
 
 
-@dataclass(frozen=True)
-class Verb:
+class Verb(Codec):
     """Declares a field for an intervention, written by its verb: ``{put: ana, to: kitchen}``.
 
     The long form, ``{do: put, entity: ana, to: kitchen}``, is what it is dumped to.
@@ -134,17 +131,6 @@ class Verb:
             mode=info.mode, context=info.context, exclude_defaults=info.exclude_defaults
         )
         return {"do": value.type_name, **fields}
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate and dump by this class alone."""
-        return core_schema.with_info_plain_validator_function(
-            self.validate,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                self.dump, info_arg=True, return_schema=core_schema.dict_schema()
-            ),
-        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
