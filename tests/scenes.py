@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 import fleet2d
 from fleet2d.runs.run import Run
+
+Cli = Callable[..., tuple[int, str, str]]
+"""What the fixture `fleet2d` is: the command line, which returns exit code, stdout and stderr."""
 
 TESTS = Path(__file__).parent
 OWN = f"{TESTS.as_posix()}/own_components"

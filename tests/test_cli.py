@@ -15,38 +15,18 @@ import jsonschema
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from tests.scenes import every_step, everything, flat_path, fleet2d_process, scenario
+from tests.scenes import Cli, every_step, everything, flat_path, fleet2d_process, scenario
 
 import fleet2d as package
-from fleet2d import cli, component
+from fleet2d import component
 from fleet2d.document import read_document
 from fleet2d.scenario.compose import bundled_path
-
-Result = tuple[int, str, str]
-Cli = Callable[..., Result]
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SUMMARY = {
     "run_dir": str, "steps": int, "simulated_s": float, "seed": int, "digest": str, "wall_s": dict,
     "speedup": float, "peak_rss_mb": float, "metrics": dict,
 }  # fmt: skip
-
-
-@pytest.fixture
-def fleet2d(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Cli:
-    """The command line in this process, in an empty folder: (exit code, stdout, stderr)."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str | Path) -> Result:
-        monkeypatch.setattr(sys, "argv", ["fleet2d", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return int(caught.value.code or 0), out, err
-
-    return call
 
 
 def written(content: dict[str, Any], name: str = "home.yaml") -> Path:

@@ -3,40 +3,24 @@
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from tests.scenes import OWN, flat_path, fleet2d_process, scenario, write_flat
+from tests.scenes import OWN, Cli, flat_path, fleet2d_process, scenario, write_flat
 
-from fleet2d import cli
 from fleet2d.artifacts import arrow, store
 from fleet2d.runs.run import open_run
 
-Result = tuple[int, str, str]
-Cli = Callable[..., Result]
-
 
 @pytest.fixture
-def fleet2d(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Cli:
-    """The command line in this process, in an empty folder: (exit code, stdout, stderr)."""
+def fleet2d(fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Cli:
+    """The command line in an empty folder within another one."""
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-
-    def call(*arguments: str | Path) -> Result:
-        monkeypatch.setattr(sys, "argv", ["fleet2d", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return int(caught.value.code or 0), out, err
-
-    return call
+    return fleet2d
 
 
 def written(content: Any, name: str = "home.yaml") -> Path:
@@ -66,7 +50,7 @@ def changed(change: dict[str, Any]) -> dict[str, Any]:
     return content
 
 
-def check(result: Result, code: int, words: list[str], left: set[str]) -> None:
+def check(result: tuple[int, str, str], code: int, words: list[str], left: set[str]) -> None:
     """Check exit code, words, that there is no traceback, and which files there are."""
     found, out, err = result
     assert code == found, err

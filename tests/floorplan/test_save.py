@@ -1,6 +1,4 @@
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +6,8 @@ import jsonschema
 import pytest
 import shapely
 import yaml
+from tests.scenes import Cli
 
-from fleet2d import cli
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import HOMES
 from fleet2d.floorplan.formats.native import native_document
@@ -19,24 +17,6 @@ from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.save import save_floorplan
-
-Cli = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def fleet2d(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Cli:
-    """The command line in this process, in an empty folder: (exit code, stdout, stderr)."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fleet2d", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        return (int(caught.value.code or 0), *capsys.readouterr())
-
-    return call
 
 
 def full_plan(name: str = "no: 1 – Küche") -> FloorPlan:

@@ -1,36 +1,19 @@
 """The commands: what they print, write and return."""
 
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import yaml
+from tests.scenes import Cli
 from tests.studies.scenes import SPEED, base, small
-
-from fleet2d import cli
-
-Result = tuple[int, str, str]
-Cli = Callable[..., Result]
 
 
 @pytest.fixture
-def fleet2d(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Cli:
-    """The command line in this process, in a folder with a study: (exit code, stdout, stderr)."""
-    monkeypatch.chdir(tmp_path)
+def fleet2d(fleet2d: Cli) -> Cli:
+    """The command line in a folder with a study."""
     Path("speeds.yaml").write_text(yaml.safe_dump(small(replicates=2)))
-
-    def call(*arguments: str) -> Result:
-        monkeypatch.setattr(sys, "argv", ["fleet2d", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return int(caught.value.code or 0), out, err
-
-    return call
+    return fleet2d
 
 
 SERIAL = ("--executor", "serial")
