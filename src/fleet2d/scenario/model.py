@@ -17,7 +17,7 @@ from pydantic import (
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.bounds import one_line
-from fleet2d.component import OneOf, Settings, ShortForm
+from fleet2d.component import OneOf, Settings
 from fleet2d.document import Document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
@@ -30,6 +30,7 @@ from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean, problem, problem_at
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.explain import explain
+from fleet2d.short_form import ShortForm
 from fleet2d.sight.settings import SightSettings
 from fleet2d.trust import check_code
 from fleet2d.units import Duration, PositiveDuration, format_duration, micros
