@@ -22,7 +22,7 @@ from fleet2d.expectations import (
     never,
     until,
 )
-from fleet2d.expectations.expectation import Expectation, Known
+from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.trace import Trace
 from fleet2d.expectations.verdict import verdict_of
 
@@ -75,10 +75,10 @@ def trace_of(values: list[float], end: int) -> Trace:
     return Trace(np.flatnonzero(kept), array[kept], end)
 
 
-def known_of(signals: dict[str, list[float]], end: int, *, over: bool) -> Known:
+def known_of(signals: dict[str, list[float]], end: int, *, over: bool) -> RunSignals:
     names = {"a": moving("a"), "b": moving("b"), "x": metric("x"), "y": metric("y")}
     traces = {str(names[name]): trace_of(v, end) for name, v in signals.items() if name in names}
-    return Known(traces, {}, 0, end, over, CLOCK)
+    return RunSignals(traces, {}, 0, end, over, CLOCK)
 
 
 def dense(trace: Trace) -> list[float]:
@@ -176,7 +176,7 @@ def test_at_most_counts_each_event_of_an_hour(times: int, holds: bool) -> None:
     steps = [0, 1, 1, 5000, 7300]
     counts = [float(steps.count(step)) for step in range(8000)]
     expectation = at_most(times, events("calls"), per="hour")
-    known = Known({str(events("calls")): trace_of(counts, 8000)}, {}, 0, 8000, True, CLOCK)
+    known = RunSignals({str(events("calls")): trace_of(counts, 8000)}, {}, 0, 8000, True, CLOCK)
     verdict = verdict_of("", expectation, known)
 
     assert verdict.holds is holds

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,9 @@ from fleet2d.engine.tables import STEP, TIME
 from fleet2d.entities.actor import Actor
 from fleet2d.errors import InputError
 from fleet2d.events import Event
-from fleet2d.expectations.expectation import Expectation, Known
+from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.signals import Measured
+from fleet2d.expectations.signals import Measurement
 from fleet2d.expectations.verdict import Verdict, check_judged, verdict_of
 from fleet2d.metrics.metric import Metric
 from fleet2d.scenario.model import Scenario
@@ -61,7 +62,7 @@ class Expecting:
                 self._measure(signal, state)
         self.entries[name] = Entry(expectation, since)
 
-    def _measure(self, signal: Measured, state: State) -> None:
+    def _measure(self, signal: Measurement, state: State) -> None:
         gauge = gauge_of(signal, state, self._clock.step_us)
         self._gauges[str(signal)] = gauge
         if isinstance(gauge, BatteryGauge):
@@ -86,9 +87,9 @@ class Expecting:
         learners = state.learners
         for (kind, name), gauges in self._noted.items():
             for gauge in gauges:
-                if kind == "Output" and name in learners.fresh:
+                if kind == "OutputSignal" and name in learners.fresh:
                     gauge.note(step, learners.fresh[name])
-                elif kind == "MetricValue":
+                elif kind == "MetricSignal":
                     self._note_metric(gauge, name, step, state)
 
     def _note_metric(self, gauge: NotedGauge, name: str, step: int, state: State) -> None:
@@ -132,7 +133,7 @@ class Expecting:
         if self._taken <= entry.since:
             return None
         keys = [str(signal) for signal in entry.expectation.measures()]
-        known = Known(
+        known = RunSignals(
             {key: self._gauges[key].trace(self._taken) for key in keys},
             {key: self._gauges[key].words for key in keys},
             entry.since,
@@ -151,7 +152,7 @@ class Expecting:
             ended: Whether the run is complete.
         """
         for (kind, name), gauges in self._noted.items():
-            if kind == "MetricValue" and name in results:
+            if kind == "MetricSignal" and name in results:
                 for gauge in gauges:
                     gauge.note(self._taken - 1, results[name])
         verdicts = self.verdicts(ended=ended)
@@ -220,8 +221,8 @@ def expect(
     state.expecting.add(name, expectation, since, state)
 
 
-def scene_of(state: State, scenario: Scenario, left: Any) -> Scene:
-    """Return the names of a run that something can be expected of."""
+def scene_of(state: State, scenario: Scenario, remaining: timedelta) -> Scene:
+    """Return the names of a run that expectations may use."""
     users = state.bodies.users
     behaviors = {
         actor.name: [_type_of(behavior) for behavior in actor.behaviors] or ["own"]
@@ -242,7 +243,7 @@ def scene_of(state: State, scenario: Scenario, left: Any) -> Scene:
         },
         behaviors=behaviors,
         records=[kind for a in state.actors for b in a.behaviors for kind in b.records],
-        left=left,
+        remaining=remaining,
     )
 
 

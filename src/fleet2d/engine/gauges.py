@@ -173,7 +173,7 @@ class SwitchGauge(Gauge):
 class SeenGauge(SwitchGauge):
     """Follows whether a camera's owner counts somebody as seen."""
 
-    def __init__(self, signal: states.Sight, now: bool) -> None:
+    def __init__(self, signal: states.CameraCondition, now: bool) -> None:
         super().__init__(float(now))
         self._body, self._by = signal.body, signal.by
 
@@ -232,7 +232,7 @@ class SensorGauge(SwitchGauge):
 class EventGauge(Gauge):
     """Counts events at each step."""
 
-    def __init__(self, signal: states.Happens) -> None:
+    def __init__(self, signal: states.EventHappens) -> None:
         super().__init__()
         self._kind, self._entity, self._detail = signal.kind, signal.entity, signal.detail
 

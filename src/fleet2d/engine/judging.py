@@ -8,7 +8,7 @@ from fleet2d.engine.expecting import expect
 from fleet2d.engine.steering import Steering
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation
-from fleet2d.expectations.text import parse_expectation
+from fleet2d.expectations.parse import parse_expectation
 from fleet2d.expectations.verdict import Verdict
 
 

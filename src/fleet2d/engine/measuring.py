@@ -29,7 +29,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.battery import Course
 from fleet2d.errors import ScenarioError
 from fleet2d.expectations import quantities, states
-from fleet2d.expectations.signals import Measured
+from fleet2d.expectations.signals import Measurement
 from fleet2d.expectations.trace import Trace, shortest
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
@@ -119,7 +119,7 @@ class InViewGauge(Gauge):
 # Which gauge
 
 
-def gauge_of(signal: Measured, state: State, step_us: int) -> Gauge:
+def gauge_of(signal: Measurement, state: State, step_us: int) -> Gauge:
     """Return a gauge that measures a signal from the present step on."""
     for kind, make in _MAKERS.items():
         if type(signal) is kind:
@@ -132,7 +132,7 @@ def row_of(state: State, name: str) -> int:
     return next(row for row, actor in enumerate(state.actors) if actor.name == name)
 
 
-def _distance(signal: quantities.Distance, state: State, _: int) -> Gauge:
+def _distance(signal: quantities.DistanceSignal, state: State, _: int) -> Gauge:
     row, other = row_of(state, signal.body), signal.other
     names = [actor.name for actor in state.actors]
     if isinstance(other, str) and other in names:
@@ -165,7 +165,7 @@ class Shape:
         return self._known[1]
 
 
-def _speed(signal: quantities.Speed | states.Moving, state: State, step_us: int) -> Gauge:
+def _speed(signal: quantities.SpeedSignal | states.IsMoving, state: State, step_us: int) -> Gauge:
     row, step = row_of(state, signal.body), state.settled
     before: tuple[int, ...] = ()
     if step > 0 and hasattr(state.actors[row], "motion"):
@@ -175,7 +175,7 @@ def _speed(signal: quantities.Speed | states.Moving, state: State, step_us: int)
     return SpeedGauge(row, before, step_us)
 
 
-def _seen(signal: states.Seen, state: State, _: int) -> Gauge:
+def _seen(signal: states.IsSeen, state: State, _: int) -> Gauge:
     cameras = _cameras_of(state, signal.by)
     return SeenGauge(signal, signal.body in cameras.in_view)
 
@@ -184,18 +184,20 @@ def _cameras_of(state: State, name: str) -> Cameras:
     return next(c for c in [*state.gazes, *state.cameras] if c.owner.name == name)
 
 
-def _perceived(signal: states.Perceived, state: State, _: int) -> Gauge:
+def _perceived(signal: states.IsPerceived, state: State, _: int) -> Gauge:
     cameras = _cameras_of(state, signal.by)
     names = [other.name for other in cameras.others]
     return PerceivedGauge(cameras.index, names.index(signal.body))
 
 
-def _noted(signal: quantities.Output | quantities.MetricValue, state: State, _: int) -> Gauge:
-    reading = OutputReading if isinstance(signal, quantities.Output) else MetricReading
+def _noted(
+    signal: quantities.OutputSignal | quantities.MetricSignal, state: State, _: int
+) -> Gauge:
+    reading = OutputReading if isinstance(signal, quantities.OutputSignal) else MetricReading
     return NotedGauge(state.settled, reading(signal.path, state.home))
 
 
-def _activity(signal: states.ActivityOf, state: State, _: int) -> Gauge:
+def _activity(signal: states.ActivitySignal, state: State, _: int) -> Gauge:
     now = state.recorder.activities.now(row_of(state, signal.user))
     return ActivityGauge(signal.user, now)
 
@@ -272,25 +274,23 @@ class MetricReading:
 
 
 _MAKERS: Mapping[type, Callable[[Any, State, int], Gauge]] = {
-    states.ActivityOf: _activity,
-    states.Away: lambda signal, state, _: AwayGauge(row_of(state, signal.body)),
-    quantities.Battery: lambda signal, state, _: BatteryGauge(
+    states.ActivitySignal: _activity,
+    states.IsAway: lambda signal, state, _: AwayGauge(row_of(state, signal.body)),
+    quantities.BatterySignal: lambda signal, state, _: BatteryGauge(
         state.actors[row_of(state, signal.robot)]
     ),
-    quantities.Distance: _distance,
-    states.DoorOpen: lambda signal, state, _: DoorGauge(state.changes.names.index(signal.name)),
-    states.Happens: lambda signal, *_: EventGauge(signal),
-    states.InView: lambda signal, state, _: InViewGauge(
+    quantities.DistanceSignal: _distance,
+    states.IsOpen: lambda signal, state, _: DoorGauge(state.changes.names.index(signal.name)),
+    states.EventHappens: lambda signal, *_: EventGauge(signal),
+    states.IsInView: lambda signal, state, _: InViewGauge(
         state, _cameras_of(state, signal.by), signal.body
     ),
-    quantities.MetricValue: _noted,
-    states.Moving: _speed,
-    quantities.Output: _noted,
-    states.Perceived: _perceived,
-    states.RoomOf: lambda signal, state, _: RoomGauge(row_of(state, signal.body), state.home),
-    states.Seen: _seen,
-    states.SensorOn: lambda signal, state, _: SensorGauge(
-        signal.name, state.sensors.on[signal.name]
-    ),
-    quantities.Speed: _speed,
+    quantities.MetricSignal: _noted,
+    states.IsMoving: _speed,
+    quantities.OutputSignal: _noted,
+    states.IsPerceived: _perceived,
+    states.RoomSignal: lambda signal, state, _: RoomGauge(row_of(state, signal.body), state.home),
+    states.IsSeen: _seen,
+    states.IsOn: lambda signal, state, _: SensorGauge(signal.name, state.sensors.on[signal.name]),
+    quantities.SpeedSignal: _speed,
 }

@@ -9,8 +9,8 @@ after(events("calls", "astro"), seen("ana", by="astro"), within="2 min")
 """
 
 from fleet2d.expectations.expectation import Expectation
+from fleet2d.expectations.parse import parse_expectation
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.text import parse_expectation
 from fleet2d.expectations.verdict import Verdict, judge
 from fleet2d.expectations.violation import Violation
 from fleet2d.expectations.vocabulary import (

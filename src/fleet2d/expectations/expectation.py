@@ -1,8 +1,9 @@
-"""Expectations: what must hold over a run, and by how much it holds or fails.
+"""Expectations: conditions on a run, with the margin by which they hold or fail.
 
 An expectation has a robustness at each step, as in signal temporal logic (Donzé and Maler, 2010):
-above 0 it holds there, below 0 it doesn't, and how far from 0 says by how much. It is never 0: a
-signal that lies on its limit is off by next to nothing, on the side on which the comparison is.
+above 0 it holds there, below 0 it doesn't, and the absolute value is the margin. It is never 0: for
+a signal exactly at its limit it is plus or minus the smallest normal float64, as the comparison
+holds there or not.
 """
 
 from abc import ABC, abstractmethod
@@ -22,20 +23,20 @@ if TYPE_CHECKING:
     from fleet2d.expectations.scene import Scene
 
 INFINITE = float("inf")
-NEXT_TO_NOTHING = float(np.finfo(np.float64).tiny)
+TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True)
-class Known:
-    """What is known of a run.
+class RunSignals:
+    """The measured signals of a run, as far as they are known.
 
     Attributes:
-        traces: What was measured, by the text of each signal.
-        words: What a value of a signal of words stands for: all words that it answers to.
-        first: The step from which on something is expected.
-        end: The step before which what is known ends.
-        ended: Whether nothing comes after it.
-        clock: Of the run.
+        traces: The measured values, by the text of each signal.
+        words: For each signal with words: the words that each of its values stands for.
+        first: The first judged step.
+        end: One past the last step that is known.
+        ended: Whether the run is over.
+        clock: The clock of the run.
     """
 
     traces: Mapping[str, Trace]
@@ -46,40 +47,40 @@ class Known:
     clock: Clock
 
     def beyond(self, neutral: float, *, high: bool, bounded: bool) -> float:
-        """Return what a signal counts as after all that is known.
+        """Return the robustness that is assumed after the last known step.
 
         Args:
-            neutral: What doesn't count in the operator that asks.
-            high: Whether the best is assumed of what isn't known, or the worst.
-            bounded: Whether the operator waits for a time, which may lie beyond the run's end.
+            neutral: The neutral value of the operator.
+            high: Whether the best case is assumed for steps that aren't run, or the worst.
+            bounded: Whether the operator has a time limit, which may lie beyond the run's end.
         """
         if self.ended and not bounded:
             return neutral
         return INFINITE if high else -INFINITE
 
     def steps_in(self, duration: timedelta) -> int:
-        """Return how many whole steps a duration has."""
+        """Return the number of whole steps in a duration."""
         return micros(duration) // self.clock.step_us
 
 
 class Expectation(ABC):
-    """Something that holds, or doesn't, at each step of a run.
+    """A condition that holds or doesn't at each step of a run.
 
     Combine them by `&`, `|` and `~`.
     """
 
     unit: str = ""
-    """Of the robustness; empty for what merely is so or not."""
+    """Unit of the robustness; empty for conditions that are only true or false."""
     is_call: ClassVar[bool] = True
-    """Whether it is written as a call, which needs no brackets around it."""
+    """Whether its text is a call, which needs no brackets."""
 
     @abstractmethod
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return by how much it holds from each step on.
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the margin by which it holds from each step on.
 
         Args:
-            known: What is known of the run.
-            high: Whether the best is assumed of what isn't known yet, or the worst.
+            run: The measured signals of the run.
+            high: Whether the best case is assumed for steps that aren't known yet, or the worst.
         """
 
     def parts(self) -> Iterator["Expectation"]:
@@ -87,10 +88,10 @@ class Expectation(ABC):
         yield from ()
 
     def check(self, scene: "Scene") -> None:
-        """Refuse what can't be in a run, part by part.
+        """Refuse what a run doesn't have, part by part.
 
         Raises:
-            ScenarioError: There is nothing of a name, or it can never happen.
+            ScenarioError: A name is unknown, or the condition can never happen.
         """
         for part in self.parts():
             part.check(scene)
@@ -100,9 +101,9 @@ class Expectation(ABC):
         for part in self.parts():
             yield from part.measures()
 
-    def occasions(self, known: Known) -> I64:
-        """Return the steps at which it begins to hold, for certain."""
-        return np.array([first for first, _ in spells(self.robustness(known, False))], np.int64)
+    def occasions(self, run: RunSignals) -> I64:
+        """Return the steps at which it certainly begins to hold."""
+        return np.array([first for first, _ in spells(self.robustness(run, False))], np.int64)
 
     @property
     def is_judged(self) -> bool:
@@ -110,34 +111,34 @@ class Expectation(ABC):
         return any(part.is_judged for part in self.parts())
 
     def __and__(self, other: "Expectation") -> "Expectation":
-        """Return that both hold."""
+        """Expect both."""
         return And(self, _checked(other, "&"))
 
     def __or__(self, other: "Expectation") -> "Expectation":
-        """Return that either holds, or both."""
+        """Expect one of the two, or both."""
         return Or(self, _checked(other, "|"))
 
     def __invert__(self) -> "Expectation":
-        """Return that it doesn't hold."""
+        """Expect the opposite."""
         return Not(self)
 
     def __bool__(self) -> bool:
-        """Refuse `and`, `or` and `not`, which Python keeps to itself."""
+        """Refuse `and`, `or` and `not`, which can't be overloaded in Python."""
         raise InputError(
-            "an expectation has no truth before the run: write & | ~ instead of and, or, not (and"
-            " put comparisons in brackets), and two comparisons instead of a < x < b"
+            "an expectation is neither true nor false before the run: write & | ~ instead of and,"
+            " or, not (and put comparisons in brackets), and two comparisons instead of a < x < b"
         )
 
 
 @dataclass(frozen=True, eq=False)
-class OfOne(Expectation):
-    """What is expected of one other thing, in its unit."""
+class UnaryExpectation(Expectation):
+    """Base of expectations about one other expectation, with its unit."""
 
     part: Expectation
 
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """That of the part."""
+        """The unit of the part."""
         return self.part.unit
 
     def parts(self) -> Iterator[Expectation]:
@@ -146,22 +147,22 @@ class OfOne(Expectation):
 
 
 @dataclass(frozen=True, eq=False)
-class Not(OfOne):
-    """That something doesn't hold."""
+class Not(UnaryExpectation):
+    """That a condition doesn't hold."""
 
     is_call = False
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the opposite; what is best for it is worst for its part."""
-        return self.part.robustness(known, not high).map(np.negative)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return minus the robustness of the part, whose worst case is this one's best."""
+        return self.part.robustness(run, not high).map(np.negative)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return f"not {bracketed(self.part)}"
 
 
 @dataclass(frozen=True, eq=False)
-class _Both(Expectation):
+class _BinaryExpectation(Expectation):
     one: Expectation
     other: Expectation
 
@@ -174,34 +175,34 @@ class _Both(Expectation):
         return common_unit(self.one, self.other)
 
     def parts(self) -> Iterator[Expectation]:
-        """Yield both."""
+        """Yield both parts."""
         yield self.one
         yield self.other
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return f"{bracketed(self.one)} {self.word} {bracketed(self.other)}"
 
 
-class And(_Both):
-    """That two things hold."""
+class And(_BinaryExpectation):
+    """That both parts hold."""
 
     word = "and"
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the lesser one."""
-        parts = (part.robustness(known, high) for part in self.parts())
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the minimum of both parts."""
+        parts = (part.robustness(run, high) for part in self.parts())
         return combine(np.minimum, *parts)
 
 
-class Or(_Both):
-    """That one of two things holds, or both."""
+class Or(_BinaryExpectation):
+    """That one part holds, or both."""
 
     word = "or"
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the greater one."""
-        parts = (part.robustness(known, high) for part in self.parts())
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the maximum of both parts."""
+        parts = (part.robustness(run, high) for part in self.parts())
         return combine(np.maximum, *parts)
 
 
@@ -209,18 +210,18 @@ MIXED = "mixed"
 
 
 def common_unit(*parts: Expectation) -> str:
-    """Return the unit of those that have one, `MIXED` if they differ."""
+    """Return the unit that the parts have in common; `MIXED` if they differ, empty if none has."""
     units = {part.unit for part in parts} - {""}
     return "" if not units else units.pop() if len(units) == 1 else MIXED
 
 
 def bracketed(part: Expectation) -> str:
-    """Write a part of an expectation, in brackets unless it is a call."""
+    """Return the text of a part, in brackets unless it is a call."""
     return str(part) if part.is_call else f"({part})"
 
 
 def truth(value: F64) -> F64:
-    """Return the robustness of what merely is so, above 0, or not."""
+    """Return the robustness of a condition that is true where `value` is above 0."""
     return np.where(value > 0, INFINITE, -INFINITE)
 
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import Signal
-from fleet2d.expectations.words import call_text
 from fleet2d.units import LENGTH, SHARE, SPEED
 
 Place = str | tuple[float, float]
@@ -12,11 +12,11 @@ Place = str | tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Distance(Signal):
+class DistanceSignal(Signal):
     """How far two bodies are apart, or a body from a room, an object or a point [m].
 
-    Of bodies the centres count, of rooms and objects what they cover: inside it is 0. Infinite
-    while one of them is not at home.
+    It is measured from the centre of a body to the nearest point of a room or object: 0 inside.
+    Infinite while a body is away from home.
     """
 
     body: str
@@ -40,19 +40,19 @@ class Distance(Signal):
             )
         scene.check_body(self.body, self)
         if isinstance(self.other, str):
-            known = [*scene.bodies, *scene.rooms, *scene.things]
-            scene.check_name("body, room or object", self.other, known, self)
+            names = [*scene.bodies, *scene.rooms, *scene.things]
+            scene.check_name("body, room or object", self.other, names, self)
         if self.other == self.body:
             raise scene.error(f"{self}: a body is no distance from itself")
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("distance", self.body, self.other)
 
 
 @dataclass(frozen=True, eq=False)
-class Speed(Signal):
-    """How fast a body goes: the way from the step before, by the length of a step [m/s]."""
+class SpeedSignal(Signal):
+    """SpeedSignal of a body: the distance from its position at the step before, per step [m/s]."""
 
     body: str
 
@@ -65,12 +65,12 @@ class Speed(Signal):
         scene.check_body(self.body, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("speed", self.body)
 
 
 @dataclass(frozen=True, eq=False)
-class Battery(Signal):
+class BatterySignal(Signal):
     """The charge of a robot, 0 to 1, rounded down to a tenth of a percent."""
 
     robot: str
@@ -80,20 +80,20 @@ class Battery(Signal):
     __hash__ = object.__hash__
 
     def check(self, scene: Scene) -> None:
-        """Refuse what has no battery."""
+        """Refuse a robot without a battery."""
         scene.check_name("robot with a battery", self.robot, scene.batteries, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("battery", self.robot)
 
 
 @dataclass(frozen=True, eq=False)
-class Output(Signal):
-    """A number of what an algorithm put out last, as others read it from the next step on.
+class OutputSignal(Signal):
+    """A number of an algorithm's newest output, which counts from the step after it.
 
-    `ltp.kitchen` is the probability of a room of `ltp`; `rtp.ana.kitchen` that of a user's;
-    `mine.sightings` a number of an output with names. Missing before the first output.
+    `ltp.kitchen` is the probability of a room by `ltp`; `rtp.ana.kitchen` that for one user;
+    `mine.sightings` a named number of an output. Missing before the first output.
     """
 
     path: str
@@ -109,16 +109,16 @@ class Output(Signal):
             )
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("output", self.path)
 
 
 @dataclass(frozen=True, eq=False)
-class MetricValue(Signal):
-    """A number of what a metric has come to so far, by the names that its result has.
+class MetricSignal(Signal):
+    """A number of a metric's result so far, by the names in its result.
 
-    It changes when the metric is updated, and at the last step it is that of the whole run. Missing
-    before the first update.
+    It changes when the metric is updated; at the last step it is the result of the whole run.
+    Missing before the first update.
     """
 
     path: str
@@ -130,5 +130,5 @@ class MetricValue(Signal):
         scene.check_name("metric", self.path.split(".")[0], scene.metrics, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("metric", self.path)

@@ -1,4 +1,4 @@
-"""What there is in a run that something can be expected of, by name."""
+"""Scenes: the names of a run that expectations may use."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from fleet2d.events import KINDS, SIGHTS, EventKind
 from fleet2d.problems import did_you_mean
 from fleet2d.units import format_duration
 
-# Events that only one kind of behavior records.
+# Kinds of events that only one type of behavior records.
 _OF_BEHAVIORS = {
     "dock": {EventKind.DOCKS, EventKind.CHARGED},
     "explore": {EventKind.EXPLORED},
@@ -29,7 +29,7 @@ _OF_DOORS = {EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOC
 
 @dataclass(frozen=True)
 class Scene:
-    """The names of a run.
+    """The names of a run that expectations may use, to check them before the run.
 
     Attributes:
         users: Names of users.
@@ -41,10 +41,10 @@ class Scene:
         algorithms: Names of algorithms.
         metrics: Names of metrics.
         batteries: Names of robots that have a battery.
-        cameras: Whom the cameras of each body that has any look at.
-        behaviors: The types of behaviors of each body; None where any may come to it.
-        records: Kinds of events that behaviors of a user's own record.
-        left: How long the run goes on.
+        cameras: For each body with cameras, the names of the bodies that they look at.
+        behaviors: The types of behaviors of each body; "own" stands for a user's own classes.
+        records: Kinds of events that a user's own behaviors record.
+        remaining: Time from now to the end of the run.
     """
 
     users: Collection[str]
@@ -59,22 +59,22 @@ class Scene:
     cameras: Mapping[str, Collection[str]]
     behaviors: Mapping[str, Collection[str]]
     records: Collection[str]
-    left: timedelta
+    remaining: timedelta
 
     @property
     def bodies(self) -> list[str]:
-        """Users and robots."""
+        """Names of users and robots."""
         return [*self.users, *self.robots]
 
     def error(self, message: str) -> ScenarioError:
-        """Return the error that says so."""
+        """Return an error with a message."""
         return ScenarioError(message)
 
     def check_name(self, what: str, name: str, known: Iterable[str], of: object) -> None:
-        """Refuse a name that is none of the known ones.
+        """Refuse an unknown name.
 
         Raises:
-            ScenarioError: It isn't; says which is nearest, and which there are.
+            ScenarioError: The name is unknown; the message has the nearest name, and all of them.
         """
         names = list(dict.fromkeys(known))
         if name not in names:
@@ -84,10 +84,10 @@ class Scene:
             )
 
     def check_body(self, name: str, of: object) -> None:
-        """Refuse what is neither a user nor a robot.
+        """Refuse a name that is neither a user's nor a robot's.
 
         Raises:
-            ScenarioError: It isn't.
+            ScenarioError: The name is unknown.
         """
         self.check_name("user or robot", name, self.bodies, of)
 
@@ -95,37 +95,38 @@ class Scene:
         """Refuse a time that is longer than the run.
 
         Raises:
-            ScenarioError: It is.
+            ScenarioError: The time is longer than what remains of the run.
         """
-        if within is not None and within > self.left:
+        if within is not None and within > self.remaining:
             raise self.error(
                 f"{of}: {format_duration(within)} is beyond the run, which goes on for"
-                f" {format_duration(self.left)}"
+                f" {format_duration(self.remaining)}"
             )
 
     def check_event(self, kind: str, entity: str | None, detail: str | None, of: object) -> None:
         """Refuse an event that can never happen.
 
         Raises:
-            ScenarioError: There is no such kind, or nobody to whom it could happen.
+            ScenarioError: The kind is unknown, or there is no entity to which it could happen.
         """
         if kind == EventKind.SENSOR:
-            raise self.error(f"{of}: what sensors say is no event: write sensor(NAME)")
+            raise self.error(f"{of}: readings of sensors are no events: write sensor(NAME)")
         self.check_name("event", kind, sorted({*KINDS, *self.records}), of)
-        able = list(self._able(kind))
+        candidates = list(self._candidates(kind))
         if entity is not None:
             self.check_name("body or object", entity, [*self.bodies, *self.doors], of)
-        if not able or (entity is not None and entity not in able and able != [""]):
-            whom = "nobody here" if entity is None else f"not {entity}"
+        is_possible = bool(candidates) and (entity in (None, *candidates) or candidates == [""])
+        if not is_possible:
+            exception = "there is none" if entity is None else f"not to {entity}"
             raise self.error(
-                f"{of}: it can never happen: {kind!r} happens to {_whom(kind)}, and {whom}"
-                + (f", but to {', '.join(able)}" if able and able != [""] else "")
+                f"{of}: it can never happen: {kind!r} happens to {_entities_of(kind)}, {exception}"
+                + (f", but to {', '.join(candidates)}" if candidates not in ([], [""]) else "")
             )
         if kind in SIGHTS and detail is not None:
             self.check_name("user or robot", detail, self.bodies, of)
 
-    def _able(self, kind: str) -> Iterable[str]:
-        """Yield those to whom an event can happen; an empty name is the home."""
+    def _candidates(self, kind: str) -> Iterable[str]:
+        """Return the names of the entities an event can happen to; an empty name is the home."""
         if kind in (EventKind.MOVED, EventKind.ROOM_CHANGED):
             return [""]
         if kind in _OF_DOORS:
@@ -144,12 +145,12 @@ class Scene:
         return self.bodies
 
 
-def _whom(kind: str) -> str:
-    """Say to whom an event can happen."""
+def _entities_of(kind: str) -> str:
+    """Describe the entities to which an event can happen."""
     if kind in _OF_DOORS:
         return "doors"
     if kind in SIGHTS:
-        return "who has a camera, and somebody to see"
+        return "robots and users with a camera and somebody to see"
     if kind == EventKind.BATTERY:
         return "robots with a battery"
     if kind == EventKind.ACTIVITY:

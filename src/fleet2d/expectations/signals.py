@@ -1,4 +1,4 @@
-"""Signals: what a run is at each step, in numbers, in words, or merely so or not."""
+"""Signals: what is measured of a run at each step, as numbers, words or truth values."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -10,65 +10,65 @@ from pydantic_core import PydanticCustomError
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import (
     INFINITE,
-    NEXT_TO_NOTHING,
+    TINY,
     Expectation,
-    Known,
+    RunSignals,
     truth,
 )
+from fleet2d.expectations.formatting import argument_text, number_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import F64, Trace
-from fleet2d.expectations.words import argument_text, number_text
 from fleet2d.units import Quantity
 
 
-class Measured:
-    """What is measured during a run; its text says what, and two of one text are the same."""
+class Measurement:
+    """Base of what is measured during a run; signals of the same text are the same signal."""
 
-    def trace(self, known: Known) -> Trace:
-        """Return what it was."""
-        return known.traces[str(self)].since(known.first)
+    def trace(self, run: RunSignals) -> Trace:
+        """Return its values from the first judged step on."""
+        return run.traces[str(self)].since(run.first)
 
     def check(self, scene: Scene) -> None:
-        """Refuse what isn't in a run.
+        """Refuse a signal that this run doesn't have.
 
         Raises:
-            ScenarioError: There is nothing of a name, or it can never be measured.
+            ScenarioError: A name is unknown, or the signal can never be measured.
         """
 
 
 @dataclass(frozen=True, eq=False)
-class Signal(Measured):
+class Signal(Measurement):
     """A number at each step; compare it by `>`, `>=`, `<`, `<=`, `==`, `!=`.
 
-    Where it is missing (an algorithm that has put out nothing so far), no comparison holds.
+    Where it is missing (an algorithm without an output so far), no comparison holds.
     """
 
     unit: ClassVar[str] = ""
     quantity: ClassVar[Quantity | None] = None
 
     def __gt__(self, limit: float | str) -> Expectation:
-        """Return that it is above a limit."""
-        return Comparison(self, ">", _limit(self, limit))
+        """Expect the signal above a limit."""
+        return SignalComparison(self, ">", _limit(self, limit))
 
     def __ge__(self, limit: float | str) -> Expectation:
-        """Return that it is a limit or above it."""
-        return Comparison(self, ">=", _limit(self, limit))
+        """Expect the signal at a limit or above it."""
+        return SignalComparison(self, ">=", _limit(self, limit))
 
     def __lt__(self, limit: float | str) -> Expectation:
-        """Return that it is below a limit."""
-        return Comparison(self, "<", _limit(self, limit))
+        """Expect the signal below a limit."""
+        return SignalComparison(self, "<", _limit(self, limit))
 
     def __le__(self, limit: float | str) -> Expectation:
-        """Return that it is a limit or below it."""
-        return Comparison(self, "<=", _limit(self, limit))
+        """Expect the signal at a limit or below it."""
+        return SignalComparison(self, "<=", _limit(self, limit))
 
     def __eq__(self, limit: object) -> Expectation:  # type: ignore[override]
-        """Return that it is exactly so."""
-        return Comparison(self, "==", _limit(self, limit))
+        """Expect the signal to equal a limit."""
+        return SignalComparison(self, "==", _limit(self, limit))
 
     def __ne__(self, limit: object) -> Expectation:  # type: ignore[override]
-        """Return that it is anything else."""
-        return Comparison(self, "!=", _limit(self, limit))
+        """Expect the signal to differ from a limit."""
+        return SignalComparison(self, "!=", _limit(self, limit))
 
     __hash__ = object.__hash__
 
@@ -85,8 +85,8 @@ def _limit(signal: Signal, limit: object) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Expectation):
-    """That a signal is on one side of a limit; its robustness is how far it is from there."""
+class SignalComparison(Expectation):
+    """That a signal is on one side of a limit; its robustness is the distance from the limit."""
 
     signal: Signal
     sign: str
@@ -96,43 +96,43 @@ class Comparison(Expectation):
 
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """That of the signal, or none in particular."""
+        """The unit of the signal; 1 if it has none."""
         return self.signal.unit or "1"
 
-    def measures(self) -> Iterator[Measured]:
+    def measures(self) -> Iterator[Measurement]:
         """Yield the signal."""
         yield from measured_in(self.signal)
 
     def parts(self) -> Iterator[Expectation]:
-        """Yield what the signal itself is made of."""
+        """Yield the expectations that the signal is made of, if any."""
         yield from getattr(self.signal, "parts", tuple)()
 
     def check(self, scene: Scene) -> None:
-        """Refuse a signal that isn't there."""
+        """Refuse a signal that this run doesn't have."""
         self.signal.check(scene)
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return how far the signal is from the limit, on the right side of it."""
-        return self.signal.trace(known).map(self._margin)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the distance of the signal from the limit, below 0 on the wrong side."""
+        return self.signal.trace(run).map(self._margin)
 
     def _margin(self, value: F64) -> F64:
-        above = value - self.limit
+        excess = value - self.limit
         if self.sign in ("==", "!="):
-            margin = -np.abs(above) if self.sign == "==" else np.abs(above)
+            margin = -np.abs(excess) if self.sign == "==" else np.abs(excess)
         else:
-            margin = above if self.sign.startswith(">") else -above
-        on_limit = NEXT_TO_NOTHING if self.sign.endswith("=") and self.sign != "!=" else 0.0
-        margin = np.where(margin == 0, on_limit or -NEXT_TO_NOTHING, margin)
+            margin = excess if self.sign.startswith(">") else -excess
+        on_limit = TINY if self.sign.endswith("=") and self.sign != "!=" else 0.0
+        margin = np.where(margin == 0, on_limit or -TINY, margin)
         return np.where(np.isnan(margin), -INFINITE, margin)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return f"{self.signal} {self.sign} {number_text(self.limit, self.signal.unit)}"
 
 
-def measured_in(signal: Measured) -> Iterator[Measured]:
-    """Yield what has to be measured for a signal: itself, or what it counts."""
-    measures: Callable[[], Iterator[Measured]] | None = getattr(signal, "measures", None)
+def measured_in(signal: Measurement) -> Iterator[Measurement]:
+    """Yield the signals to measure for a signal: itself, or for a count those of its part."""
+    measures: Callable[[], Iterator[Measurement]] | None = getattr(signal, "measures", None)
     if measures is None:
         yield signal
     else:
@@ -140,72 +140,72 @@ def measured_in(signal: Measured) -> Iterator[Measured]:
 
 
 @dataclass(frozen=True, eq=False)
-class WordSignal(Measured):
+class WordSignal(Measurement):
     """A word at each step, such as a room; compare it by `==`, `!=` and `is_in`."""
 
     def __eq__(self, word: object) -> Expectation:  # type: ignore[override]
-        """Return that it is a word."""
+        """Expect the signal to be a word."""
         return self.is_in(word)
 
     def __ne__(self, word: object) -> Expectation:  # type: ignore[override]
-        """Return that it is another word, or none."""
+        """Expect the signal to be another word, or none."""
         return ~self.is_in(word)
 
     __hash__ = object.__hash__
 
     def is_in(self, *words: object) -> Expectation:
-        """Return that it is one of several words."""
+        """Expect the signal to be one of several words."""
         for word in words:
             if not isinstance(word, str):
                 raise InputError(f"{self} is compared with {word!r}: a name is wanted")
-        return Matches(self, tuple(map(str, words)))
+        return WordComparison(self, tuple(map(str, words)))
 
     def check_word(self, word: str, scene: Scene) -> None:
-        """Refuse a word that it can never be."""
+        """Refuse a word that the signal can never have."""
 
 
 @dataclass(frozen=True, eq=False)
-class Matches(Expectation):
-    """That a signal of words is one of some."""
+class WordComparison(Expectation):
+    """That a signal has one of several words."""
 
     signal: WordSignal
     words: tuple[str, ...]
 
     is_call = False
 
-    def measures(self) -> Iterator[Measured]:
+    def measures(self) -> Iterator[Measurement]:
         """Yield the signal."""
         yield self.signal
 
     def check(self, scene: Scene) -> None:
-        """Refuse a signal or a word that isn't there."""
+        """Refuse a signal or a word that this run doesn't have."""
         self.signal.check(scene)
         for word in self.words:
             self.signal.check_word(word, scene)
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return whether it is: infinitely so, or not at all."""
-        answers = known.words[str(self.signal)]
-        codes = [float(code) for code, words in answers.items() if words & set(self.words)]
-        return self.signal.trace(known).map(
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return infinity where the signal has one of the words, minus infinity elsewhere."""
+        words_by_code = run.words[str(self.signal)]
+        codes = [float(code) for code, words in words_by_code.items() if words & set(self.words)]
+        return self.signal.trace(run).map(
             lambda value: truth(np.isin(value, codes).astype(np.float64))
         )
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         if len(self.words) == 1:
             return f'{self.signal} == "{self.words[0]}"'
         return f"{self.signal} in [{', '.join(map(argument_text, self.words))}]"
 
 
 @dataclass(frozen=True, eq=False)
-class State(Measured, Expectation):
-    """Something that is so at a step, or not."""
+class Condition(Measurement, Expectation):
+    """A signal that is true or false at each step; it is an expectation itself."""
 
-    def measures(self) -> Iterator[Measured]:
+    def measures(self) -> Iterator[Measurement]:
         """Yield itself."""
         yield self
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return whether it is so: infinitely, or not at all."""
-        return self.trace(known).map(truth)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return infinity where it is true, minus infinity where it is false."""
+        return self.trace(run).map(truth)

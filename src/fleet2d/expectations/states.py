@@ -1,4 +1,4 @@
-"""Signals that are words, or merely so or not: rooms, activities, sights, doors, events, times."""
+"""Signals with words (rooms, activities) or truth values (sights, doors, events, times of day)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,17 +7,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from fleet2d.expectations.expectation import Known
+from fleet2d.expectations.expectation import RunSignals
+from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.signals import Measured, State, WordSignal
+from fleet2d.expectations.signals import Condition, Measurement, WordSignal
 from fleet2d.expectations.trace import I64, Trace
-from fleet2d.expectations.words import call_text
 from fleet2d.problems import did_you_mean
 
 
 @dataclass(frozen=True, eq=False)
-class RoomOf(WordSignal):
-    """The room that a body is in, by its name or its type; none between two, or away."""
+class RoomSignal(WordSignal):
+    """The room that a body is in: its name or its type; no word between two rooms, or away."""
 
     body: str
 
@@ -32,13 +32,13 @@ class RoomOf(WordSignal):
         scene.check_name("room", word, scene.rooms, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("room", self.body)
 
 
 @dataclass(frozen=True, eq=False)
-class ActivityOf(WordSignal):
-    """What a user does, as the events `activity` say; none before the first of them."""
+class ActivitySignal(WordSignal):
+    """A user's activity, from the events `activity`; no word before the first of them."""
 
     user: str
 
@@ -49,43 +49,47 @@ class ActivityOf(WordSignal):
         scene.check_name("user", self.user, scene.users, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("activity", self.user)
 
 
 @dataclass(frozen=True, eq=False)
-class Moving(State):
-    """That a body is elsewhere than at the step before."""
+class BodyCondition(Condition):
+    """Base of conditions about one body alone."""
 
     body: str
+
+    word: ClassVar[str]
 
     def check(self, scene: Scene) -> None:
         """Refuse an unknown body."""
         scene.check_body(self.body, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
-        return call_text("moving", self.body)
+        """Return the text that `parse_expectation` reads back."""
+        return call_text(self.word, self.body)
+
+
+class IsMoving(BodyCondition):
+    """Whether a body's position differs from that at the step before."""
+
+    word = "moving"
+
+
+class IsAway(BodyCondition):
+    """Whether a body is away from home."""
+
+    word = "away"
 
 
 @dataclass(frozen=True, eq=False)
-class Away(State):
-    """That a body is not at home."""
+class CameraCondition(Condition):
+    """Base of conditions about a camera.
 
-    body: str
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown body."""
-        scene.check_body(self.body, self)
-
-    def __str__(self) -> str:
-        """Write it as it is read."""
-        return call_text("away", self.body)
-
-
-@dataclass(frozen=True, eq=False)
-class Sight(State):
-    """Something between a camera's owner and somebody whom it looks at."""
+    Attributes:
+        body: Name of the body that the camera may see.
+        by: Name of the robot or user that the camera belongs to.
+    """
 
     body: str
     by: str
@@ -93,7 +97,7 @@ class Sight(State):
     word: ClassVar[str]
 
     def check(self, scene: Scene) -> None:
-        """Refuse who has no camera, and whom it never looks at."""
+        """Refuse an owner without a camera, and a body that the camera never looks at."""
         scene.check_name("robot or user with a camera", self.by, scene.cameras, self)
         if self.body not in scene.cameras[self.by]:
             near = did_you_mean(self.body, scene.cameras[self.by])
@@ -103,36 +107,36 @@ class Sight(State):
             )
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text(self.word, self.body, by=self.by)
 
 
-class Seen(Sight):
-    """That a camera's owner counts somebody as seen: from `user_seen` until `user_lost`."""
+class IsSeen(CameraCondition):
+    """Whether a camera's owner counts a body as seen: from `user_seen` until `user_lost`."""
 
     word = "seen"
 
 
-class InView(Sight):
-    """That somebody really is in view of a camera, noticed or not."""
+class IsInView(CameraCondition):
+    """Whether a body truly is in view of a camera, noticed or not."""
 
     word = "in_view"
 
 
-class Perceived(Sight):
-    """That a robot perceives somebody, rightly or wrongly, in the row of a step."""
+class IsPerceived(CameraCondition):
+    """Whether a robot has an observation of a user at a step, correct or not."""
 
     word = "perceived"
 
     def check(self, scene: Scene) -> None:
-        """Refuse users, whose perception isn't recorded."""
+        """Refuse users as owners: their perception isn't recorded."""
         scene.check_name("robot", self.by, scene.robots, self)
         super().check(scene)
 
 
 @dataclass(frozen=True, eq=False)
-class DoorOpen(State):
-    """That a door is open."""
+class IsOpen(Condition):
+    """Whether a door is open."""
 
     name: str
 
@@ -141,13 +145,13 @@ class DoorOpen(State):
         scene.check_name("door", self.name, scene.doors, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("door", self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class SensorOn(State):
-    """That a sensor is on; of a door's contact, that it is open."""
+class IsOn(Condition):
+    """Whether a sensor is on; for the contact sensor of a door, whether the door is open."""
 
     name: str
 
@@ -156,18 +160,18 @@ class SensorOn(State):
         scene.check_name("sensor", self.name, scene.sensors, self)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("sensor", self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class Happens(State):
-    """That an event happens at a step.
+class EventHappens(Condition):
+    """Whether an event happens at a step.
 
     Attributes:
-        kind: Of the event, as the table of events has it.
-        entity: To whom it happens; None: to anybody.
-        detail: What else it says; None: anything.
+        kind: Kind of the event, as in the table of events.
+        entity: Name of the entity to which it happens; None: any.
+        detail: Detail of the event; None: any.
     """
 
     kind: str
@@ -178,9 +182,9 @@ class Happens(State):
         """Refuse an event that can never happen."""
         scene.check_event(self.kind, self.entity, self.detail, self)
 
-    def occasions(self, known: Known) -> I64:
-        """Return the steps at which it happens, each as often as it does."""
-        trace = self.trace(known)
+    def occasions(self, run: RunSignals) -> I64:
+        """Return the steps at which it happens, repeated for several events at one step."""
+        trace = self.trace(run)
         end = np.append(trace.start[1:], trace.end)
         lengths = np.where(trace.value > 0, end - trace.start, 0)
         offset = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
@@ -188,19 +192,19 @@ class Happens(State):
         return np.repeat(steps, np.repeat(trace.value.clip(0).astype(np.int64), lengths))
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("events", self.kind, self.entity, detail=self.detail)
 
 
 @dataclass(frozen=True, eq=False)
-class During(State):
-    """That it is a time of day, on some days of the week.
+class IsDuring(Condition):
+    """Whether it is a certain time of day, on certain days of the week.
 
     Attributes:
-        begin: Time of day at which it begins, since midnight.
-        end: Time of day before which it ends; the next day's if that is earlier than `begin`.
+        begin: Time of day at which it begins, as time since midnight.
+        end: Time of day before which it ends; on the next day if that is earlier than `begin`.
         days: Days of the week on which it begins, 0 is Monday.
-        text: What was written.
+        text: The hours and the days as they were written.
     """
 
     begin: timedelta
@@ -208,30 +212,30 @@ class During(State):
     days: frozenset[int]
     text: tuple[str, str | None]
 
-    def measures(self) -> Iterator[Measured]:
-        """Yield nothing: the clock tells."""
+    def measures(self) -> Iterator[Measurement]:
+        """Yield nothing: it follows from the clock."""
         yield from ()
 
-    def trace(self, known: Known) -> Trace:
-        """Return when it is."""
-        clock, day = known.clock, timedelta(days=1)
-        midnight = clock.time(known.first).replace(hour=0, minute=0, second=0, microsecond=0) - day
-        edges, value = [known.first], [0.0]
-        while midnight < clock.time(known.end):
+    def trace(self, run: RunSignals) -> Trace:
+        """Return 1 where the time is within these hours, 0 elsewhere."""
+        clock, day = run.clock, timedelta(days=1)
+        midnight = clock.time(run.first).replace(hour=0, minute=0, second=0, microsecond=0) - day
+        starts, values = [run.first], [0.0]
+        while midnight < clock.time(run.end):
             if midnight.weekday() in self.days:
                 length = (
                     self.end - self.begin if self.end > self.begin else self.end + day - self.begin
                 )
-                for moment, on in ((self.begin, 1.0), (self.begin + length, 0.0)):
-                    step = clock.step_at_or_after(clock.elapsed(midnight + moment))
-                    if step <= edges[-1]:
-                        value[-1] = on
-                    elif step < known.end:
-                        edges.append(step)
-                        value.append(on)
+                for offset, is_within in ((self.begin, 1.0), (self.begin + length, 0.0)):
+                    step = clock.step_at_or_after(clock.elapsed(midnight + offset))
+                    if step <= starts[-1]:
+                        values[-1] = is_within
+                    elif step < run.end:
+                        starts.append(step)
+                        values.append(is_within)
             midnight += day
-        return Trace(np.array(edges, np.int64), np.array(value), known.end)
+        return Trace(np.array(starts, np.int64), np.array(values), run.end)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("during", self.text[0], days=self.text[1])

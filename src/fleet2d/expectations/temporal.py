@@ -1,4 +1,4 @@
-"""When something must hold: always, never, eventually, at the end, until, after an occasion."""
+"""When a condition must hold: always, never, eventually, at the end, until, after a trigger."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,43 +9,43 @@ import numpy as np
 from fleet2d.expectations.expectation import (
     INFINITE,
     Expectation,
-    Known,
-    OfOne,
+    RunSignals,
+    UnaryExpectation,
     common_unit,
 )
+from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import I64, Trace, combine, constant, pulses, spells
 from fleet2d.expectations.violation import Violation, violations_of
-from fleet2d.expectations.words import call_text
 
 
 @dataclass(frozen=True, eq=False)
 class Temporal(Expectation):
-    """What says when something must hold, so that a run can be judged by it."""
+    """Base of expectations that say when something must hold, so that a run can be judged."""
 
     @property
     def is_judged(self) -> bool:
-        """It does."""
+        """True: it says when."""
         return True
 
-    def violations(self, known: Known) -> list[Violation]:
-        """Return when it is violated, from the first step on: the longest stretches, in order."""
-        value = self.robustness(known, True).at(known.first)
-        last = self.last(known)
-        return [] if value > 0 else [Violation(known.first, last, value, last)]
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return the violations from the first judged step on: maximal stretches, in order."""
+        value = self.robustness(run, True).at(run.first)
+        last = self.last(run)
+        return [] if value > 0 else [Violation(run.first, last, value, last)]
 
-    def last(self, known: Known) -> int:
-        """Return the last step that it is about, as far as is known."""
-        return known.end - 1
+    def last(self, run: RunSignals) -> int:
+        """Return the last judged step that is known."""
+        return run.end - 1
 
-    def slack(self, known: Known) -> int | None:
-        """Return how many steps were left when it came about, below 0 if late; None: no limit."""
+    def slack(self, run: RunSignals) -> int | None:
+        """Return the steps to spare when it was fulfilled, below 0 if late; None: no limit."""
         return None
 
 
 @dataclass(frozen=True, eq=False)
-class Window(Temporal, OfOne):
-    """Something about the time from a step on, up to so long after it, or to the run's end."""
+class WindowedExpectation(Temporal, UnaryExpectation):
+    """Base of expectations about the time from a step on: for `within`, or to the run's end."""
 
     within: timedelta | None = None
 
@@ -54,95 +54,95 @@ class Window(Temporal, OfOne):
         scene.check_within(self.within, self)
         super().check(scene)
 
-    def last(self, known: Known) -> int:
-        """Return the last step of the time, as far as is known."""
-        steps = _steps(self.within, known)
-        return min(known.first + steps, known.end - 1)
+    def last(self, run: RunSignals) -> int:
+        """Return the last step of the window that is known."""
+        steps = _steps(self.within, run)
+        return min(run.first + steps, run.end - 1)
 
 
-class Always(Window):
-    """That something holds at every step."""
+class Always(WindowedExpectation):
+    """That `part` holds at every step."""
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the least that is yet to come."""
-        bounded, steps = self.within is not None, _steps(self.within, known)
-        after = known.beyond(INFINITE, high=high, bounded=bounded)
-        return self.part.robustness(known, high).sliding_min(0, steps, INFINITE, after)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the least robustness of the part over the window from each step on."""
+        bounded, steps = self.within is not None, _steps(self.within, run)
+        after = run.beyond(INFINITE, high=high, bounded=bounded)
+        return self.part.robustness(run, high).sliding_min(0, steps, INFINITE, after)
 
-    def violations(self, known: Known) -> list[Violation]:
-        """Return when it doesn't hold."""
-        part = self.part.robustness(known, True)
-        return violations_of(part.until(self.last(known) + 1))
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return the stretches in which the part doesn't hold."""
+        part = self.part.robustness(run, True)
+        return violations_of(part.until(self.last(run) + 1))
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("always", self.part, within=self.within)
 
 
-class Never(Window):
-    """That something holds at no step."""
+class Never(WindowedExpectation):
+    """That `part` holds at no step."""
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the opposite of the most that is yet to come."""
-        return Always(~self.part, self.within).robustness(known, high)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return minus the greatest robustness of the part over the window from each step on."""
+        return Always(~self.part, self.within).robustness(run, high)
 
-    def violations(self, known: Known) -> list[Violation]:
-        """Return when it holds."""
-        return Always(~self.part, self.within).violations(known)
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return the stretches in which the part holds."""
+        return Always(~self.part, self.within).violations(run)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("never", self.part, within=self.within)
 
 
-class Eventually(Window):
-    """That something holds at some step."""
+class Eventually(WindowedExpectation):
+    """That `part` holds at some step."""
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the most that is yet to come."""
-        bounded, steps = self.within is not None, _steps(self.within, known)
-        after = known.beyond(-INFINITE, high=high, bounded=bounded)
-        return self.part.robustness(known, high).sliding_max(0, steps, -INFINITE, after)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the greatest robustness of the part over the window from each step on."""
+        bounded, steps = self.within is not None, _steps(self.within, run)
+        after = run.beyond(-INFINITE, high=high, bounded=bounded)
+        return self.part.robustness(run, high).sliding_max(0, steps, -INFINITE, after)
 
-    def slack(self, known: Known) -> int | None:
-        """Return how many steps before its time it came about."""
+    def slack(self, run: RunSignals) -> int | None:
+        """Return how many steps before the time limit it was fulfilled."""
         if self.within is None:
             return None
-        return _slack(self.spans(known), known.first, known.steps_in(self.within), known)
+        return _slack(self.spans(run), run.first, run.steps_in(self.within), run)
 
-    def spans(self, known: Known) -> I64:
-        """Return the stretches in which it has come about: first and last step, (n, 2)."""
-        return np.array(spells(self.part.robustness(known, False)), np.int64).reshape(-1, 2)
+    def spans(self, run: RunSignals) -> I64:
+        """Return the stretches in which the part holds: int64 (n, 2), first and last step."""
+        return np.array(spells(self.part.robustness(run, False)), np.int64).reshape(-1, 2)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("eventually", self.part, within=self.within)
 
 
 @dataclass(frozen=True, eq=False)
-class AtEnd(Temporal, OfOne):
-    """That something holds at the last step of the run."""
+class AtEnd(Temporal, UnaryExpectation):
+    """That `part` holds at the last step of the run."""
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return what it is at the last step."""
-        value = self.part.robustness(known, high).at(known.end - 1)
-        if not known.ended:
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the robustness of the part at the last step."""
+        value = self.part.robustness(run, high).at(run.end - 1)
+        if not run.ended:
             value = INFINITE if high else -INFINITE
-        return constant(value, known.first, known.end)
+        return constant(value, run.first, run.end)
 
-    def violations(self, known: Known) -> list[Violation]:
-        """Return the last step, if it doesn't hold there."""
-        value = self.robustness(known, True).at(known.first)
-        return [] if value > 0 else [Violation(known.end - 1, known.end - 1, value, known.end - 1)]
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return the last step, if the part doesn't hold there."""
+        value = self.robustness(run, True).at(run.first)
+        return [] if value > 0 else [Violation(run.end - 1, run.end - 1, value, run.end - 1)]
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("at_end", self.part)
 
 
 @dataclass(frozen=True, eq=False)
 class Until(Temporal):
-    """That something holds at every step until something else does, which it must."""
+    """That `hold` holds at every step until `goal` holds, and that `goal` does hold."""
 
     hold: Expectation
     goal: Expectation
@@ -154,7 +154,7 @@ class Until(Temporal):
         return common_unit(self.hold, self.goal)
 
     def parts(self) -> Iterator[Expectation]:
-        """Yield what holds, and until when."""
+        """Yield `hold` and `goal`."""
         yield self.hold
         yield self.goal
 
@@ -163,38 +163,36 @@ class Until(Temporal):
         scene.check_within(self.within, self)
         super().check(scene)
 
-    def last(self, known: Known) -> int:
-        """Return the last step of the time, as far as is known."""
-        return min(known.first + _steps(self.within, known), known.end - 1)
+    def last(self, run: RunSignals) -> int:
+        """Return the last step of the time limit that is known."""
+        return min(run.first + _steps(self.within, run), run.end - 1)
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return the best way to wait for the goal: its worst moment."""
-        hold, goal = self.hold.robustness(known, high), self.goal.robustness(known, high)
-        after = known.beyond(-INFINITE, high=high, bounded=self.within is not None)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the maximum over goal steps of the least robustness up to that step."""
+        hold, goal = self.hold.robustness(run, high), self.goal.robustness(run, high)
+        after = run.beyond(-INFINITE, high=high, bounded=self.within is not None)
         whole = hold.until_goal(goal, after)
         if self.within is None:
             return whole
-        return combine(
-            np.minimum, whole, Eventually(self.goal, self.within).robustness(known, high)
-        )
+        return combine(np.minimum, whole, Eventually(self.goal, self.within).robustness(run, high))
 
-    def violations(self, known: Known) -> list[Violation]:
-        """Return the step at which it stopped to hold too early, or by which the goal was due."""
-        value = self.robustness(known, True).at(known.first)
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return one violation, up to where `hold` failed or the goal was due."""
+        value = self.robustness(run, True).at(run.first)
         if value > 0:
             return []
-        broken = spells(self.hold.robustness(known, True).map(np.negative))
-        last = min([self.last(known), *(first for first, _ in broken)])
-        return [Violation(known.first, last, value, last)]
+        broken = spells(self.hold.robustness(run, True).map(np.negative))
+        last = min([self.last(run), *(first for first, _ in broken)])
+        return [Violation(run.first, last, value, last)]
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("until", self.hold, self.goal, within=self.within)
 
 
 @dataclass(frozen=True, eq=False)
 class After(Temporal):
-    """That each time something begins, something else holds then, or comes about in time."""
+    """That each time `trigger` begins, `part` holds at once, or at some step in time."""
 
     trigger: Expectation
     part: Expectation
@@ -202,16 +200,16 @@ class After(Temporal):
 
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """That of what must hold."""
+        """The unit of `part`."""
         return self.part.unit
 
     @property
     def consequence(self) -> Expectation:
-        """What must hold when the trigger begins."""
+        """The expectation that must hold at each step at which the trigger begins."""
         return self.part if self.within is None else Eventually(self.part, self.within)
 
     def parts(self) -> Iterator[Expectation]:
-        """Yield the trigger, and what must hold."""
+        """Yield `trigger` and `part`."""
         yield self.trigger
         yield self.part
 
@@ -220,70 +218,70 @@ class After(Temporal):
         scene.check_within(self.within, self)
         super().check(scene)
 
-    def triggered(self, known: Known) -> I64:
-        """Return when the trigger begins."""
-        return np.unique(self.trigger.occasions(known))
+    def triggered(self, run: RunSignals) -> I64:
+        """Return the steps at which the trigger begins: int64 (n,), ascending."""
+        return np.unique(self.trigger.occasions(run))
 
-    def robustness(self, known: Known, high: bool) -> Trace:
-        """Return what it is on the worst occasion yet to come."""
-        value = self._on_occasions(known, high)
-        after = known.beyond(INFINITE, high=high, bounded=False)
-        return value.sliding_min(0, known.end - known.first, INFINITE, after)
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the least robustness over the occasions from each step on."""
+        value = self._on_occasions(run, high)
+        after = run.beyond(INFINITE, high=high, bounded=False)
+        return value.sliding_min(0, run.end - run.first, INFINITE, after)
 
-    def _on_occasions(self, known: Known, high: bool) -> Trace:
-        """Return what it is on each occasion, and infinite in between."""
-        is_occasion = pulses(self.triggered(known), known.first, known.end)
-        value = self.consequence.robustness(known, high)
+    def _on_occasions(self, run: RunSignals, high: bool) -> Trace:
+        """Return the robustness at each occasion, and infinity between occasions."""
+        is_occasion = pulses(self.triggered(run), run.first, run.end)
+        value = self.consequence.robustness(run, high)
         return combine(lambda on, v: np.where(on > 0, v, INFINITE), is_occasion, value)
 
-    def violations(self, known: Known) -> list[Violation]:
-        """Return from when to when it was waited for in vain, or not so, occasion by occasion."""
-        value = self._on_occasions(known, True)
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return the violations of each missed occasion, from the trigger to the deadline."""
+        value = self._on_occasions(run, True)
         missed = value.start[value.value < 0]
         ends = np.append(value.start[1:], value.end)[value.value < 0]
         steps = [
             s for a, b in zip(missed.tolist(), ends.tolist(), strict=True) for s in range(a, b)
         ]
-        found = []
+        violations = []
         for step in steps:
-            later = _from(known, step)
-            inner = self.consequence
-            if isinstance(inner, Eventually) or not isinstance(inner, Temporal):
-                last = inner.last(later) if isinstance(inner, Eventually) else step
-                found.append(Violation(step, last, value.at(step), last))
+            rest = _from(run, step)
+            expected = self.consequence
+            if isinstance(expected, Eventually) or not isinstance(expected, Temporal):
+                last = expected.last(rest) if isinstance(expected, Eventually) else step
+                violations.append(Violation(step, last, value.at(step), last))
             else:
-                found += inner.violations(later)
-        return found
+                violations += expected.violations(rest)
+        return violations
 
-    def slack(self, known: Known) -> int | None:
-        """Return how many steps before its time it came about, on the worst occasion."""
-        inner = self.consequence
-        if not isinstance(inner, Eventually) or inner.within is None:
+    def slack(self, run: RunSignals) -> int | None:
+        """Return how many steps before the time limit it was fulfilled, on the worst occasion."""
+        expected = self.consequence
+        if not isinstance(expected, Eventually) or expected.within is None:
             return None
-        came, steps = inner.spans(known), known.steps_in(inner.within)
-        slacks = (_slack(came, at, steps, known) for at in self.triggered(known).tolist())
+        spans, steps = expected.spans(run), run.steps_in(expected.within)
+        slacks = (_slack(spans, at, steps, run) for at in self.triggered(run).tolist())
         return min((slack for slack in slacks if slack is not None), default=None)
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Return the text that `parse_expectation` reads back."""
         return call_text("after", self.trigger, self.part, within=self.within)
 
 
-def _steps(within: timedelta | None, known: Known) -> int:
-    return known.end - known.first if within is None else known.steps_in(within)
+def _steps(within: timedelta | None, run: RunSignals) -> int:
+    return run.end - run.first if within is None else run.steps_in(within)
 
 
-def _slack(spans: I64, first: int, steps: int, known: Known) -> int | None:
-    """Return how many steps are left of the time when the first of some spans has come.
+def _slack(spans: I64, first: int, steps: int, run: RunSignals) -> int | None:
+    """Return how many steps before the deadline the first of some spans begins.
 
-    None as long as it may still come in time.
+    None while it may still begin in time.
     """
-    at = int(np.searchsorted(spans[:, 1], first))
-    if at == len(spans) and first + steps >= known.end:
+    index = int(np.searchsorted(spans[:, 1], first))
+    if index == len(spans) and first + steps >= run.end:
         return None
-    came = max(int(spans[at, 0]), first) if at < len(spans) else known.end
-    return first + steps - came
+    begin = max(int(spans[index, 0]), first) if index < len(spans) else run.end
+    return first + steps - begin
 
 
-def _from(known: Known, step: int) -> Known:
-    return Known(known.traces, known.words, step, known.end, known.ended, known.clock)
+def _from(run: RunSignals, step: int) -> RunSignals:
+    return RunSignals(run.traces, run.words, step, run.end, run.ended, run.clock)

@@ -1,4 +1,4 @@
-"""Traces: what a signal is at each step, as stretches of equal value."""
+"""Traces: the value of a signal at each step, stored as stretches of equal value."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -16,9 +16,9 @@ class Trace(NamedTuple):
     """A signal over the steps from `start[0]` to `end` - 1.
 
     Attributes:
-        start: int64 (n,), ascending: where its stretches begin.
-        value: float64 (n,), what it is from there on; neighbours differ.
-        end: The step before which the last stretch ends.
+        start: int64 (n,), ascending: the first step of each stretch.
+        value: float64 (n,), the value over each stretch; neighbours differ.
+        end: One past the last step of the last stretch.
     """
 
     start: I64
@@ -31,52 +31,52 @@ class Trace(NamedTuple):
         return int(self.start[0])
 
     def at(self, step: int) -> float:
-        """Return what it is at a step."""
+        """Return the value at a step."""
         return float(self.value[np.searchsorted(self.start, step, side="right") - 1])
 
     def since(self, first: int) -> "Trace":
-        """Return the same from a later step on."""
+        """Return the trace from the step `first` on."""
         if first <= self.first:
             return self
-        kept = int(np.searchsorted(self.start, first, side="right")) - 1
-        start = self.start[kept:].copy()
+        index = int(np.searchsorted(self.start, first, side="right")) - 1
+        start = self.start[index:].copy()
         start[0] = first
-        return Trace(start, self.value[kept:], self.end)
+        return Trace(start, self.value[index:], self.end)
 
     def until(self, end: int) -> "Trace":
-        """Return the same up to an earlier end."""
+        """Return the trace up to before the step `end`."""
         if end >= self.end:
             return self
-        kept = int(np.searchsorted(self.start, end))
-        return Trace(self.start[:kept], self.value[:kept], end)
+        count = int(np.searchsorted(self.start, end))
+        return Trace(self.start[:count], self.value[:count], end)
 
     def map(self, function: Callable[[F64], F64]) -> "Trace":
-        """Return a function of it, step by step."""
+        """Return the trace of `function(value)` at each step."""
         return shortest(self.start, function(self.value), self.end)
 
     def sliding_max(self, low: int, high: int, before: float, after: float) -> "Trace":
-        """Return its greatest value from `low` to `high` steps after each step.
+        """Return the greatest value from `low` to `high` steps after each step.
 
         Args:
-            low: First step of the window, counted from the step asked about.
-            high: Last step of the window.
-            before: What it counts as before its first step.
-            after: What it counts as from its end on.
+            low: First step of the window, relative to each step.
+            high: Last step of the window, relative to each step.
+            before: Value that is assumed before the first step.
+            after: Value that is assumed from the end on.
         """
-        found = signals.sliding_max(self.start, self.value, self.end, low, high, before, after)
-        return Trace(*found, self.end)
+        maxima = signals.sliding_max(self.start, self.value, self.end, low, high, before, after)
+        return Trace(*maxima, self.end)
 
     def sliding_min(self, low: int, high: int, before: float, after: float) -> "Trace":
-        """Return its least value from `low` to `high` steps after each step; as `sliding_max`."""
+        """Return the least value from `low` to `high` steps after each step; see `sliding_max`."""
         negative = Trace(self.start, -self.value, self.end)
         return negative.sliding_max(low, high, -before, -after).map(np.negative)
 
     def until_goal(self, goal: "Trace", after: float) -> "Trace":
-        """Return how well it holds until another signal does, over the same steps.
+        """Return the robustness of "this holds until `goal` holds" from each step on.
 
         Args:
-            goal: The other signal.
-            after: What comes after the end of both.
+            goal: A trace over the same steps.
+            after: Value that is assumed from the end of both on.
         """
         start = np.union1d(self.start, goal.start)
         hold, reached = (
@@ -86,20 +86,24 @@ class Trace(NamedTuple):
 
 
 def constant(value: float, first: int, end: int) -> Trace:
-    """Return a signal that never changes."""
+    """Return a trace that never changes."""
     return Trace(np.array([first], np.int64), np.array([value]), end)
 
 
 def shortest(start: I64, value: F64, end: int) -> Trace:
-    """Return a signal with stretches of equal value joined; one that is missing equals itself."""
+    """Return a trace with neighbouring stretches of equal value joined; NaN equals NaN."""
     missing = np.isnan(value)
     differs = (value[1:] != value[:-1]) & ~(missing[1:] & missing[:-1])
-    kept = np.append(True, differs)
-    return Trace(start, value, end) if kept.all() else Trace(start[kept], value[kept], end)
+    differs_from_last = np.append(True, differs)
+    return (
+        Trace(start, value, end)
+        if differs_from_last.all()
+        else Trace(start[differs_from_last], value[differs_from_last], end)
+    )
 
 
 def combine(function: Callable[..., F64], *traces: Trace) -> Trace:
-    """Return a function of several signals over the same steps, step by step.
+    """Return the trace of a function of several signals over the same steps.
 
     Example:
         >>> one, two = constant(1.0, 0, 9), constant(4.0, 0, 9)
@@ -114,7 +118,7 @@ def combine(function: Callable[..., F64], *traces: Trace) -> Trace:
 
 
 def joined(parts: Sequence[Trace]) -> Trace:
-    """Return signals that follow each other as one."""
+    """Return traces that follow each other in time as one."""
     if len(parts) == 1:
         return parts[0]
     start = np.concatenate([part.start for part in parts])
@@ -122,7 +126,7 @@ def joined(parts: Sequence[Trace]) -> Trace:
 
 
 def pulses(steps: I64, first: int, end: int) -> Trace:
-    """Return how often a step is among some steps, which needn't be in order.
+    """Return how often each step is among `steps`, which needn't be in order.
 
     Example:
         >>> pulses(np.array([3, 3, 5]), 0, 9).value.tolist()
@@ -132,7 +136,7 @@ def pulses(steps: I64, first: int, end: int) -> Trace:
     at, count = np.unique(steps, return_counts=True)
     start = np.concatenate([[first], at, at + 1])
     value = np.concatenate([[0.0], count, np.zeros(len(at))])
-    # Of entries for one step the one that says how often counts: it sorts behind the zeros.
+    # A step may have both a count and the zero after its neighbour: the count sorts last and stays.
     order = np.lexsort((value, start))
     start, value = start[order], value[order]
     last = np.append(start[1:] != start[:-1], True) & (start < end)
@@ -140,7 +144,7 @@ def pulses(steps: I64, first: int, end: int) -> Trace:
 
 
 def spells(trace: Trace) -> list[tuple[int, int]]:
-    """Return the longest stretches in which a signal is above 0, as first and last step."""
+    """Return the maximal stretches in which a signal is above 0, as first and last step."""
     above = np.concatenate([[False], trace.value > 0, [False]])
     edges = np.flatnonzero(above[1:] != above[:-1])
     steps = np.append(trace.start, trace.end)[edges]

@@ -1,4 +1,4 @@
-"""Verdicts: whether an expectation held, by how much, and when it was violated."""
+"""Verdicts: whether an expectation holds, by how much, and when it was violated."""
 
 import math
 from collections.abc import Mapping
@@ -8,33 +8,33 @@ from typing import Any, Protocol
 
 from fleet2d.clock import Clock
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import NEXT_TO_NOTHING, And, Expectation, Known
+from fleet2d.expectations.expectation import TINY, And, Expectation, RunSignals
+from fleet2d.expectations.formatting import number_text
 from fleet2d.expectations.temporal import After, Temporal
 from fleet2d.expectations.violation import Violation
-from fleet2d.expectations.words import number_text
 from fleet2d.units import format_duration
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of an expectation.
+    """The result of judging an expectation.
 
     Attributes:
-        name: What the expectation is called.
+        name: Name of the expectation.
         expectation: Its text.
-        holds: Whether it holds; of a run under way, whether it isn't violated yet.
-        decided: Whether nothing that may still come changes that.
-        robustness: By how much it holds (above 0) or fails (below 0) [unit]; infinite for what is
-            merely so or not.
-        unit: Of the robustness: `m`, `m/s`, `share`, `times`, `1` for other numbers, `mixed`,
-            and empty for what is merely so or not.
-        slack_s: With a time limit: by how much it came about in time, on the worst occasion [s];
-            below 0: too late, or by so much at least if it never did. None without one.
-        occasions: How often what it waits for (`after`) happened; None where nothing is waited for.
-        violations: When it is violated, in order.
-        first: The first step that it is about.
-        end: The step before which all is taken in.
-        clock: Of the run.
+        holds: Whether it holds; during a run, whether it isn't violated yet.
+        decided: Whether the rest of the run can't change `holds`.
+        robustness: Margin by which it holds (above 0) or fails (below 0) [unit]; infinite for
+            conditions that are only true or false.
+        unit: Unit of the robustness: `m`, `m/s`, `share`, `times`, `1` for other numbers, `mixed`,
+            and empty for conditions that are only true or false.
+        slack_s: With a time limit: time to spare on the worst occasion [s]; below 0 if it was late,
+            by at least that much if it never happened. None without a time limit.
+        occasions: How often the trigger of `after` happened; None for other expectations.
+        violations: The violations, in order of time.
+        first: The first judged step.
+        end: One past the last step that is known.
+        clock: The clock of the run.
     """
 
     name: str
@@ -51,12 +51,12 @@ class Verdict:
     clock: Clock
 
     def __bool__(self) -> bool:
-        """Return whether it holds."""
+        """Return `holds`."""
         return self.holds
 
     @property
     def worst(self) -> Violation | None:
-        """The violation with the least robustness, the first of several; None if it holds."""
+        """The violation with the least robustness, the first of equals; None if it holds."""
         return min(self.violations, key=lambda v: v.robustness, default=None)
 
     @property
@@ -65,14 +65,14 @@ class Verdict:
         return [(self.clock.time(v.first), self.clock.time(v.last)) for v in self.violations]
 
     def __str__(self) -> str:
-        """Say in words whether it held, and if not, when and by how much."""
+        """Return a sentence: whether it held, and if not, when and by how much."""
         if self.holds:
             return f"{self.name} {'held' if self.decided else 'holds so far'}{self._by_how_much()}"
         return f"{self.name} is violated: {self.expectation}{self._when()}"
 
     def _by_how_much(self) -> str:
         if self.occasions == 0:
-            return ", for it never came to it"
+            return ", for its trigger never happened"
         parts = []
         if math.isfinite(self.robustness):
             parts.append(f"by {amount(self.robustness, self.unit)}")
@@ -101,7 +101,7 @@ class Verdict:
         return text
 
     def content(self) -> dict[str, Any]:
-        """Return it as plain JSON data; an infinite robustness is null."""
+        """Return the verdict as plain JSON data; an infinite robustness is null."""
         return {
             "expectation": self.expectation,
             "holds": self.holds,
@@ -117,23 +117,23 @@ class Verdict:
 
 
 class Judged(Protocol):
-    """What can be judged: a run, or a simulation."""
+    """What can be judged: a finished run, or a simulation."""
 
     def judge(self, expectation: Expectation, name: str = "") -> Verdict:
         """Return the verdict on an expectation."""
 
 
 def judge(expectation: Expectation, run: Judged, name: str = "") -> Verdict:
-    """Return whether an expectation holds in a run, by how much, and when it doesn't.
+    """Return the verdict on an expectation in a run.
 
     Args:
-        expectation: What is expected.
-        run: A finished run, or a simulation: then it is expected from the first call on, and the
-            verdict is about the time until now.
-        name: What it is called.
+        expectation: The expectation.
+        run: A finished run, or a simulation: then the expectation counts from the first call on,
+            and the verdict is about the time until now.
+        name: Name of the expectation, for messages.
 
     Raises:
-        InputError: It can't be judged: it names what isn't there, or what the run didn't store.
+        InputError: A name in it is unknown, or the run didn't store what it needs.
 
     Example:
         >>> import fleet2d
@@ -145,13 +145,13 @@ def judge(expectation: Expectation, run: Judged, name: str = "") -> Verdict:
     return run.judge(expectation, name)
 
 
-def verdict_of(name: str, expectation: Expectation, known: Known) -> Verdict:
-    """Return the verdict on what is known of a run."""
-    best = expectation.robustness(known, True).at(known.first)
-    worst = best if known.ended else expectation.robustness(known, False).at(known.first)
-    decided = known.ended or best < 0 or worst > 0
-    violations = tuple(_violations(expectation, known)) if best < 0 else ()
-    slack = expectation.slack(known) if isinstance(expectation, Temporal) else None
+def verdict_of(name: str, expectation: Expectation, run: RunSignals) -> Verdict:
+    """Return the verdict on an expectation from the signals of a run."""
+    best = expectation.robustness(run, True).at(run.first)
+    worst = best if run.ended else expectation.robustness(run, False).at(run.first)
+    decided = run.ended or best < 0 or worst > 0
+    violations = tuple(_violations(expectation, run)) if best < 0 else ()
+    slack = expectation.slack(run) if isinstance(expectation, Temporal) else None
     return Verdict(
         name or str(expectation),
         str(expectation),
@@ -159,31 +159,31 @@ def verdict_of(name: str, expectation: Expectation, known: Known) -> Verdict:
         decided,
         worst if worst > 0 else best,
         expectation.unit,
-        None if slack is None else slack * known.clock.step_us / 1e6,
-        len(expectation.triggered(known)) if isinstance(expectation, After) else None,
+        None if slack is None else slack * run.clock.step_us / 1e6,
+        len(expectation.triggered(run)) if isinstance(expectation, After) else None,
         violations,
-        known.first,
-        known.end,
-        known.clock,
+        run.first,
+        run.end,
+        run.clock,
     )
 
 
-def _violations(expectation: Expectation, known: Known) -> list[Violation]:
+def _violations(expectation: Expectation, run: RunSignals) -> list[Violation]:
     if isinstance(expectation, Temporal):
-        return expectation.violations(known)
-    value = expectation.robustness(known, True).at(known.first)
+        return expectation.violations(run)
+    value = expectation.robustness(run, True).at(run.first)
     if value > 0:
         return []
     if isinstance(expectation, And):
-        return sorted(v for part in expectation.parts() for v in _violations(part, known))
-    return [Violation(known.first, known.end - 1, value, known.first)]
+        return sorted(v for part in expectation.parts() for v in _violations(part, run))
+    return [Violation(run.first, run.end - 1, value, run.first)]
 
 
 def check_judged(expectation: object) -> Expectation:
     """Return an expectation that says when it must hold.
 
     Raises:
-        InputError: It doesn't, or it is none.
+        InputError: It doesn't, or it is no expectation.
     """
     if not isinstance(expectation, Expectation):
         raise InputError(
@@ -198,32 +198,32 @@ def check_judged(expectation: object) -> Expectation:
 
 
 def amount(value: float, unit: str) -> str:
-    """Write how much something is beyond or inside its limit.
+    """Format a margin with its unit, to three digits.
 
     >>> amount(0.2138, "m"), amount(0.031, "share"), amount(2.0, "times")
     ('0.214 m', '3.1 %', '2 times')
     """
-    value = 0.0 if abs(value) <= NEXT_TO_NOTHING else float(f"{value:.3g}")
+    value = 0.0 if abs(value) <= TINY else float(f"{value:.3g}")
     return number_text(value, "" if unit in ("1", "mixed") else unit)
 
 
 def _finite(value: float) -> float | None:
     if not math.isfinite(value):
         return None
-    return 0.0 if abs(value) <= NEXT_TO_NOTHING else value
+    return 0.0 if abs(value) <= TINY else value
 
 
 def spoken(duration: timedelta) -> str:
-    """Write a duration in the units that people use.
+    """Format a duration in days, hours, minutes and seconds.
 
     >>> spoken(timedelta(seconds=9514)), spoken(timedelta(seconds=40.5)), spoken(timedelta(days=2))
     ('2 h 38 min 34 s', '40.5 s', '2 d')
     """
-    parts, rest = [], duration
+    parts, remainder = [], duration
     for unit, length in (("d", 86400), ("h", 3600), ("min", 60)):
-        count, rest = divmod(rest, timedelta(seconds=length))
+        count, remainder = divmod(remainder, timedelta(seconds=length))
         parts += [f"{count} {unit}"] if count else []
-    return " ".join(parts + ([format_duration(rest)] if rest or not parts else []))
+    return " ".join(parts + ([format_duration(remainder)] if remainder or not parts else []))
 
 
 def contents(verdicts: Mapping[str, Verdict]) -> dict[str, Any]:

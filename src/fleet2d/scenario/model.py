@@ -22,7 +22,7 @@ from fleet2d.document import Document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ScenarioError
-from fleet2d.expectations.written import Written
+from fleet2d.expectations.field import ExpectationField
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interventions.script import Entry
@@ -173,7 +173,7 @@ class Scenario(Settings):
     metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _Named, _Typed] = Field(
         default={}, description="What is only recorded, by name."
     )
-    expect: Annotated[dict[str, Written], _Named] = Field(
+    expect: Annotated[dict[str, ExpectationField], _Named] = Field(
         default={}, description="What must hold over the run, by name."
     )
     artifacts: ArtifactSettings = Field(

@@ -1,4 +1,4 @@
-"""Reading expectations from text: the words of Python, and quotes only where names need them."""
+"""Parse expectations from text: Python syntax, with quotes only where names need them."""
 
 import ast
 import operator
@@ -18,7 +18,7 @@ WORDS: Mapping[str, Callable[..., Any]] = {
     for name, word in vars(vocabulary).items()
     if getattr(word, "__module__", "") == vocabulary.__name__ and not name.startswith("_")
 }
-"""What can be called, by name."""
+"""The functions that a text may call, by name."""
 
 _COMPARED: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Gt: operator.gt,
@@ -51,7 +51,7 @@ def parse_expectation(text: str) -> Expectation:
     """Read an expectation, or a part of one.
 
     Raises:
-        InputError: The text is none; says what is wrong and which word is nearest.
+        InputError: The text is no expectation; the message has the nearest word.
 
     Example:
         >>> print(parse_expectation("always(distance(ana, astro) > 50 cm)"))
@@ -78,13 +78,13 @@ def _quoted(match: re.Match[str]) -> str:
 
 
 class _Reader:
-    """Reads the tree of a text."""
+    """Reads the syntax tree of a text."""
 
     def __init__(self) -> None:
         self._depth = 0
 
     def expectation(self, node: ast.expr) -> Expectation:
-        """Read what holds or doesn't."""
+        """Read a part that holds or doesn't."""
         value = self.value(node)
         if isinstance(value, Expectation):
             return value
@@ -93,11 +93,12 @@ class _Reader:
                 f"{value} is compared with nothing: write {value} > 0.5, or == kitchen"
             )
         raise InputError(
-            f"{ast.unparse(node)} says nothing that holds or doesn't{did_you_mean(value, WORDS)}"
+            f"{ast.unparse(node)} is no condition, which holds or doesn't"
+            f"{did_you_mean(value, WORDS)}"
         )
 
     def value(self, node: ast.expr) -> Any:
-        """Read anything."""
+        """Read any part: an expectation, a signal, or an argument."""
         self._depth += 1
         if self._depth > _DEEPEST:
             raise InputError("the expectation is nested too deeply")
@@ -119,7 +120,7 @@ class _Reader:
         return self._argument(node)
 
     def _joined(self, node: ast.BoolOp | ast.BinOp) -> Expectation:
-        """Read what is joined by and, or, & or |."""
+        """Read parts joined by and, or, & or |."""
         joint = _JOINED.get(type(node.op))
         if joint is None:
             raise self._foreign(node)
@@ -185,5 +186,5 @@ class _Reader:
                 f"{ast.unparse(node)}: a signal is compared with a number, or room(…) and"
                 " activity(…) by == with a name"
             )
-        found: Expectation = compare(left, right)
-        return found
+        comparison: Expectation = compare(left, right)
+        return comparison

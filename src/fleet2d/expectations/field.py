@@ -1,4 +1,4 @@
-"""Expectations as a scenario writes them: as text, or as a mapping of what and when."""
+"""The fields of a scenario that hold expectations: text, or a mapping of when to what."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -8,24 +8,24 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from fleet2d.errors import InputError
 from fleet2d.expectations import vocabulary
 from fleet2d.expectations.expectation import Expectation
-from fleet2d.expectations.text import parse_expectation
+from fleet2d.expectations.parse import parse_expectation
 from fleet2d.expectations.verdict import check_judged
 from fleet2d.problems import did_you_mean, problem, problem_at
 
-WHEN = ("always", "never", "eventually", "at_end", "at_most")
-KEYS = (*WHEN, "until", "after", "within", "holds_for", "during", "of", "per")
+OPERATORS = ("always", "never", "eventually", "at_end", "at_most")
+KEYS = (*OPERATORS, "until", "after", "within", "holds_for", "during", "of", "per")
 
 
-def read_written(value: Any) -> Expectation:
-    """Read an expectation of a scenario: text, or a mapping of `KEYS` to parts of it.
+def read_expectation(value: Any) -> Expectation:
+    """Read an expectation of a scenario: text, or a mapping of `KEYS` to its parts.
 
     Raises:
-        PydanticCustomError: It can't be read, or doesn't say when.
+        PydanticCustomError: It can't be read, or doesn't say when it must hold.
 
     Example:
-        >>> print(read_written({"eventually": "seen(ana, by=astro)", "within": "2 min"}))
+        >>> print(read_expectation({"eventually": "seen(ana, by=astro)", "within": "2 min"}))
         eventually(seen("ana", by="astro"), within="2 min")
-        >>> print(read_written({"never": "moving(astro)", "during": "22:00-07:00"}))
+        >>> print(read_expectation({"never": "moving(astro)", "during": "22:00-07:00"}))
         never(during("22:00-07:00") and moving("astro"))
     """
     if isinstance(value, Expectation):
@@ -47,44 +47,47 @@ def _read_mapping(value: Mapping[str, Any]) -> Expectation:
         if key not in KEYS:
             near = did_you_mean(key, KEYS)
             raise problem_at((key,), f"unknown key {key!r}{near} Allowed here: {', '.join(KEYS)}")
-    when = [key for key in WHEN if key in value]
-    if len(when) != 1:
-        raise InputError(f"one of {', '.join(WHEN)} is wanted, found {', '.join(when) or 'none'}")
-    if when == ["at_most"]:
+    operators = [key for key in OPERATORS if key in value]
+    if len(operators) != 1:
+        raise InputError(
+            f"one of {', '.join(OPERATORS)} is wanted, found {', '.join(operators) or 'none'}"
+        )
+    operator = operators[0]
+    if operator == "at_most":
         return _at_most(value)
-    _refuse(value, when[0], "of", "per")
-    if when == ["at_end"]:
-        _refuse(value, when[0], "within", "until")
-    if when == ["eventually"] and "after" in value:
-        _refuse(value, when[0], "until")
-        part = _narrowed(value, "eventually")
+    _refuse(value, operator, "of", "per")
+    if operator == "at_end":
+        _refuse(value, operator, "within", "until")
+    if operator == "eventually" and "after" in value:
+        _refuse(value, operator, "until")
+        part = _condition(value, operator)
         return vocabulary.after(_part(value, "after"), part, within=value.get("within"))
-    whole = _when(value, when[0])
+    whole = _whole(value, operator)
     return vocabulary.after(_part(value, "after"), whole) if "after" in value else whole
 
 
-def _when(value: Mapping[str, Any], word: str) -> Expectation:
-    """Return what a word says of its part, for the time that the mapping gives."""
-    part, within = _narrowed(value, word), value.get("within")
-    if word == "at_end":
+def _whole(value: Mapping[str, Any], operator: str) -> Expectation:
+    """Apply an operator to its condition, with the time limits of the mapping."""
+    part, within = _condition(value, operator), value.get("within")
+    if operator == "at_end":
         return vocabulary.at_end(part)
     if "until" in value:
-        if word != "always":
-            raise problem_at(("until",), f"until goes with always, not with {word}")
+        if operator != "always":
+            raise problem_at(("until",), f"until goes with always, not with {operator}")
         return vocabulary.until(part, _part(value, "until"), within=within)
-    whole: Expectation = getattr(vocabulary, word)(part, within=within)
-    return whole
+    expectation: Expectation = getattr(vocabulary, operator)(part, within=within)
+    return expectation
 
 
-def _narrowed(value: Mapping[str, Any], word: str) -> Expectation:
-    """Return the part that a word is about, as long and at such hours as the mapping says."""
-    part = _part(value, word)
+def _condition(value: Mapping[str, Any], operator: str) -> Expectation:
+    """Return the condition of an operator, with `holds_for` and `during` applied."""
+    part = _part(value, operator)
     if "holds_for" in value:
         part = vocabulary.holds_for(part, value["holds_for"])
     if "during" not in value:
         return part
     hours = vocabulary.during(str(value["during"]))
-    return (~hours | part) if word == "always" else (hours & part)
+    return (~hours | part) if operator == "always" else (hours & part)
 
 
 def _at_most(value: Mapping[str, Any]) -> Expectation:
@@ -109,15 +112,15 @@ def _part(value: Mapping[str, Any], key: str) -> Expectation:
         raise problem_at((key,), str(error)) from None
 
 
-def _refuse(value: Mapping[str, Any], word: str, *keys: str) -> None:
+def _refuse(value: Mapping[str, Any], operator: str, *keys: str) -> None:
     for key in keys:
         if key in value:
-            raise problem_at((key,), f"{key!r} doesn't go with {word}")
+            raise problem_at((key,), f"{key!r} doesn't go with {operator}")
 
 
-Written = Annotated[
+ExpectationField = Annotated[
     Any,
-    BeforeValidator(read_written),
+    BeforeValidator(read_expectation),
     PlainSerializer(str, return_type=str, when_used="json"),
     WithJsonSchema(
         {
@@ -135,4 +138,4 @@ Written = Annotated[
         }
     ),
 ]
-"""An expectation of a scenario; an `Expectation` in Python."""
+"""Type of the fields of a scenario that hold an expectation; an `Expectation` in Python."""

@@ -1,4 +1,4 @@
-"""How expectations are written: the same text is read back."""
+"""Format expectations as text that `parse_expectation` reads back."""
 
 from datetime import timedelta
 from typing import Any
