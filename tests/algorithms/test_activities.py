@@ -67,6 +67,6 @@ def test_a_camera_that_does_not_tell_activities_has_only_the_truth() -> None:
 def test_where_no_camera_tells_them_nothing_is_worked_out() -> None:
     made = Activities(1, {(0, 0): ActivitySense(0, KEYS, None)})
     made.begin(0, 0, "cook")
-    assert not made.are_told
+    assert not made.are_perceived
     assert [None] == made.true(rows([5])).tolist()
     assert 0 == len(activities().perceived(rows([])))

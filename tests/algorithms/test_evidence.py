@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Present
-from fleet2d.algorithms.evidence import Sightings, count_seen, steps_of_bin
+from fleet2d.algorithms.evidence import SightingRows, count_seen, steps_of_bin
 from fleet2d.errors import ComponentError
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_evidence"
@@ -45,9 +45,9 @@ class Unsaid(Algorithm):
         return {"bins": len(history.evidence)}
 
 
-def sightings(rows: list[tuple[int, int, int]]) -> Sightings:
+def sightings(rows: list[tuple[int, int, int]]) -> SightingRows:
     """Return sightings of (step, user, room)."""
-    return Sightings(*np.array(rows, np.int64).reshape(-1, 3).T)
+    return SightingRows(*np.array(rows, np.int64).reshape(-1, 3).T)
 
 
 def test_bins_last_a_minute_or_a_step() -> None:

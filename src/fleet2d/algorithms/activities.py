@@ -1,7 +1,7 @@
-"""What the users of a run do, and what the cameras take it for.
+"""Activities of the users of a run, true and as cameras perceive them.
 
-Both follow from when each activity began and from the step of a look, so nothing of it is worked
-out before somebody asks.
+Both follow from the steps at which activities began and from the step of a look, so they are
+computed on demand.
 """
 
 from collections.abc import Mapping
@@ -14,23 +14,23 @@ from fleet2d.kernels.look import CAMERA, SIGHTING, STEP, USER
 from fleet2d.kernels.perception import ONE, random_shares
 
 I64 = NDArray[np.int64]
-Names = NDArray[np.object_]  # str, or None where nothing is told
+Names = NDArray[np.object_]  # str, or None where no activity is known
 
-# A row of observations: that of the sight kernel, and the robot's index behind it.
+# A row of observations is a row of the sight kernel, followed by the robot's index.
 ROBOT = SIGHTING
-NOTHING = 0  # the code of an activity that nobody has told
-TOLD = "activity"  # the event by which a plan tells what is done from then on
+NOTHING = 0  # the code for no known activity
+TOLD = "activity"  # the kind of the events by which plans announce a new activity
 
 
 @dataclass(frozen=True)
 class ActivitySense:
-    """How one camera tells what users do.
+    """How one camera perceives activities.
 
     Attributes:
-        latency: Steps from a look to its rows.
-        keys: The stream of each user, uint64 (users,).
-        confusion: What each activity is taken for, with which probability, and right otherwise;
-            None: this camera doesn't tell activities.
+        latency: Steps from a look to its observations.
+        keys: uint64 (users,), the key of the random stream of each user.
+        confusion: For each activity, the probabilities of being mistaken for others; None: this
+            camera perceives no activities.
     """
 
     latency: int
@@ -39,7 +39,7 @@ class ActivitySense:
 
 
 class Activities:
-    """When each user began which activity, and how each camera of each robot tells them.
+    """The activities of each user over time, and how the cameras of each robot perceive them.
 
     Example:
         >>> sense = ActivitySense(0, np.array([7], np.uint64), {"cook": {"bake": 1.0}})
@@ -52,70 +52,68 @@ class Activities:
     """
 
     def __init__(self, users: int, senses: Mapping[tuple[int, int], ActivitySense]) -> None:
-        """Begin with nothing told; `senses` are by index of the robot and of its camera."""
+        """Begin without activities; `senses` are by index of the robot and of its camera."""
         self._senses = dict(senses)
         self._codes: dict[str | None, int] = {None: NOTHING}
         self._begun: list[tuple[list[int], list[int]]] = [([], [NOTHING]) for _ in range(users)]
 
     @property
     def users(self) -> int:
-        """How many users there are."""
+        """Number of users."""
         return len(self._begun)
 
     @property
-    def are_told(self) -> bool:
-        """Whether any camera tells activities."""
+    def are_perceived(self) -> bool:
+        """Whether any camera perceives activities."""
         return any(sense.confusion is not None for sense in self._senses.values())
 
     def begin(self, user: int, step: int, activity: str) -> None:
-        """Take down what a user does from a step on; steps must not run backwards."""
+        """Record the activity of a user from a step on; steps must not decrease."""
         steps, codes = self._begun[user]
         steps.append(step)
         codes.append(self._code(activity))
 
     def now(self, user: int) -> str | None:
-        """Return what a user began last; None if nothing is known."""
+        """Return the activity that a user began last; None if none is known."""
         return list(self._codes)[self._begun[user][1][-1]]
 
     def true(self, rows: I64) -> Names:
-        """Return what the user of each row of observations did at the look."""
-        return self._named(self._looked_at(rows)[0])
+        """Return the true activity of the user of each row at its look: object (n,)."""
+        return self._names(self._codes_of(rows)[0])
 
     def perceived(self, rows: I64) -> Names:
-        """Return what the user of each row was taken to do."""
-        return self._named(self._looked_at(rows)[1])
+        """Return the perceived activity of the user of each row: object (n,)."""
+        return self._names(self._codes_of(rows)[1])
 
     def _code(self, activity: str) -> int:
         return self._codes.setdefault(activity, len(self._codes))
 
-    def _named(self, codes: I64) -> Names:
+    def _names(self, codes: I64) -> Names:
         return np.array(list(self._codes), object)[codes]
 
-    def _looked_at(self, rows: I64) -> tuple[I64, I64]:
-        """Return codes of the true and the perceived activities."""
-        true, taken = (np.full(len(rows), NOTHING, np.int64) for _ in range(2))
-        if not self.are_told:
-            return true, taken
+    def _codes_of(self, rows: I64) -> tuple[I64, I64]:
+        """Return the codes of the true and of the perceived activities: int64 (n,) each."""
+        true, perceived = (np.full(len(rows), NOTHING, np.int64) for _ in range(2))
+        if not self.are_perceived:
+            return true, perceived
         for (robot, camera), sense in self._senses.items():
-            mine = (rows[:, ROBOT] == robot) & (rows[:, CAMERA] == camera)
+            is_camera = (rows[:, ROBOT] == robot) & (rows[:, CAMERA] == camera)
             for user, (steps, codes) in enumerate(self._begun):
-                at = np.flatnonzero(mine & (rows[:, USER] == user))
-                looks = rows[at, STEP] - sense.latency
-                begun = np.searchsorted(np.array(steps, np.int64), looks, side="right")
-                true[at] = np.array(codes, np.int64)[begun]
+                index = np.flatnonzero(is_camera & (rows[:, USER] == user))
+                looks = rows[index, STEP] - sense.latency
+                position = np.searchsorted(np.array(steps, np.int64), looks, side="right")
+                true[index] = np.array(codes, np.int64)[position]
                 if sense.confusion is not None:
                     draws = random_shares(sense.keys[user], looks)
-                    taken[at] = self._taken_for(true[at], draws, sense.confusion)
-        return true, taken
+                    perceived[index] = self._confused(true[index], draws, sense.confusion)
+        return true, perceived
 
-    def _taken_for(
-        self, true: I64, draws: I64, confusion: Mapping[str, Mapping[str, float]]
-    ) -> I64:
-        """Return what activities are taken for, by draws [2**-31]."""
-        taken = true.copy()
+    def _confused(self, true: I64, draws: I64, confusion: Mapping[str, Mapping[str, float]]) -> I64:
+        """Return the codes of perceived activities, by random draws [2**-31]."""
+        perceived = true.copy()
         for activity, others in confusion.items():
             ends = np.rint(np.cumsum(list(others.values())) * ONE).astype(np.int64)
             outcomes = np.array([self._code(name) for name in (*others, activity)], np.int64)
-            mine = np.flatnonzero(true == self._code(activity))
-            taken[mine] = outcomes[np.searchsorted(ends, draws[mine], side="right")]
-        return taken
+            index = np.flatnonzero(true == self._code(activity))
+            perceived[index] = outcomes[np.searchsorted(ends, draws[index], side="right")]
+        return perceived

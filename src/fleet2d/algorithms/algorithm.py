@@ -1,4 +1,4 @@
-"""Algorithms: what learns from the history of a run, and what others may read."""
+"""Algorithms: components that learn from the history of a run and put out results."""
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -45,19 +45,18 @@ class Present:
     seed: int
 
     def random(self, purpose: str) -> Draws:
-        """Return the random draws of this component for a purpose of its own, at this step."""
+        """Return the random draws of this component for one purpose, at this step."""
         return Draws(np.uint64(stream_key(self.seed, self.path, purpose)), self.step)
 
 
 class Algorithm(Component):
-    """Base of what computes from history and state; a subclass writes `update`.
+    """Base of algorithms, which compute outputs from the history; a subclass writes `update`.
 
     It is updated after every full `period`, with the history of exactly that period; or, with `on`,
-    at the end of each step in which one of these events happens, with the history since the update
-    before. What it
-    returns (a RoomDistribution, or a mapping of names to numbers or arrays; None for nothing) is
-    stored as rows of a table of its own, and everybody reads it from the next step on. Run state is
-    set in `start`.
+    at the end of each step in which one of these events happens, with the history since the last
+    update. What `update` returns (a RoomDistribution, or a mapping of names to numbers or arrays;
+    None for nothing) is stored as rows of the algorithm's table, and all components read it from
+    the next step on. Run state is set in `start`.
 
     Example:
         >>> import numpy as np
@@ -75,10 +74,10 @@ class Algorithm(Component):
     """
 
     kind: ClassVar[str] = "algorithm"
-    looks_back: ClassVar[timedelta] = timedelta(0)  # how far beyond its period; timedelta.max: all
-    needs: ClassVar[Set[str]] = (
-        frozenset()
-    )  # of evidence, exposure, explored, first_seen, last_seen …
+    # How far before its period it reads the history; timedelta.max: all of it.
+    looks_back: ClassVar[timedelta] = timedelta(0)
+    # What has to be computed for it: evidence, exposure, explored, first_seen, last_seen …
+    needs: ClassVar[Set[str]] = frozenset()
 
     period: PositiveDuration = Field(
         default=timedelta(hours=1), description="how often it is updated"
@@ -101,14 +100,14 @@ class Algorithm(Component):
         """Prepare for a run."""
 
     def remember(self) -> Mapping[str, Any]:
-        """Return what it has learned: arrays, numbers and texts, in mappings of any depth.
+        """Return the learned state: arrays, numbers and texts, in mappings of any depth.
 
-        Unless a subclass says otherwise, that is all its run state: what it keeps in attributes.
+        By default that is all run state: the attributes that are no configuration.
         """
         return run_state(self)
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Go on from what `remember` returned in another run; called after `start`.
+        """Restore what `remember` returned in another run; called after `start`.
 
         Raises:
             ComponentError: It was learned in a home with other rooms.
@@ -118,20 +117,20 @@ class Algorithm(Component):
             setattr(self, name, value)
 
     def check_learned(self, users: Sequence[str], start: datetime) -> None:
-        """Refuse what was learned with other users; called after `recall`, before the run begins.
+        """Refuse a state learned with other users; called after `recall`, before the run begins.
 
         Args:
-            users: Their names.
-            start: When the run begins.
+            users: Names of the users of this run.
+            start: Local time of step 0.
 
         Raises:
-            ComponentError: It doesn't fit.
+            ComponentError: The learned state doesn't fit.
         """
 
     def files(self) -> list[Path]:
-        """Return the files that it reads: a run notes their content, to be reproducible."""
+        """Return the files that it reads: the run stores their digests, to be reproducible."""
         return [] if self.learned is None else [self.learned]
 
     def update(self, history: History, state: Present) -> Any:
-        """Take in the history since the last update; return the output, or None."""
+        """Process the history since the last update; return the output, or None."""
         raise NotImplementedError

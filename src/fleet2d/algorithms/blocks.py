@@ -1,4 +1,4 @@
-"""Blocks: arrays that follow on each other in time, kept for as long as somebody may ask."""
+"""Blocks: consecutive arrays of rows, dropped when no component can look back to them."""
 
 from bisect import bisect_left, bisect_right
 from typing import Any
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class Blocks:
-    """Arrays of rows, of one shape but for their length, each of a stretch of time.
+    """Arrays of rows, each of a stretch of time; their shapes differ in length only.
 
     Example:
         >>> blocks = Blocks()
@@ -22,33 +22,34 @@ class Blocks:
     """
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Begin without blocks."""
         self._begins: list[int] = []
         self._ends: list[int] = []
         self._rows: list[NDArray[Any]] = []
 
     def append(self, begin: int, end: int, rows: NDArray[Any]) -> None:
-        """Keep what lies from `begin` up to before `end`, after all that is kept."""
+        """Append the rows of the stretch from `begin` up to before `end`, the latest so far."""
         self._begins.append(begin)
         self._ends.append(end)
         self._rows.append(rows)
 
     def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
-        """Return all blocks with a part in a stretch of time as one, and where they begin."""
-        here = self._touching(begin, end)
-        found = self._rows[here]
-        if not found:
+        """Return all blocks that overlap a stretch of time, joined, and their begin."""
+        overlap = self._touching(begin, end)
+        blocks = self._rows[overlap]
+        if not blocks:
             return begin, None
-        return self._begins[here.start], found[0] if len(found) == 1 else np.concatenate(found)
+        rows = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return self._begins[overlap.start], rows
 
     def each_touching(self, begin: int, end: int) -> list[NDArray[Any]]:
-        """Return each block with a part in a stretch of time."""
+        """Return each block that overlaps a stretch of time."""
         return self._rows[self._touching(begin, end)]
 
     def _touching(self, begin: int, end: int) -> slice:
         return slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
 
     def forget(self, before: int) -> None:
-        """Drop the blocks that end by then."""
+        """Drop the blocks that end by `before`."""
         past = slice(bisect_right(self._ends, before))
         del self._begins[past], self._ends[past], self._rows[past]

@@ -1,4 +1,4 @@
-"""What components are handed: the same arrays for all of them, so that none may change them."""
+"""Read-only views: components share the same arrays, so none of them may change one."""
 
 from typing import Any, TypeVar
 
@@ -8,7 +8,7 @@ T = TypeVar("T")
 
 
 def frozen(value: T) -> T:
-    """Return the same with read-only views of its arrays, in tuples of any depth.
+    """Return a value with read-only views in place of its arrays, in tuples of any depth.
 
     Example:
         >>> counts = np.zeros(3)

@@ -1,4 +1,4 @@
-"""What happened in a stretch of steps, handed to who may know it: algorithms and metrics."""
+"""Histories: what happened in a stretch of steps, as algorithms and metrics may know it."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,12 +17,12 @@ from fleet2d.events import Event
 
 @dataclass(frozen=True)
 class Readings:
-    """What sensors said, in order of step; all arrays of one length.
+    """Readings of sensors, in order of step; all arrays of one length.
 
     Attributes:
-        step: int64.
-        sensor: Index of the sensor, in the order of the scenario, int32.
-        on: Whether it went on (or open), bool.
+        step: int64 (n,), the step of each reading.
+        sensor: int32 (n,), index of the sensor, in the order of the scenario.
+        on: bool (n,), True where the sensor went on (or open), False where off (or shut).
     """
 
     step: NDArray[np.int64]
@@ -32,7 +32,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class History:
-    """The steps since a component was asked last, `first` to `end` - 1.
+    """The steps since the last update of a component, `first` to `end` - 1.
 
     Attributes:
         first: First step.
@@ -45,17 +45,17 @@ class History:
     first: int
     end: int
     step_s: float
-    visible: frozenset[str]  # the bodies whose poses may be asked for
-    oldest: int = 0  # the first step that is kept for who looks back
-    needs: frozenset[str] = frozenset()  # what the asker's class said that it would ask for
+    visible: frozenset[str]  # names of the bodies whose poses the component may read
+    oldest: int = 0  # the first step that is stored for components that look back
+    needs: frozenset[str] = frozenset()  # `needs` of the component's class
 
     def between(self, first: int, end: int) -> "History":
         """Return the history of the steps from `first` to `end` - 1.
 
-        How far back that may be, the component's class says by `looks_back`.
+        The component's class declares by `looks_back` how far back that may be.
 
         Raises:
-            ComponentError: These steps are not kept, or are yet to come.
+            ComponentError: These steps are no longer stored, or are yet to come.
 
         Example:
             >>> from datetime import timedelta
@@ -69,8 +69,9 @@ class History:
         """
         if not self.oldest <= first <= end <= self.end:
             raise ComponentError(
-                f"the steps from {first} to {end} were asked for, but those from {self.oldest} to"
-                f" {self.end} are kept: say by looks_back in the class how far back you look"
+                f"the steps from {first} to {end} were requested, but only those from"
+                f" {self.oldest} to {self.end} are stored: set looks_back in the class to how far"
+                " back it looks"
             )
         return replace(self, first=first, end=end)
 
@@ -85,7 +86,7 @@ class History:
 
     @cached_property
     def readings(self) -> Readings:
-        """What the sensors said."""
+        """The readings of sensors."""
         rows = [row for row in self.log.readings if self.first <= row.step < self.end]
         return Readings(
             frozen(np.array([row.step for row in rows], np.int64)),
@@ -95,16 +96,16 @@ class History:
 
     @cached_property
     def events(self) -> list[Event]:
-        """What the plans of bodies said happens, in order of step; algorithms hear of robots'."""
-        found = self.log.events(self.first, self.end)
-        return [event for event in found if event.entity in self.visible]
+        """The events of the visible bodies, in order of step; for algorithms those of robots."""
+        events = self.log.events(self.first, self.end)
+        return [event for event in events if event.entity in self.visible]
 
     @cached_property
     def truth(self) -> Truth:
-        """What was really there, row by row of the observations; for metrics.
+        """The truth, row by row of the observations; for metrics only.
 
         Raises:
-            ComponentError: The asker is an algorithm.
+            ComponentError: The component is an algorithm.
         """
         self._check_metric("truth")
         log = self.log
@@ -112,10 +113,10 @@ class History:
 
     @cached_property
     def looks(self) -> Looks:
-        """How often each camera had a user in view, and how often it noticed; for metrics.
+        """How often each camera had a user in view, and how often it noticed; for metrics only.
 
         Raises:
-            ComponentError: The asker is an algorithm.
+            ComponentError: The component is an algorithm.
         """
         self._check_metric("looks")
         return frozen(self.log.looks(self.first, self.end, self.log.users))
@@ -124,21 +125,22 @@ class History:
     def exposure(self) -> NDArray[np.int64]:
         """Cells of each room in view of each robot, summed over the steps: (robots, rooms).
 
-        Divided by the room's cells and by the number of steps, it is the mean share of the room
-        that was in view.
+        Divided by the room's number of cells and by the number of steps, it is the mean share of
+        the room that was in view.
 
         Raises:
-            ComponentError: The asker has no needs = {"exposure"}.
+            ComponentError: The component's class has no needs = {"exposure"}.
         """
         self._check_needs("exposure")
         return frozen(self.log.exposure(self.first, self.end))
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What robots watched and whom they perceived there, minute by minute.
+        """What robots watched, and which users they perceived there, minute by minute.
 
         Raises:
-            ComponentError: The asker has no needs = {"evidence"}, or no period of whole minutes.
+            ComponentError: The component's class has no needs = {"evidence"}, or its period is no
+                whole number of minutes.
         """
         self._check_needs("evidence")
         return frozen(self.log.evidence(self.first, self.end, self.log.users))
@@ -146,30 +148,31 @@ class History:
     def _check_needs(self, what: str) -> None:
         if what not in self.needs:
             raise ComponentError(
-                f"{what} was asked for, but isn't worked out unless somebody says so before: write"
+                f"{what} was requested, but is only computed for components that declare it: write"
                 f" needs = {{{what!r}}} in the class of the component"
             )
 
     def _check_metric(self, what: str) -> None:
         if self.visible != frozenset(self.log.index):
-            raise ComponentError(f"{what} was asked for, but only metrics know what is true")
+            raise ComponentError(f"{what} was requested, but only metrics know what is true")
 
     def poses(self, name: str) -> BodyPoses:
-        """Return the poses of a body. Algorithms may ask for robots, metrics for users, too.
+        """Return the poses of a body. Algorithms may read those of robots, metrics also of users.
 
-        Of a robot with `localization` algorithms are told where it believes to be, metrics where
-        it is.
+        For a robot with `localization`, algorithms get its believed poses, metrics the true ones.
 
         Raises:
-            ComponentError: There is no such body, or it is a user and the asker an algorithm.
+            ComponentError: There is no such body, or it is a user and the component an algorithm.
         """
         if name not in self.visible:
-            known = ", ".join(sorted(self.visible))
-            why = (
+            available = ", ".join(sorted(self.visible))
+            reason = (
                 "only metrics know where users are"
                 if name in self.log.index
                 else "there is no such body"
             )
-            raise ComponentError(f"poses of {name!r} were asked for, but {why}; available: {known}")
-        true = self.visible == frozenset(self.log.index)  # what metrics are told
-        return self.log.poses(name, self.first, self.end, true=true)
+            raise ComponentError(
+                f"poses of {name!r} were requested, but {reason}; available: {available}"
+            )
+        is_metric = self.visible == frozenset(self.log.index)
+        return self.log.poses(name, self.first, self.end, true=is_metric)

@@ -1,4 +1,4 @@
-"""What an algorithm has learned, as a file that another run can start from."""
+"""Files with the learned state of an algorithm, from which another run can start."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from fleet2d.bounds import LEARNED_BYTES, check_file, one_line
 from fleet2d.errors import ComponentError, InputError
 
-# Between the names of a nested mapping, in the names of the file's arrays.
-BELOW = "/"
+# Joins the names of nested mappings in the names of the file's arrays.
+SEPARATOR = "/"
 
 
 def save_learned(state: Mapping[str, Any], path: Path, where: str) -> None:
-    """Write what an algorithm remembers: arrays, numbers and texts, in mappings of any depth.
+    """Write the learned state of an algorithm: arrays, numbers and texts in nested mappings.
 
     Args:
-        state: What `Algorithm.remember` returned.
+        state: The return value of `Algorithm.remember`.
         path: The file to write, .npz as NumPy reads it.
         where: The algorithm's path in the scenario, for errors.
 
     Raises:
-        ComponentError: It holds something else, which is named.
+        ComponentError: It has a value of another type; the message names it.
     """
     arrays = dict(_flat(state, "", where))
     with path.open("wb") as file:
@@ -32,10 +32,10 @@ def save_learned(state: Mapping[str, Any], path: Path, where: str) -> None:
 
 
 def load_learned(path: Path) -> dict[str, Any]:
-    """Read what an algorithm remembered: mappings of arrays; numbers and texts as themselves.
+    """Read the learned state of an algorithm: nested mappings of arrays, numbers and texts.
 
     Raises:
-        InputError: It is no such file.
+        InputError: The file is damaged, or holds no learned state.
     """
     state: dict[str, Any] = {}
     try:
@@ -46,11 +46,11 @@ def load_learned(path: Path) -> dict[str, Any]:
         with path.open("rb") as opened, np.load(opened, allow_pickle=False) as content:
             arrays = {name: _plain(content[name], name) for name in content.files}
         for name, array in arrays.items():
-            *above, last = name.split(BELOW)
-            here = state
-            for key in above:
-                here = here.setdefault(key, {})
-            here[last] = array if array.ndim else array.item()
+            *parents, last = name.split(SEPARATOR)
+            mapping = state
+            for key in parents:
+                mapping = mapping.setdefault(key, {})
+            mapping[last] = array if array.ndim else array.item()
     except InputError:
         raise
     except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
@@ -62,34 +62,34 @@ def load_learned(path: Path) -> dict[str, Any]:
 
 
 def _plain(value: Any, name: str) -> NDArray[Any]:
-    """Return an array of plain values; NumPy hands on whatever else is in the archive."""
+    """Return an array of plain values; refuse other entries of the archive."""
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "biufU":
         raise ValueError(f"{name!r} is no array of numbers, truth values or texts")
     return value
 
 
 def run_state(component: Any) -> dict[str, Any]:
-    """Return the attributes of a component that aren't its configuration."""
+    """Return the attributes of a component that are no configuration."""
     fields = type(component).model_fields
     return {name: value for name, value in vars(component).items() if name not in fields}
 
 
-def check_shapes(now: Mapping[str, Any], before: Mapping[str, Any], where: str) -> None:
-    """Refuse arrays of other shapes than those that `start` has made: of another home.
+def check_shapes(initial: Mapping[str, Any], learned: Mapping[str, Any], where: str) -> None:
+    """Refuse learned arrays whose shapes differ from those that `start` made.
 
     Raises:
-        ComponentError: One doesn't fit.
+        ComponentError: A shape differs, as of another home; or there is a NaN.
     """
-    for name, value in before.items():
-        made = now.get(name)
-        if isinstance(value, Mapping) and isinstance(made, Mapping):
-            check_shapes(made, value, where)
+    for name, value in learned.items():
+        start = initial.get(name)
+        if isinstance(value, Mapping) and isinstance(start, Mapping):
+            check_shapes(start, value, where)
             continue
         check_numbers(name, value, where)
-        if isinstance(made, np.ndarray) and made.size and np.shape(value) != made.shape:
+        if isinstance(start, np.ndarray) and start.size and np.shape(value) != start.shape:
             raise ComponentError(
                 f"{where}: what was learned has {name!r} of shape {np.shape(value)}, but this home"
-                f" and its users make {made.shape}: it was learned somewhere else"
+                f" and its users need {start.shape}: it was learned in another home"
             )
 
 
@@ -100,39 +100,40 @@ def array_of(
     kind: type[np.generic] = np.float64,
     most: float = 1e300,
 ) -> NDArray[Any]:
-    """Return an array of what was learned, a copy.
+    """Return a copy of an array of a learned state.
 
     Args:
-        learned: What was learned.
-        name: Of the array.
-        shape: Its shape; -1 for any length above 0.
-        kind: Its type.
-        most: Its numbers are from -most to most.
+        learned: The learned state.
+        name: Name of the array.
+        shape: The shape it must have; -1 for any length above 0.
+        kind: Type of the returned array.
+        most: The largest absolute value allowed.
 
     Raises:
-        ComponentError: It is missing, of another shape, or holds what is no number.
+        ComponentError: It is missing, of another shape, or not of finite numbers.
     """
-    found = np.asarray(learned.get(name, ()))
-    fits = found.ndim == len(shape) and all(
-        size == wanted or wanted < 0 < size for size, wanted in zip(found.shape, shape, strict=True)
+    array = np.asarray(learned.get(name, ()))
+    fits = array.ndim == len(shape) and all(
+        size == expected or expected < 0 < size
+        for size, expected in zip(array.shape, shape, strict=True)
     )
-    if not fits or found.dtype.kind not in "biuf" or not (np.abs(found) <= most).all():
+    if not fits or array.dtype.kind not in "biuf" or not (np.abs(array) <= most).all():
         raise ComponentError(
             f"what was learned has no {name!r} of shape {shape}, of numbers alone: it is damaged,"
             " or from another home, other users or another estimator"
         )
-    return np.array(found, kind)
+    return np.array(array, kind)
 
 
 def check_numbers(name: str, value: Any, where: str) -> None:
-    """Refuse what is no number among those that were learned.
+    """Refuse NaN in a learned state.
 
     Raises:
         ComponentError: There is a NaN.
     """
     if isinstance(value, Mapping):
         for inner, entry in value.items():
-            check_numbers(f"{name}{BELOW}{inner}", entry, where)
+            check_numbers(f"{name}{SEPARATOR}{inner}", entry, where)
     elif np.asarray(value).dtype.kind == "f" and np.isnan(value).any():
         raise ComponentError(f"{where}: what was learned has NaN in {name!r}: it is damaged")
 
@@ -140,10 +141,12 @@ def check_numbers(name: str, value: Any, where: str) -> None:
 def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[str, NDArray[Any]]]:
     for name, value in state.items():
         path = f"{above}{name}"
-        if BELOW in str(name) or not name:
-            raise ComponentError(f"{where} remembers {name!r}: a name without {BELOW!r} is wanted")
+        if SEPARATOR in str(name) or not name:
+            raise ComponentError(
+                f"{where} remembers {name!r}: a name without {SEPARATOR!r} is wanted"
+            )
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{path}{BELOW}", where)
+            yield from _flat(value, f"{path}{SEPARATOR}", where)
             continue
         array = np.asarray(value)
         if array.dtype.kind not in "biufU":

@@ -1,4 +1,4 @@
-"""What is kept of a run: motions, observations and events, as far back as somebody may ask."""
+"""The log of a run: motions, observations and events, as far back as components may look."""
 
 from collections.abc import Callable, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.blocks import Blocks
-from fleet2d.algorithms.evidence import Evidence, Sightings, gather
+from fleet2d.algorithms.evidence import Evidence, SightingRows, gather
 from fleet2d.algorithms.observations import (
     Looks,
     NearestRooms,
@@ -36,60 +36,60 @@ class SensorRow(NamedTuple):
 
 
 class Motions(Protocol):
-    """How the bodies of a run move."""
+    """Protocol of the motions of all bodies of a run."""
 
     def runs(self, row: int, first: int, end: int) -> Window:
         """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
 
 
 class Log:
-    """The motions and observations of a run, as far back as somebody may ask."""
+    """The motions and observations of a run, as far back as components may look."""
 
     def __init__(
-        self, home: "Home", paths: Mapping[str, str], motions: Motions, activities: Activities
+        self, home: "Home", names: Sequence[str], motions: Motions, activities: Activities
     ) -> None:
-        """Begin with nothing.
+        """Begin an empty log.
 
         Args:
             home: The home.
-            paths: Of each body by name, users first: "users.ana".
-            motions: How they move.
+            names: Names of the bodies, users first.
+            motions: The motions of the bodies.
             activities: What users do.
         """
         self.home = home
-        self.index = {name: row for row, name in enumerate(paths)}
-        self.users = sum(path.startswith("users.") for path in paths.values())
+        self.index = {name: row for row, name in enumerate(names)}
+        self.users = activities.users
         self.activities = activities
         self._motions = motions
         self._observations = Blocks()  # (n, OBSERVATION), by step
         self._events: list[Event] = []
         self.readings: list[SensorRow] = []
-        self.cameras: list[tuple[int, str]] = []  # index of the robot, and name
+        self.cameras: list[tuple[int, str]] = []  # index of the robot, and name of the camera
         self._looks: dict[int, NDArray[np.int64]] = {}
         self._exposures: dict[int, NDArray[np.int64]] = {}
-        self.bin_steps = 0  # of the bins of evidence; 0: nobody asks for it
-        self._bins = Blocks()  # (n, robots, 2, patches), by bin
+        self.bin_steps = 0  # steps of a bin of evidence; 0: no component needs evidence
+        self._bins = Blocks()  # int64 (n, robots, 2, patches), by bin
         self._next_bin = 0
-        self.patches: Patches | None = None  # that bins of evidence tell apart
+        self.patches: Patches | None = None  # the patches of evidence
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
-        # Of robots that don't know where they are: what they believe of their poses.
+        # For robots with `localization`: the believed poses from the true ones.
         self.beliefs: dict[str, Callable[[Window], Path]] = {}
         self._poses: dict[tuple[str, int, int, bool], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
-        """Drop what is only needed for steps earlier than `before`."""
+        """Drop everything that belongs to steps earlier than `before`."""
         self._poses.clear()
         self._observations.forget(before)
         self.readings = [row for row in self.readings if row.step >= before]
         self._events = [event for event in self._events if event.step >= before]
         self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
-        self._exposures = {k: seen for k, seen in self._exposures.items() if k >= before}
+        self._exposures = {k: cells for k, cells in self._exposures.items() if k >= before}
         if self.bin_steps:
             self._bins.forget(before // self.bin_steps)
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Keep the events of bodies."""
+        """Store the events of bodies."""
         self._events += [event for event in events if event.entity in self.index]
 
     def next_event(self, step: int, kinds: Set[str]) -> int | None:
@@ -98,16 +98,16 @@ class Log:
         return min(steps, default=None)
 
     def events(self, first: int, end: int) -> list[Event]:
-        """Return what happened in the steps from `first` to `end` - 1, in order.
+        """Return the events in the steps from `first` to `end` - 1, in order.
 
-        What plans note, and who came into view or was lost.
+        These are the notes of plans, and users and robots that came into view or were lost.
         """
         order = self.index
         events = [event for event in self._events if first <= event.step < end]
         return sorted(events, key=lambda e: (e.step, order[e.entity], e.rank))
 
     def happened(self, step: int) -> list[Event]:
-        """Return what happened at one step, readings of sensors among it."""
+        """Return the events at one step, with one for readings of sensors."""
         events = self.events(step, step + 1)
         if any(row.step == step for row in self.readings):
             events.append(Event(step, HOME, EventKind.SENSOR, ""))
@@ -117,21 +117,21 @@ class Log:
         """Return the poses of a body in the steps from `first` to `end` - 1.
 
         Args:
-            name: Of the body.
+            name: Name of the body.
             first: First step.
             end: One past the last step.
-            true: Where it is; False: where it believes to be.
+            true: Whether to return the true poses, or those that a robot believes.
         """
         true = true or name not in self.beliefs
         key = (name, first, end, true)
-        if key not in self._poses:  # whoever is updated at the same time asks for the same
+        if key not in self._poses:  # components that are updated at the same step share them
             runs = self._motions.runs(self.index[name], first, end)
             path = runs if true else self.beliefs[name](runs)
             self._poses[key] = BodyPoses(self.home, path)
         return self._poses[key]
 
     def observe(self, rows: NDArray[np.int64]) -> None:
-        """Keep what was perceived in a span: its observations (n, OBSERVATION), in order."""
+        """Store the observations of a span: int64 (n, OBSERVATION), in order of step."""
         if len(rows):
             self._observations.append(int(rows[0, STEP]), int(rows[-1, STEP]) + 1, rows)
 
@@ -143,11 +143,11 @@ class Log:
         )
 
     def perceived(self, first: int, end: int) -> Observations:
-        """Return what was perceived in the steps from `first` to `end` - 1."""
+        """Return the observations of the steps from `first` to `end` - 1."""
         return Observations(self.home.plan, self._rooms, self.seen(first, end), self.activities)
 
     def count_looks(self, step: int, counts: Sequence[NDArray[np.int64]]) -> None:
-        """Keep how often each robot's cameras have looked and noticed before `step`."""
+        """Store how often each robot's cameras have looked and noticed before `step`."""
         if counts:
             self._looks[step] = np.concatenate(counts)
 
@@ -155,7 +155,7 @@ class Log:
         """Return the looks in the steps from `first` to `end` - 1.
 
         Raises:
-            ComponentError: They weren't counted before one of these.
+            ComponentError: No counts were stored at `first` or `end`.
         """
         none = np.zeros((len(self.cameras), users, 2), np.int64)
         counts = _known_at(self._looks, end, none) - _known_at(self._looks, first, none)
@@ -164,19 +164,20 @@ class Log:
         return Looks(robots, names, counts[..., 0], counts[..., 1])
 
     def expose(self, step: int, exposure: NDArray[np.int64]) -> None:
-        """Keep how much of each room each robot has had in view before `step`."""
+        """Store how much of each room each robot has had in view before `step`."""
         self._exposures[step] = exposure
 
     def expose_bins(self, bins: NDArray[np.int64]) -> None:
-        """Keep how much each robot has had in view: the bins (n, robots, 2, patches).
+        """Store what each robot has had in view in the next bins: int64 (n, robots, 2, patches).
 
-        That is cells of each patch, summed over the steps of the bin, and at most at one.
+        Entry 0 is the number of cells of each patch in view, summed over the steps of the bin;
+        entry 1 the maximum over them.
         """
         begin, self._next_bin = self._next_bin, self._next_bin + len(bins)
         self._bins.append(begin, self._next_bin, bins)
 
     def evidence(self, first: int, end: int, users: int) -> Evidence:
-        """Return what was watched and perceived in the steps from `first` to `end` - 1.
+        """Return the evidence of the steps from `first` to `end` - 1.
 
         Raises:
             ComponentError: The steps aren't whole bins.
@@ -195,29 +196,28 @@ class Log:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         rows = self.seen(first, end)
         patch = self._nearest_patches.of(rows.column(X), rows.column(Y))
-        sightings = Sightings(rows.column(STEP), rows.column(IDENTITY), patch)
+        sightings = SightingRows(rows.column(STEP), rows.column(IDENTITY), patch)
         return gather(first, self.bin_steps, self.patches, bins, sightings, users)
 
     def exposure(self, first: int, end: int) -> NDArray[np.int64]:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
 
-        Before the run somebody must have said that it would be asked for.
+        It is only summed if a component declared before the run that it needs it.
 
         Raises:
-            ComponentError: It wasn't added up before one of these.
+            ComponentError: No sums were stored at `first` or `end`.
         """
         none = np.zeros_like(next(iter(self._exposures.values())))
         return _known_at(self._exposures, end, none) - _known_at(self._exposures, first, none)
 
 
 def _known_at(
-    sums: Mapping[int, NDArray[np.int64]], step: int, at_first: NDArray[np.int64]
+    sums: Mapping[int, NDArray[np.int64]], step: int, zero: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return what was added up before a step."""
+    """Return the sums up to before a step."""
     if step in sums or step == 0 or not sums:  # without cameras there are no sums
-        return sums.get(step, at_first)
+        return sums.get(step, zero)
     raise ComponentError(
-        f"what cameras looked at is added up from update to update, and step {step} is none: ask"
-        f" for exposure and looks between those of {', '.join(map(str, sorted(sums)[-5:]))}, or for"
-        " evidence"
+        f"exposure and looks are summed from update to update, and none is at step {step}: request"
+        f" them between the updates at {', '.join(map(str, sorted(sums)[-5:]))}, or use evidence"
     )

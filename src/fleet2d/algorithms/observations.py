@@ -1,4 +1,4 @@
-"""Observations: what the robots made of what their cameras showed, and what was really there."""
+"""Observations: what the robots perceived, and the truth behind it."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -30,13 +30,13 @@ from fleet2d.kernels.measure import rooms_at
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
 
-NOWHERE = -1  # the room of who is away
+NOWHERE = -1  # the room of a body that is away
 NO_NAMES: Names = np.empty(0, object)
-OBSERVATION = ROBOT + 1  # columns of a row of observations
+OBSERVATION = ROBOT + 1  # number of columns of a row of observations
 
 
 class Rows:
-    """Rows of observations in blocks that follow on each other, joined by column when asked for."""
+    """Rows of observations in consecutive blocks; columns are joined on demand."""
 
     def __init__(self, blocks: Sequence[NDArray[np.int64]]) -> None:
         self._blocks = blocks or [np.empty((0, OBSERVATION), np.int64)]
@@ -59,8 +59,8 @@ class Observations:
     """What the robots perceived, in order of step and robot; all arrays of one length.
 
     `step` is when it became known. Users, robots and rooms are indices into the scenario's users
-    and robots and the home's rooms. Nobody can tell from it what is wrong: a user may be mistaken
-    for another, or not be there at all. Arrays are read-only, and worked out when asked for.
+    and robots and the home's rooms. Errors aren't marked: a user may be mistaken for another, or
+    not be there at all. Arrays are read-only, and computed on demand.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Observations:
 
     @cached_property
     def step(self) -> NDArray[np.int64]:
-        """Step at which it became known: int64 (n,)."""
+        """Step at which the observation became known: int64 (n,)."""
         return read_only(self._rows.column(STEP))
 
     @cached_property
@@ -88,7 +88,7 @@ class Observations:
 
     @cached_property
     def user(self) -> NDArray[np.int32]:
-        """For whom somebody was taken, NOBODY if not recognized: int32 (n,)."""
+        """Index of the recognized user, NOBODY if not recognized: int32 (n,)."""
         return read_only(self._rows.column(IDENTITY).astype(np.int32))
 
     @cached_property
@@ -109,7 +109,7 @@ class Observations:
 
     @cached_property
     def room(self) -> NDArray[np.int16]:
-        """Room of that position, or the nearest room: int16 (n,)."""
+        """Room of the perceived position, or the nearest room: int16 (n,)."""
         return read_only(self._rooms.of(self._rows.column(X), self._rows.column(Y)))
 
     @cached_property
@@ -129,43 +129,43 @@ class Observations:
 
     @cached_property
     def activity(self) -> Names:
-        """What somebody is taken to do; None where that isn't perceived: object (n,)."""
+        """Perceived activity; None where activities aren't perceived: object (n,)."""
         return read_only(self._activities.perceived(self._rows.whole))
 
 
 class Truth(NamedTuple):
-    """What was really there, row by row of the observations; only metrics may know.
+    """The truth, row by row of the observations; for metrics only.
 
-    Of a false positive, `user` is NOBODY, and the rest means nothing.
+    For a false positive, `user` is NOBODY, and the other columns mean nothing.
     """
 
     user: NDArray[np.int32]
-    x: NDArray[np.float64]  # where the user was at the look [m]
+    x: NDArray[np.float64]  # position of the user at the look [m]
     y: NDArray[np.float64]
     heading: NDArray[np.float64]  # [rad]
     posture: NDArray[np.int8]
-    activity: Names = NO_NAMES  # what the user did, as far as behaviors tell; None: not told
+    activity: Names = NO_NAMES  # activity of the user; None where its behavior records none
 
 
 class Looks(NamedTuple):
     """How often each camera looked at a user in view, and how often it noticed; for metrics."""
 
-    robot: NDArray[np.int32]  # (cameras,) index of its robot
-    camera: tuple[str, ...]  # (cameras,) its name
-    in_view: NDArray[np.int64]  # (cameras, users) looks at which the user was in view
-    detected: NDArray[np.int64]  # (cameras, users) of these, those at which it was noticed
+    robot: NDArray[np.int32]  # (cameras,) index of the camera's robot
+    camera: tuple[str, ...]  # (cameras,) name of the camera
+    in_view: NDArray[np.int64]  # (cameras, users) looks with the user in view
+    detected: NDArray[np.int64]  # (cameras, users) looks with the user in view and noticed
 
 
 class NearestRooms:
-    """The room of any place, also of one in a wall or outside: there it is the nearest room's."""
+    """The room of any place; in a wall or outside, the nearest room."""
 
     def __init__(self, plan: "FloorPlan", of_cell: NDArray[np.int16] | None = None) -> None:
-        """Take the rooms of a plan, or other parts of it, as the patches of its rooms.
+        """Use the rooms of a plan, or other parts of it, such as the patches of its rooms.
 
         Args:
             plan: The floor plan.
             of_cell: int16 (rows, columns), the part that each cell belongs to, NOWHERE for none;
-                left out: its room.
+                None: its room.
         """
         self._plan = plan
         self._rooms = None if of_cell is None else _shared(beside_rooms(of_cell))
@@ -174,23 +174,23 @@ class NearestRooms:
         """Return the rooms of places [lattice units]; NOWHERE only in a home without rooms."""
         if self._rooms is None:
             self._rooms = self._plan.room_of_place
-        found: NDArray[np.int16] = rooms_at(self._rooms, x, y)
-        while len(found) and found.min() == NOWHERE and self._plan.rooms:
+        rooms: NDArray[np.int16] = rooms_at(self._rooms, x, y)
+        while len(rooms) and rooms.min() == NOWHERE and self._plan.rooms:
             padded = np.pad(self._rooms, 1, constant_values=NOWHERE)
             self._rooms = _shared(beside_rooms(padded)[1:-1, 1:-1])
-            found = rooms_at(self._rooms, x, y)
-        return found
+            rooms = rooms_at(self._rooms, x, y)
+        return rooms
 
 
 def _shared(rooms: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Return a map of rooms as the plan's own are: in one piece, and not to be changed."""
+    """Return a map of rooms as a contiguous, read-only array."""
     rooms = np.ascontiguousarray(rooms)
     rooms.setflags(write=False)
     return rooms
 
 
 def truth(plan: "FloorPlan", rows: NDArray[np.int64], activities: Activities) -> Truth:
-    """Return rows of observations as what was there."""
+    """Return the truth behind rows of observations."""
     xy = plan.lattice.to_metres(rows[:, [TRUE_X, TRUE_Y]])
     return Truth(
         rows[:, USER].astype(np.int32),

@@ -1,4 +1,4 @@
-"""What algorithms put out, and how it becomes rows of a table."""
+"""Outputs of algorithms, and the rows of a table that they become."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
@@ -11,9 +11,9 @@ from fleet2d.floorplan.home.change import HomeChanges
 from fleet2d.problems import did_you_mean
 
 WITHHELD = "withheld"
-"""What stands for an output that nobody is to read."""
+"""Stands for an output that nobody may read."""
 FROZEN = "frozen"
-"""What stands for the newest output, as it is when somebody asks that it stay."""
+"""Stands for the newest output at the moment at which an intervention freezes it."""
 
 # The columns of every table.
 RESERVED = frozenset({"step", "time"})
@@ -21,10 +21,10 @@ RESERVED = frozenset({"step", "time"})
 
 @runtime_checkable
 class Tabular(Protocol):
-    """An output of a class of its own, which knows the rows that it is stored as."""
+    """Protocol of outputs of other classes, which convert themselves to rows."""
 
     def to_columns(self, rooms: Sequence[str]) -> Mapping[str, ArrayLike]:
-        """Return columns of one length, by name.
+        """Return columns of equal length, by name.
 
         Args:
             rooms: The names of the home's rooms, in the order of their indices.
@@ -32,7 +32,7 @@ class Tabular(Protocol):
 
 
 class RoomDistribution:
-    """A probability for each room: weights that are divided by their sum (uniform if that is zero).
+    """A probability for each room: weights divided by their sum (uniform if the sum is zero).
 
     Attributes:
         share: float64 (rooms,), sums to one.
@@ -66,11 +66,11 @@ class RoomDistribution:
 
 
 class Outputs(Mapping[str, Any]):
-    """The newest output of each algorithm, by name; to be read, and asked for what is there.
+    """The newest output of each algorithm: a read-only mapping by name.
 
     Args:
-        newest: The outputs.
-        known: The names of all algorithms, with those that have put out nothing so far.
+        newest: The outputs, by name.
+        known: The names of all algorithms, also of those without an output so far.
 
     Example:
         >>> outputs = Outputs({"ltp": 3}, ["ltp", "rtp"])
@@ -88,7 +88,7 @@ class Outputs(Mapping[str, Any]):
         """Return an output.
 
         Raises:
-            ComponentError: There is no such algorithm, or it has put out nothing so far.
+            ComponentError: There is no such algorithm, or it has no output so far.
         """
         if name in self._newest:
             return self._newest[name]
@@ -103,19 +103,19 @@ class Outputs(Mapping[str, Any]):
         )
 
     def get(self, name: str, default: Any = None) -> Any:
-        """Return an output, or something else if there is none."""
+        """Return an output, or `default` if there is none so far."""
         return self._newest.get(name, default)
 
     def __contains__(self, name: object) -> bool:
-        """Tell whether an algorithm has put out anything so far."""
+        """Return whether an algorithm has an output so far."""
         return name in self._newest
 
     def __iter__(self) -> Iterator[str]:
-        """Go through the names of those that have put out something."""
+        """Iterate over the names of the algorithms with an output."""
         return iter(self._newest)
 
     def __len__(self) -> int:
-        """Return how many outputs there are."""
+        """Return the number of outputs."""
         return len(self._newest)
 
 
@@ -170,12 +170,14 @@ def _check_column(name: str, values: NDArray[Any], where: str) -> None:
             f"{where} put out {name!r} of shape {values.shape}; a number or an array of one"
             " dimension is wanted"
         )
-    words = values.dtype.kind == "O" and all(
-        issubclass(kind, str) for kind in set(map(type, values.tolist()))
+    is_text = values.dtype.kind == "O" and all(
+        issubclass(cls, str) for cls in set(map(type, values.tolist()))
     )
-    if values.dtype.kind not in "biuf" and not words:
-        what = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
-        raise ComponentError(f"{where} put out {name!r} with {what}; numbers or strings are wanted")
+    if values.dtype.kind not in "biuf" and not is_text:
+        example = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
+        raise ComponentError(
+            f"{where} put out {name!r} with {example}; numbers or strings are wanted"
+        )
     if values.dtype.kind == "f" and not np.isfinite(values).all():
         raise ComponentError(f"{where} put out {name!r} with a value that is not finite: {values}")
 

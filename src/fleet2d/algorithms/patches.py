@@ -1,4 +1,4 @@
-"""Patches: rooms cut into parts, each mostly in view as a whole or not at all."""
+"""Patches: rooms divided into parts, each mostly in view as a whole or not at all."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,19 +13,19 @@ from fleet2d.floorplan.kept import read_only
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
 
-# Patches are about so long and wide [m], and a room has about so many at most: larger ones then.
-SIDE = 1.0
-MOST = 12
+# Side of a patch [m], approximately; larger where a room would have more than about MOST_PATCHES.
+SIDE_M = 1.0
+MOST_PATCHES = 12
 
 
 @dataclass(frozen=True)
 class Patches:
-    """The rooms of a floor plan, cut into patches.
+    """The rooms of a floor plan, divided into patches.
 
     Attributes:
-        of_cell: int16 (rows, columns), the patch of each cell, NOWHERE where there is no room.
-        room: int64 (patches,), the room of each, in ascending order; each room has one at least.
-        cells: int64 (patches,), how many cells each has.
+        of_cell: int16 (rows, columns), the patch of each cell; NOWHERE outside rooms.
+        room: int64 (patches,), ascending, the room of each patch; each room has at least one.
+        cells: int64 (patches,), number of cells of each patch.
     """
 
     of_cell: NDArray[np.int16]
@@ -39,20 +39,20 @@ class Patches:
 
     @cached_property
     def room_cells(self) -> NDArray[np.int64]:
-        """How many cells each room has, 1 at least: int64 (rooms,)."""
+        """Number of cells of each room, at least 1: int64 (rooms,)."""
         cells: NDArray[np.int64] = np.maximum(np.add.reduceat(self.cells, self.first), 1)
         return read_only(cells)
 
 
 def whole_rooms(plan: "FloorPlan") -> Patches:
-    """Return the rooms as they are, each a patch."""
+    """Return each room as one patch."""
     rooms, count = plan.room_of_cell, len(plan.rooms)
     cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
     return Patches(rooms, read_only(np.arange(count)), read_only(cells))
 
 
 def patches_of(plan: "FloorPlan") -> Patches:
-    """Cut each room into boxes of cells: its own box by equal parts along both sides.
+    """Divide the bounding box of each room into equal boxes along both axes.
 
     Example:
         >>> import fleet2d
@@ -68,30 +68,40 @@ def patches_of(plan: "FloorPlan") -> Patches:
     row, column = np.nonzero(rooms != NOWHERE)
     room = rooms[row, column].astype(np.int64)
     total = np.bincount(room, minlength=count)
-    side = np.maximum(SIDE / plan.lattice.cell, np.sqrt(np.ceil(total / MOST)))
-    along, parts_along = _cut(row, room, side, count)
-    across, parts_across = _cut(column, room, side, count)
-    boxes = parts_along * parts_across
+    side = np.maximum(SIDE_M / plan.lattice.cell, np.sqrt(np.ceil(total / MOST_PATCHES)))
+    box_row, box_rows = _divide(row, room, side, count)
+    box_column, box_columns = _divide(column, room, side, count)
+    boxes = box_rows * box_columns
     first = np.cumsum(boxes) - boxes
-    box = first[room] + along * parts_across[room] + across
+    box = first[room] + box_row * box_columns[room] + box_column
     cells = np.bincount(box, minlength=int(boxes.sum()))
-    kept = cells > 0
-    kept[first[total == 0]] = True
-    number = np.cumsum(kept) - 1
+    is_patch = cells > 0
+    is_patch[first[total == 0]] = True
+    number = np.cumsum(is_patch) - 1
     of_cell = np.full(rooms.shape, NOWHERE, np.int16)
     of_cell[row, column] = number[box]
-    room = np.repeat(np.arange(count), boxes)[kept]
-    return Patches(read_only(of_cell), read_only(room), read_only(cells[kept]))
+    room = np.repeat(np.arange(count), boxes)[is_patch]
+    return Patches(read_only(of_cell), read_only(room), read_only(cells[is_patch]))
 
 
-def _cut(
+def _divide(
     place: NDArray[np.int64], room: NDArray[np.int64], side: NDArray[np.float64], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return which part of its room's extent each cell is in, and into how many that is cut."""
+    """Divide the extent of each room along one axis into equal parts.
+
+    Args:
+        place: int64 (cells,), row or column of each cell.
+        room: int64 (cells,), room of each cell.
+        side: float64 (rooms,), length of a part, approximately [cells].
+        count: Number of rooms.
+
+    Returns:
+        The part that each cell is in, int64 (cells,), and the number of parts, int64 (rooms,).
+    """
     low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
     np.minimum.at(low, room, place)
     np.maximum.at(high, room, place)
     extent = np.maximum(high - low + 1, 1)
     parts = np.maximum(1, np.rint(extent / side)).astype(np.int64)
-    found: NDArray[np.int64] = (place - low[room]) * parts[room] // extent[room]
-    return found, parts
+    part: NDArray[np.int64] = (place - low[room]) * parts[room] // extent[room]
+    return part, parts

@@ -19,7 +19,7 @@ Array = TypeVar("Array", bound=NDArray[Any])
 
 
 class Path(Protocol):
-    """Runs of equal pose, as a `Window` of one body has them."""
+    """Protocol of runs of equal pose of one body, such as `fleet2d.kernels.timelines.Window`."""
 
     @property
     def first(self) -> int:
@@ -31,27 +31,27 @@ class Path(Protocol):
 
     @property
     def step(self) -> NDArray[np.int64]:
-        """At which each run begins."""
+        """First step of each run."""
 
     @property
     def x(self) -> NDArray[np.int64]:
-        """Lattice units."""
+        """Position along x of each run [lattice units]."""
 
     @property
     def y(self) -> NDArray[np.int64]:
-        """Lattice units."""
+        """Position along y of each run [lattice units]."""
 
     @property
     def heading(self) -> NDArray[np.int64]:
-        """1/4096 turn."""
+        """Heading of each run [1/4096 turn]."""
 
     @property
     def away(self) -> NDArray[np.uint8]:
-        """Not 0 while it isn't at home."""
+        """Not 0 for runs away from home."""
 
 
 class BodyPoses:
-    """Poses of one body, one entry per step; columns are worked out when they are asked for."""
+    """Poses of one body, one entry per step; columns are computed on demand."""
 
     def __init__(self, home: "Home", runs: Path) -> None:
         self._home, self._runs = home, runs
@@ -62,12 +62,12 @@ class BodyPoses:
 
     @cached_property
     def _lengths(self) -> NDArray[np.int64]:
-        """How many steps each run of equal pose has."""
+        """Number of steps of each run of equal pose."""
         return np.diff(self._runs.step, append=self._runs.end)
 
     @cached_property
     def xy(self) -> NDArray[np.float64]:
-        """Positions (n, 2) [m]; where it left while it is away."""
+        """Positions: float64 (n, 2) [m]; while away, the place at which the body left."""
         lattice = self._home.plan.lattice
         xy = lattice.to_metres(np.stack([self._runs.x, self._runs.y], axis=-1))
         return _shared(np.repeat(xy, self._lengths, axis=0))
@@ -98,12 +98,12 @@ class BodyPoses:
 
     @cached_property
     def away(self) -> NDArray[np.bool_]:
-        """Whether it is out of the home."""
+        """Whether the body is away from home: bool (n,)."""
         return _shared(np.repeat(self._runs.away.astype(bool), self._lengths))
 
     @cached_property
     def room(self) -> NDArray[np.int16]:
-        """Index of the room, NOWHERE while it is away."""
+        """Index of the room, NOWHERE while the body is away: int16 (n,)."""
         return _shared(np.repeat(self._rooms, self._lengths))
 
     @cached_property
@@ -116,9 +116,9 @@ class BodyPoses:
 
     @cached_property
     def visits(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int16]]:
-        """Stretches of steps at one place: where each begins and ends, and its room, (stretches,).
+        """Stretches of steps at one place: begin, end and room of each, each (stretches,).
 
-        Steps are counted from the first one on; the room of who is away is NOWHERE.
+        Steps are counted from `first`; the room is NOWHERE while the body is away.
         """
         begin = self._runs.step - self._runs.first
         return frozen((begin, begin + self._lengths, self._rooms))
@@ -139,6 +139,6 @@ class BodyPoses:
 
 
 def _shared(array: Array) -> Array:
-    """Refuse changes: whoever is updated at the same step gets the same array."""
+    """Make an array read-only: components that are updated at the same step share it."""
     array.setflags(write=False)
     return array

@@ -184,7 +184,7 @@ class Recorder:
                 "true_heading": np.where(real, t.heading, np.nan),
                 "true_posture": np.where(real, t.posture, -1).astype(np.int32),
             }
-            if self.activities.are_told:
+            if self.activities.are_perceived:
                 columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
         self.store.append("observations", **columns)
 

@@ -201,7 +201,7 @@ def _add_tables(
         list(scenario.objects),
         changes=_may_change(scenario),
         cameras=camera_names(cameras),
-        activities=activities_of(cameras, len(users)).are_told,
+        activities=activities_of(cameras, len(users)).are_perceived,
     )
     if sensors.names:
         specs.append(sensor_table(sensors))
@@ -224,8 +224,7 @@ def _learners(scenario: Scenario, home: Home, clock: Clock, seed: int, store: Ru
 def _log(
     home: Home, actors: list[Actor], bodies: Bodies, cameras: list[Cameras], recorder: Recorder
 ) -> Log:
-    paths = {actor.name: actor.path for actor in actors}
-    log = Log(home, paths, bodies, recorder.activities)
-    log.cameras = [(those.index, name) for those in cameras for name in those.names]
+    log = Log(home, [actor.name for actor in actors], bodies, recorder.activities)
+    log.cameras = [(group.index, name) for group in cameras for name in group.names]
     log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
     return log

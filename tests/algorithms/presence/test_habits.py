@@ -1,4 +1,4 @@
-"""Habits: who is drawn to where time is spent at an hour ends up there."""
+"""Habits: transitions by the hour lead to the shares of time of that hour."""
 
 import numpy as np
 import pytest

@@ -9,11 +9,18 @@ from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
 from fleet2d.algorithms.evidence import Evidence, Parts
 from fleet2d.algorithms.presence.counts import Bins, in_time
-from fleet2d.algorithms.presence.person import STAY, Habits, Layout, Person, stretches_of, ways_of
+from fleet2d.algorithms.presence.person import (
+    STAY,
+    Person,
+    Prior,
+    StateLayout,
+    stretches_of,
+    ways_of,
+)
 from fleet2d.kernels.smoothing import smooth
 from fleet2d.kernels.stays import Moments, take_together
 
-HABITS = Habits(0.9, 0.05)
+PRIOR = Prior(0.9, 0.05)
 
 
 def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
@@ -21,7 +28,7 @@ def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
     of = case(seed, stages, 6, longest=1)
     of.shown[:] = -1
     dawn, dusk = of.now.sum(axis=0), np.random.default_rng(seed).random((stages, PATCHES))
-    moments = Layout(ROOM, np.ones(PATCHES), PLACES - 1, stages).no_moments()
+    moments = StateLayout(ROOM, np.ones(PATCHES), PLACES - 1, stages).no_moments()
     smooth(of.ways, of.stretches, dawn, dusk, moments)
     steps, weights = twin(of)
     ahead = [by_state(np.stack([dusk, dusk]))]
@@ -58,8 +65,8 @@ def test_expected_exits_and_time_are_those_of_pairs_of_states(seed: int, stages:
 
 
 def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
-    layout = Layout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
-    ways = ways_of(layout.no_moments(), layout, HABITS)
+    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
+    ways = ways_of(layout.no_moments(), layout, PRIOR)
     assert [1 - 1 / STAY] * 4 == pytest.approx(ways.stay.tolist())
     assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(ways.follow[0].tolist())
     assert layout.spread.tolist() == pytest.approx(ways.spread.tolist())
@@ -67,11 +74,11 @@ def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() 
 
 
 def test_ways_are_counts_by_time_with_one_event_beforehand() -> None:
-    layout = Layout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
+    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
     moments = layout.no_moments()
     moments.time[0], moments.exits[0, 1], moments.exits[0, 3] = 880.0, 6.0, 3.0
     moments.arrivals[:2], moments.moves[0], moments.rests[0] = (3.0, 7.0), 9.0, 971.0
-    ways = ways_of(moments, layout, HABITS)
+    ways = ways_of(moments, layout, PRIOR)
     assert 1 - 10 / 1000 == pytest.approx(ways.stay[0])
     entered = np.array([0.25, 6.25, 0.25, 3.25])  # to each room overall, and a quarter each
     wanted = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
@@ -112,14 +119,14 @@ def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
 
 def test_who_was_never_in_the_patch_looked_at_may_always_be_in_the_other() -> None:
     """However long a robot looks at one patch of a room, the other may have somebody in it."""
-    habits, seen = Habits(0.9, 1e-6), [[0, 0, 0]] * 600
+    prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
-    person = Person(Layout.of(bins, 1), habits)
+    person = Person(StateLayout.of(bins, 1), prior)
     places = person.end_day(stretches_of(bins, 0, longest=5))
     assert places[300, 0] > 0.1
     assert places[300, 1] < 0.01
     hidden = bins_of([[0.5, 0, 1]] * 600, seen)
-    person = Person(Layout.of(hidden, 1), habits)
+    person = Person(StateLayout.of(hidden, 1), prior)
     assert places[300, 0] + 0.02 < person.end_day(stretches_of(hidden, 0, longest=5))[300, 0]
 
 
@@ -129,7 +136,7 @@ def test_days_gone_through_again_count_once() -> None:
     shown = np.eye(3)[looks]
     seen = (np.eye(3)[looks] * (random.random((3 * 1440, 1)) < 0.3) * 5).astype(int)
     bins = bins_of(shown, seen)
-    person = Person(Layout.of(bins, 2), HABITS)
+    person = Person(StateLayout.of(bins, 2), PRIOR)
     for day in range(3):
         person.end_day(stretches_of(bins.part(day * 1440, (day + 1) * 1440), 0, longest=1))
     for _ in range(20):

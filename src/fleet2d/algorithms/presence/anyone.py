@@ -1,4 +1,4 @@
-"""Anyone, from what is believed of each user apart from the others."""
+"""The row of anyone, from the probabilities of each user, taken as independent."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,29 +9,29 @@ F64 = NDArray[np.float64]
 
 
 def unknown_seen(bins: Bins) -> NDArray[np.bool_]:
-    """Return where somebody was seen who is none of the users: bool (bins, rooms)."""
+    """Return where somebody was seen who was not recognized as a user: bool (bins, rooms)."""
     users = bins.seen[:, :-1]
-    found: NDArray[np.bool_] = bins.seen[:, -1] > users.sum(axis=1)
-    return found if users.shape[1] else np.zeros_like(found)
+    unknown: NDArray[np.bool_] = bins.seen[:, -1] > users.sum(axis=1)
+    return unknown if users.shape[1] else np.zeros_like(unknown)
 
 
 def with_anyone(chains: list[F64], unknown: NDArray[np.bool_]) -> F64:
     """Add the row of anyone to the probabilities of the users' places.
 
-    A room has somebody in it unless each user, apart from the others, is somewhere else, and for
-    sure where somebody unknown was perceived.
+    A room is empty if each user, independently of the others, is somewhere else; it certainly has
+    somebody in it where an unknown person was perceived.
 
     Args:
         chains: Each user's probability of each place, float64 (bins, rooms + 1).
-        unknown: From `unknown_seen`.
+        unknown: bool (bins, rooms), as from `unknown_seen`.
 
     Returns:
         float64 (bins, users + 1, rooms + 1).
     """
     empty = np.where(unknown, 0.0, 1.0)
-    gone = np.where(unknown.any(axis=1), 0.0, 1.0)
+    all_away = np.where(unknown.any(axis=1), 0.0, 1.0)
     for places in chains:
         empty = empty * (1 - np.minimum(places[:, :-1], 1))
-        gone = gone * places[:, -1]
-    anyone = np.concatenate([1 - empty, gone[:, None]], axis=1)
+        all_away = all_away * places[:, -1]
+    anyone = np.concatenate([1 - empty, all_away[:, None]], axis=1)
     return np.stack([*chains, anyone], axis=1)

@@ -1,4 +1,4 @@
-"""Presence: where people are believed to be, as algorithms put it out and others read it."""
+"""Presence: the probabilities of where people are, the output of presence algorithms."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -16,14 +16,14 @@ F64 = NDArray[np.float64]
 ANYONE = "anyone"
 AWAY = "away"
 HOURS = 168  # of a week, from Monday 00:00
-SUM_ERROR = 1e-6  # by which a distribution's sum may miss one
+SUM_ERROR = 1e-6  # largest deviation of a distribution's sum from one
 
 
 class Track(NamedTuple):
-    """What was believed in each bin of a period, from the evidence up to the end of that bin.
+    """The belief after each bin of a period, from the evidence up to the end of that bin.
 
     Attributes:
-        begin: Step at which the first bin begins.
+        begin: First step of the first bin.
         bin_steps: Steps of a bin.
         home: float64 (bins, users + 1, rooms), as `Presence.share`.
         away: float64 (bins, users + 1), as `Presence.away`.
@@ -38,15 +38,15 @@ class Track(NamedTuple):
 class Presence:
     """For each user, and for anyone, the probability of each room given at home, and of away.
 
-    It never changes. *Anyone* is in every room with somebody in it: `share("anyone")` is the time
-    that each room has somebody in it, divided by the sum over rooms, and `away("anyone")` is the
-    share of time with nobody at home.
+    It is immutable. *Anyone* is in every room with at least one user: `share("anyone")` is the time
+    during which each room has somebody in it, divided by the sum over rooms, and `away("anyone")`
+    is the share of time with nobody at home.
 
     Attributes:
         users: Names of the users.
-        names: Everybody it tells of: the users, and anyone.
-        time: The local time it is of.
-        track: What was believed bin by bin on the way here, of real-time presence; else None.
+        names: Names of the rows: the users, and anyone.
+        time: The local time that it describes.
+        track: For real-time presence, the belief after each bin of the period; else None.
 
     Raises:
         ComponentError: Shapes don't fit, a value isn't finite, or rooms don't sum to one.
@@ -68,15 +68,15 @@ class Presence:
         interval: tuple[F64, F64] | None = None,
         track: Track | None = None,
     ) -> None:
-        """Keep the arrays, which nobody may change any more.
+        """Keep the arrays, which become read-only.
 
         Args:
             users: Names of the users.
             home: float64 (users + 1, rooms), each row sums to one; the last is of anyone.
             away: float64 (users + 1,).
-            time: The local time it is of.
+            time: The local time that it describes.
             interval: Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
-            track: What was believed bin by bin.
+            track: The belief after each bin of the period.
         """
         self.users, self.time, self.track = tuple(users), time, track
         self.names = (*self.users, ANYONE)
@@ -92,9 +92,9 @@ class Presence:
                 f"presence of {rows - 1} users and anyone needs {rows} rows of shares and as many"
                 f" numbers of away; found shapes {self._home.shape} and {self._away.shape}"
             )
-        good = are_distributions(self._home, self._away)
-        if not good.all():
-            row = int(np.argmin(good))
+        is_valid = are_distributions(self._home, self._away)
+        if not is_valid.all():
+            row = int(np.argmin(is_valid))
             raise ComponentError(
                 f"presence of {self.names[row]!r} is no distribution: shares"
                 f" {self._home[row].tolist()}, which sum to {self._home[row].sum():g}, away"
@@ -114,22 +114,22 @@ class Presence:
         """
         if user not in self.names:
             raise ComponentError(
-                f"presence of {user!r} was asked for, whom it doesn't tell of; it tells of:"
-                f" {', '.join(self.names)}{did_you_mean(user, self.names)}"
+                f"there is no presence of {user!r}{did_you_mean(user, self.names)} There are:"
+                f" {', '.join(self.names)}"
             )
         return self.names.index(user)
 
     def share(self, user: str = ANYONE) -> F64:
         """Return the probability of each room, given at home: float64 (rooms,), sums to one."""
-        found: F64 = self._home[self.row(user)]
-        return found
+        share: F64 = self._home[self.row(user)]
+        return share
 
     def away(self, user: str = ANYONE) -> float:
         """Return the probability that a user is away, or that nobody is at home."""
         return float(self._away[self.row(user)])
 
     def with_away(self, user: str = ANYONE) -> F64:
-        """Return the probability of each room, and last of away: float64 (rooms + 1,)."""
+        """Return the probability of each room, and last that of away: float64 (rooms + 1,)."""
         away = self.away(user)
         return np.append(self.share(user) * (1 - away), away)
 
@@ -142,7 +142,7 @@ class Presence:
         return None if self._interval is None else self._interval[1][self.row(user), :-1]
 
     def at(self, time: datetime) -> "Presence":
-        """Return what this says of another time: the same, unless it tells times apart."""
+        """Return the presence at another time: itself, unless it depends on time."""
         return self
 
     def by_hour_of_week(self, user: str = ANYONE) -> F64:
@@ -150,9 +150,9 @@ class Presence:
         return np.broadcast_to(self.share(user), (HOURS, self._home.shape[1]))
 
     def to_columns(self, rooms: Sequence[str]) -> dict[str, NDArray[Any]]:
-        """Return a row per user and room, and per user one of away.
+        """Return a row for each user and room, and for each user one of away.
 
-        The shares of rooms are given at home and sum to one; that of away is of all time.
+        The shares of rooms are given at home and sum to one; that of away is a share of all time.
 
         Raises:
             ComponentError: The home has another number of rooms.
@@ -182,7 +182,7 @@ class Presence:
 
 @lru_cache(64)
 def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Return the columns that are the same each time: a row for everybody and each place."""
+    """Return the columns that are the same each time: a row for each name and place."""
     user = np.repeat(np.array(names, dtype=object), len(places))
     room = np.tile(np.array(places, dtype=object), len(names))
     for labels in (user, room):
@@ -191,19 +191,21 @@ def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArra
 
 
 def are_distributions(home: F64, away: F64) -> NDArray[np.bool_]:
-    """Tell which shares (..., rooms) sum to one, with an away (...) from 0 to 1; a NaN doesn't.
+    """Return whether shares (..., rooms) sum to one and away (...) is from 0 to 1: bool (...).
+
+    NaN is no distribution.
 
     Example:
         >>> are_distributions(np.array([[0.5, 0.5], [0.5, 0.6], [np.nan, 1]]), np.zeros(3)).tolist()
         [True, False, False]
     """
-    good = (np.abs(home.sum(axis=-1) - 1) <= SUM_ERROR) & (home >= 0).all(axis=-1)
-    found: NDArray[np.bool_] = good & (away >= 0) & (away <= 1)
-    return found
+    is_share = (np.abs(home.sum(axis=-1) - 1) <= SUM_ERROR) & (home >= 0).all(axis=-1)
+    is_valid: NDArray[np.bool_] = is_share & (away >= 0) & (away <= 1)
+    return is_valid
 
 
 class WeeklyPresence(Presence):
-    """Presence that differs by hour of the week."""
+    """Presence that depends on the hour of the week."""
 
     def __init__(
         self,
@@ -212,32 +214,32 @@ class WeeklyPresence(Presence):
         time: datetime,
         track: Track | None = None,
     ) -> None:
-        """Keep what is believed of each slot of the week.
+        """Keep the probabilities for each slot of the week.
 
         Args:
             users: Names of the users.
-            week: Shares float64 (slots, users + 1, rooms), and away float64 (slots, users + 1), of
-                the slots of equal length that a week is cut into from Monday 00:00.
-            time: The local time it is of.
-            track: What was believed bin by bin.
+            week: Shares float64 (slots, users + 1, rooms), and away float64 (slots, users + 1), for
+                slots of equal length that divide the week from Monday 00:00.
+            time: The local time that it describes.
+            track: The belief after each bin of the period.
         """
         self._week = week
-        now = slot_of_week(time, len(week[1]))
-        super().__init__(users, week[0][now], week[1][now], time, track=track)
+        slot = slot_of_week(time, len(week[1]))
+        super().__init__(users, week[0][slot], week[1][slot], time, track=track)
 
     def at(self, time: datetime) -> "WeeklyPresence":
-        """Return what it says of another time."""
+        """Return the presence at another time."""
         return WeeklyPresence(self.users, self._week, time)
 
     def by_hour_of_week(self, user: str = ANYONE) -> F64:
         """Return `share` at each hour of the week from Monday 00:00: float64 (168, rooms)."""
         slots = np.arange(HOURS) * len(self._week[1]) // HOURS
-        found: F64 = self._week[0][slots, self.row(user)]
-        return found
+        shares: F64 = self._week[0][slots, self.row(user)]
+        return shares
 
 
 def slot_of_week(time: datetime, slots: int = HOURS) -> int:
-    """Return which of the equal slots of a week a time is in.
+    """Return the index of the slot of the week that a time is in.
 
     Example:
         >>> slot_of_week(datetime(2026, 1, 5, 7, 30)), slot_of_week(datetime(2026, 1, 11, 23, 59))

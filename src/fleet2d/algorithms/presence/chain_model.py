@@ -1,4 +1,4 @@
-"""Models of real-time presence that follow a person from room to room: the chains."""
+"""Models of real-time presence that follow each person through a Markov chain over rooms."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -24,16 +24,16 @@ from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
 
-FARTHEST = 10_080  # bins ahead, beyond which a forecast stays as it is
+FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
 
 
-class Going(NamedTuple):
-    """Where somebody is now, and how that goes on.
+class PersonForecast(NamedTuple):
+    """Where a person is, and how the person moves on.
 
     Attributes:
-        now: float64 (nodes,), probability of each stage of each place, away last.
-        ways: How the person goes on.
-        habits: What differs by the hour; None: nothing.
+        now: float64 (nodes,), the probability of each stage of each place, away last.
+        ways: The transition probabilities.
+        habits: How the transitions depend on the hour; None: they don't.
     """
 
     now: F64
@@ -43,18 +43,18 @@ class Going(NamedTuple):
     @property
     def places(self) -> F64:
         """The probability of each place: float64 (1, rooms + 1)."""
-        found: F64 = self.now.reshape(1, len(self.ways.first) - 1, -1).sum(axis=2)
-        return found
+        places: F64 = self.now.reshape(1, len(self.ways.first) - 1, -1).sum(axis=2)
+        return places
 
-    def after(self, bins: int, time: datetime, bin_us: int) -> "Going":
-        """Return where somebody is some bins later than `time`, without evidence."""
+    def after(self, bins: int, time: datetime, bin_us: int) -> "PersonForecast":
+        """Return the forecast for `bins` bins later than `time`."""
         if self.habits is None:
             return self._replace(now=advance(self.now, steps_of(self.ways), bins))
         now = self.now
         while bins > 0:
-            since = timedelta(minutes=time.minute, seconds=time.second)
-            hour = -((since - timedelta(hours=1)) // timedelta(microseconds=bin_us))
-            part = min(bins, max(hour, 1))
+            past = timedelta(minutes=time.minute, seconds=time.second)
+            to_next_hour = -((past - timedelta(hours=1)) // timedelta(microseconds=bin_us))
+            part = min(bins, max(to_next_hour, 1))
             ways = self.habits.at(self.ways, time.weekday(), time.hour)
             now = advance(now, steps_of(ways), part)
             bins, time = bins - part, time + timedelta(microseconds=part * bin_us)
@@ -62,24 +62,24 @@ class Going(NamedTuple):
 
 
 class ChainPresence(Presence):
-    """Presence that goes on by transitions: the later the time, the more like that of all time."""
+    """Presence with forecasts by transitions; they approach the long-term presence over time."""
 
     def __init__(
         self,
         users: Sequence[str],
-        people: Sequence[Going],
+        people: Sequence[PersonForecast],
         time: datetime,
         bin_us: int,
         track: Track | None = None,
     ) -> None:
-        """Keep where people are.
+        """Keep the present distributions.
 
         Args:
             users: Names of the users.
-            people: Each user; without any there is one person, of anyone.
-            time: The local time it is of.
+            people: The forecast of each user; without users, one forecast, of anyone.
+            time: The local time that it describes.
             bin_us: Length of a bin [us].
-            track: What was believed on the way here; its end is taken for now.
+            track: The belief after each bin of the period, whose last bin is the present belief.
         """
         self._people, self._bin_us = tuple(people), bin_us
         if track is None:
@@ -98,12 +98,12 @@ class ChainPresence(Presence):
 
 
 def split(places: list[F64], users: int, bins: Bins | None) -> tuple[F64, F64]:
-    """Return everybody's places, anyone's last, as shares of rooms given at home, and of away.
+    """Return shares of rooms given at home, and of away, for each user and last for anyone.
 
     Args:
-        places: Each person's, float64 (bins, rooms + 1).
-        users: How many users there are; without any there is one person, of anyone.
-        bins: The evidence, which tells of unknown people; None: nobody unknown was seen.
+        places: For each person, float64 (bins, rooms + 1), the probability of each place.
+        users: Number of users; without users there is one person, of anyone.
+        bins: The evidence, in which unknown people may be seen; None: no unknown people.
     """
     everybody = places[0][:, np.newaxis]
     if users:
@@ -113,15 +113,15 @@ def split(places: list[F64], users: int, bins: Bins | None) -> tuple[F64, F64]:
 
 
 class Follower:
-    """Follows one person bin by bin.
+    """Filters the place of one person bin by bin.
 
     Attributes:
-        now: float64 (2, stages, patches), the probability of each patch, in view and not.
-        shown: int64 (patches,), what part of each patch is in view.
+        now: float64 (2, stages, patches), the probability of each patch, in view and out of view.
+        shown: int64 (patches,), the part of each patch in view.
     """
 
     def __init__(self, person: Person) -> None:
-        """Begin without knowing anything."""
+        """Begin with the uninformed distribution."""
         anywhere = person.layout.anywhere
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
@@ -130,27 +130,27 @@ class Follower:
         """Return P(room | evidence up to each bin): float64 (bins, rooms + 1).
 
         Args:
-            ways: How the person goes on, as far as that was learned.
-            stretches: The evidence, of one bin each.
+            ways: The transition probabilities.
+            stretches: The evidence, in stretches of one bin.
         """
         return follow(ways, stretches, self.now, self.shown)
 
-    def going(self, person: Person, habits: Habits | None) -> Going:
-        """Return where the person is, without patches."""
+    def forecast(self, person: Person, habits: Habits | None) -> PersonForecast:
+        """Return the present distribution over rooms, with the transitions of the person."""
         stages = person.layout.stages
         nodes = person.layout.room[:, np.newaxis] * stages + np.arange(stages)
         mass = np.bincount(nodes.ravel(), (self.now[0] + self.now[1]).T.ravel())
-        return Going(mass.astype(np.float64), person.ways, habits)
+        return PersonForecast(mass.astype(np.float64), person.ways, habits)
 
 
 def steps_of(ways: Ways) -> F64:
-    """Return how stages follow each other from bin to bin without evidence: (nodes, nodes)."""
+    """Return the transition matrix from bin to bin without evidence: float64 (nodes, nodes)."""
     nodes, places = len(ways.stay), ways.follow.shape[1] - 1
     stages = nodes // places
     steps, leave = np.diag(ways.stay), (1 - ways.stay)[:, np.newaxis] * ways.follow
     steps[:, ::stages] += leave[:, :places]
-    passed = np.arange(nodes)[np.arange(nodes) % stages < stages - 1]
-    steps[passed, passed + 1] += leave[passed, places]
+    early = np.arange(nodes)[np.arange(nodes) % stages < stages - 1]
+    steps[early, early + 1] += leave[early, places]
     return steps
 
 
@@ -158,12 +158,13 @@ def steps_of(ways: Ways) -> F64:
 class Filter(Model):
     """The filter of a hidden Markov model: P(room now | all evidence so far).
 
-    From bin to bin what is believed goes on by the transitions, and is weighed by the evidence:
-    patches of rooms that are watched in vain lose (negative information). What a person is, how
-    evidence is explained, and how it is learned after each day says the `likelihood` estimator,
-    whose keys these are.
+    From bin to bin the belief moves on by the transitions and is weighted by the evidence: patches
+    that are watched without a sighting lose probability (negative information). The model of a
+    person, the likelihood of evidence and the learning after each day are those of the `likelihood`
+    estimator, whose keys these are.
 
-    Right where stays are about geometric in length. Breaks when routines differ by time of day.
+    It is right where lengths of stays are about geometric. It fails when routines depend on the
+    time of day.
     """
 
     detection: Share = Field(
@@ -171,7 +172,7 @@ class Filter(Model):
     )
     restless: Share = Field(
         default=0.05,
-        description="chance a bin that who stays in a room changes patch, before it is learned",
+        description="chance per bin that a person in a room changes patch, before it is learned",
     )
     stages: ClassVar[int] = 1
     negative: ClassVar[bool] = True
@@ -188,12 +189,12 @@ class Filter(Model):
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
         """Return the filtered belief after each bin."""
-        found = [self._observe_day(day) for day in by_day(bins)]
-        home, away = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        days = [self._observe_day(day) for day in by_day(bins)]
+        home, away = (np.concatenate(parts) for parts in zip(*days, strict=True))
         return home, away
 
     def _observe_day(self, bins: Bins) -> tuple[F64, F64]:
-        self.learner.take_in(bins)
+        self.learner.add(bins)
         people = self.learner.people
         self.followers = self.followers or [Follower(person) for person in people]
         places = [self._follow(user, bins) for user in range(len(people))]
@@ -206,62 +207,64 @@ class Filter(Model):
         return self.followers[user].follow(self.learner.people[user].ways, stretches)
 
     def habits(self, user: int) -> Habits | None:
-        """Return what differs by the hour."""
+        """Return how a user's transitions depend on the hour; None: they don't."""
         return None
 
     def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
-        """Return what is believed now, and by `at` the forecast."""
+        """Return the present belief, which forecasts later times by `at`."""
         pairs = enumerate(zip(self.learner.people, self.followers, strict=True))
-        now = [follower.going(person, self.habits(user)) for user, (person, follower) in pairs]
-        return ChainPresence(users, now, time, bin_us, track)
+        people = [
+            follower.forecast(person, self.habits(user)) for user, (person, follower) in pairs
+        ]
+        return ChainPresence(users, people, time, bin_us, track)
 
     def remember(self) -> dict[str, Any]:
-        """Return all that was learned, as arrays in mappings."""
+        """Return the learned state, as arrays in mappings."""
         return self.learner.remember()
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Go on from what `remember` returned; called after `begin`."""
+        """Restore what `remember` returned; called after `begin`."""
         self.learner.recall(learned, self.day)
 
 
 @register("presence_model", "semi_markov")
 class SemiMarkov(Filter):
-    """The filter with stays in stages, so that how long a stay has lasted matters.
+    """The filter with stays in stages, so that the time already spent in a room matters.
 
-    A hidden semi-Markov model whose lengths of stay are Coxian distributions: a stay passes its
-    stages in order and may end in each. With two, who has just come may soon go on, while who has
-    been there for long stays for long; or the other way round, as is learned.
+    A hidden semi-Markov model whose lengths of stay have Coxian distributions: a stay passes its
+    stages in order and may end in each. With two stages, a person who has just come may leave soon,
+    while one who has been there for long stays for long; or the other way round, as is learned.
     """
 
     stages: ClassVar[int] = 2
 
 
 @register("presence_model", "routine")
-class Routine(SemiMarkov):
-    """The semi-Markov filter by the hour: people are drawn to where they usually are then.
+class RoutineModel(SemiMarkov):
+    """The semi-Markov filter with transitions by the hour, towards the rooms usual at that time.
 
-    Rooms follow each other more or less often by the hour of working days and of weekends, as far
-    as shares of time differ then (`fleet2d.algorithms.presence.habits`), from the second day on.
+    From the second day on, transitions depend on the hour of working days and of weekends, by the
+    shares of time spent in each room at that hour (`fleet2d.algorithms.presence.habits`).
 
-    Right where days are alike. Breaks when they aren't: it is surer of the usual.
+    It is right where days are similar. It fails where they aren't: it is too sure of the routine.
     """
 
     smoothing: float = Field(
-        default=60, gt=0, description="bins of average evidence each hour is given beforehand"
+        default=60, gt=0, description="bins of average evidence added to each hour"
     )
 
     def _follow(self, user: int, bins: Bins) -> F64:
         habits, ways = self.habits(user), self.learner.people[user].ways
         hours = bins.day * 24 + bins.minute // 60
         ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
-        found = []
+        places = []
         for part in (bins.part(a, b) for a, b in pairwise(ends)):
-            now = habits.at(ways, int(part.day[0] - 1) % 7, int(part.minute[0]) // 60)
-            found.append(self.followers[user].follow(now, stretches_of(part, user, 1)))
-        return np.concatenate(found)
+            at_hour = habits.at(ways, int(part.day[0] - 1) % 7, int(part.minute[0]) // 60)
+            places.append(self.followers[user].follow(at_hour, stretches_of(part, user, 1)))
+        return np.concatenate(places)
 
     def habits(self, user: int) -> Habits:
-        """Return what differs by the hour, as far as it was learned."""
+        """Return how a user's transitions depend on the hour, as learned so far."""
         counts, columns = self.learner.counts, [*range(self.rooms + 1), -1]  # places, and all bins
         week, total = counts.by_hour_of_week[:, user], counts.total[user]
         return Habits(week[:, columns], total[columns], self.smoothing)
@@ -269,10 +272,10 @@ class Routine(SemiMarkov):
 
 @register("presence_model", "markov")
 class MarkovDecay(Filter):
-    """The row of P^g of the room in which the user was perceived last, g bins ago.
+    """The row of P^g for the room in which the user was perceived last, g bins ago.
 
-    P are the transitions, learned as by `hmm`; but here views in vain tell nothing. Before the
-    first sighting it is what the transitions lead to from anywhere.
+    P is the transition matrix, learned as by `hmm`; but views without a sighting are ignored.
+    Before the first sighting it is the result of the transitions from the uniform distribution.
     """
 
     negative: ClassVar[bool] = False

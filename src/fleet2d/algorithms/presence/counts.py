@@ -1,4 +1,4 @@
-"""Sums of evidence by day and by hour of the week, of which older days may count less."""
+"""Sums of evidence by day and by hour of the week, in which older days may count less."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -20,11 +20,11 @@ EXACT = 1 << 40
 
 
 class Bins(NamedTuple):
-    """Evidence, and when it was.
+    """Evidence with the time of each bin.
 
     Attributes:
-        day: int64 (bins,), number of the day as `date.toordinal` counts.
-        minute: int64 (bins,), minutes since midnight at which the bin begins.
+        day: int64 (bins,), the day, as `date.toordinal` counts.
+        minute: int64 (bins,), begin of the bin [minutes since midnight].
         bin_steps: Steps of a bin.
         watched: float64 (bins, rooms), as in Evidence.
         seen: int64 (bins, users + 1, rooms), as in Evidence.
@@ -40,23 +40,23 @@ class Bins(NamedTuple):
 
     @property
     def parts(self) -> Parts:
-        """The same by patches of rooms, or by rooms if they aren't told apart."""
+        """The evidence by patches of rooms, or by rooms if there are no patches."""
         if self.by_patch is not None:
             return self.by_patch
         rooms = self.watched.shape[1]
-        whole = np.arange(rooms, dtype=np.int64), np.ones(rooms, np.int64)
-        return Parts(*whole, self.watched, self.watched, self.seen)
+        room, cells = np.arange(rooms, dtype=np.int64), np.ones(rooms, np.int64)
+        return Parts(room, cells, self.watched, self.watched, self.seen)
 
     def part(self, begin: int, end: int) -> "Bins":
         """Return the bins from `begin` to `end` - 1."""
-        here = slice(begin, end)
+        rows = slice(begin, end)
         return Bins(
-            self.day[here],
-            self.minute[here],
+            self.day[rows],
+            self.minute[rows],
             self.bin_steps,
-            self.watched[here],
-            self.seen[here],
-            _part(self.by_patch, here),
+            self.watched[rows],
+            self.seen[rows],
+            _part(self.by_patch, rows),
         )
 
 
@@ -64,17 +64,17 @@ def in_time(evidence: Evidence, start: datetime, step_us: int) -> Bins:
     """Return evidence with the time of each bin.
 
     Args:
-        evidence: What was watched and seen.
+        evidence: The evidence.
         start: Local time of step 0.
         step_us: Length of a step [us].
     """
     midnight = start.replace(hour=0, minute=0, second=0, microsecond=0)
-    since_us = (start - midnight).seconds * 1_000_000 + start.microsecond
+    start_us = (start - midnight).seconds * 1_000_000 + start.microsecond
     steps = evidence.begin + np.arange(len(evidence.watched), dtype=np.int64) * evidence.bin_steps
-    day, rest = np.divmod(since_us + steps * step_us, DAY_US)
+    day, time_us = np.divmod(start_us + steps * step_us, DAY_US)
     return Bins(
         start.toordinal() + day,
-        rest // 60_000_000,
+        time_us // 60_000_000,
         evidence.bin_steps,
         evidence.watched,
         evidence.seen,
@@ -82,21 +82,21 @@ def in_time(evidence: Evidence, start: datetime, step_us: int) -> Bins:
     )
 
 
-def _part(parts: Parts | None, here: slice) -> Parts | None:
-    """Return some bins of the evidence by patches."""
+def _part(parts: Parts | None, rows: slice) -> Parts | None:
+    """Return the given bins of the evidence by patches."""
     if parts is None:
         return None
-    shown_parts = None if parts.shown_parts is None else parts.shown_parts[here]
+    shown_parts = None if parts.shown_parts is None else parts.shown_parts[rows]
     return parts._replace(
-        watched=parts.watched[here],
-        shown=parts.shown[here],
-        seen=parts.seen[here],
+        watched=parts.watched[rows],
+        shown=parts.shown[rows],
+        seen=parts.seen[rows],
         shown_parts=shown_parts,
     )
 
 
 def joined(parts: Sequence[Bins]) -> Bins:
-    """Return bins that follow each other as one."""
+    """Return consecutive bins as one."""
     first = parts[0]
     if len(parts) == 1:
         return first
@@ -117,16 +117,18 @@ def joined(parts: Sequence[Bins]) -> Bins:
 
 
 class DayCounts:
-    """Sums of values per bin: of today by hour, and of earlier days, which are forgotten.
+    """Sums of values over bins: for today by hour, and for earlier days, with decaying weights.
 
-    A day that is k days old counts 2**(-k / half_life). Nothing is summed in another order when
-    updates come more often than days end.
+    A day that is k days old has the weight 2**(-k / half_life). The order of summation doesn't
+    depend on how often the sums are updated.
 
     Attributes:
-        days: The days that are over, as ordinals.
-        by_day: float64 (days, *shape), the sum of each, unweighted.
-        today: Ordinal of the day under way; 0 before the first.
-        hours: float64 (24, *shape), the sums of its hours.
+        days: The finished days, as ordinals.
+        by_day: float64 (days, *shape), the sum of each finished day, unweighted.
+        week: float64 (168, *shape), the weighted sum of each hour of the week, without today.
+        finished: float64 (*shape), the weighted sum of the finished days.
+        today: Ordinal of the present day; 0 before the first.
+        hours: float64 (24, *shape), the sums of the hours of today.
 
     Example:
         >>> counts = DayCounts((2,))
@@ -137,24 +139,24 @@ class DayCounts:
     """
 
     def __init__(self, shape: tuple[int, ...], half_life: float | None = None) -> None:
-        """Begin with nothing.
+        """Begin without days.
 
         Args:
-            shape: Of the values of a bin.
-            half_life: Days after which a day counts half; None: all count alike.
+            shape: Shape of the values of a bin.
+            half_life: Days after which a day counts half; None: all days count equally.
         """
-        # Rounded to where no library of mathematical functions disagrees.
+        # Rounded so that all math libraries agree.
         self.fade = 1.0 if half_life is None else round(0.5 ** (1 / half_life) * EXACT) / EXACT
         self.shape = shape
         self.days: list[int] = []
         self.by_day = np.zeros((0, *shape))
         self.week = np.zeros((HOURS, *shape))
-        self.over = np.zeros(shape)
+        self.finished = np.zeros(shape)
         self.today = 0
         self.hours = np.zeros((24, *shape))
 
     def add(self, day: I64, minute: I64, values: F64) -> None:
-        """Add the values of some bins, which come in order of time.
+        """Add the values of the next bins, in order of time.
 
         Args:
             day: int64 (bins,), ordinals.
@@ -168,47 +170,47 @@ class DayCounts:
         self.add_hours(slot[first], np.add.reduceat(values, first, axis=0))
 
     def add_hours(self, hours: I64, sums: F64) -> None:
-        """Add the sums of some hours, which come in order of time.
+        """Add the sums of the next hours, in order of time.
 
         Args:
             hours: int64 (hours,), as ordinal * 24 + hour of the day.
             sums: float64 (hours, *shape).
         """
-        for at, part in zip(hours.tolist(), sums, strict=True):
-            if at // 24 != self.today:
-                self.begin_day(at // 24)
-            self.hours[at % 24] += part
+        for hour, part in zip(hours.tolist(), sums, strict=True):
+            if hour // 24 != self.today:
+                self.begin_day(hour // 24)
+            self.hours[hour % 24] += part
 
     def begin_day(self, day: int) -> None:
-        """End the day under way, if there is one, and let older days fade."""
+        """End the present day, if there is one, and reduce the weights of older days."""
         if self.today:
             self._end(self.today, self.hours, day)
         self.today = day
         self.hours = np.zeros((24, *self.shape))
 
     def put(self, day: int, old: F64, new: F64) -> None:
-        """Put other sums of the hours of a day in place of those it had: (24, *shape) each."""
+        """Replace the sums of the hours of a day: float64 (24, *shape) each."""
         change = new - old
         if day == self.today:
             self.hours = self.hours + change
             return
         weight, monday = self.faded(self.today - day), (day - 1) % 7 * 24
         self.by_day[self.days.index(day)] += change.sum(axis=0)
-        self.over = self.over + weight * change.sum(axis=0)
+        self.finished = self.finished + weight * change.sum(axis=0)
         self.week[monday : monday + 24] += weight * change
 
-    def _end(self, day: int, hours: F64, following: int) -> None:
+    def _end(self, day: int, hours: F64, next_day: int) -> None:
         self.days.append(day)
         total = hours.sum(axis=0)
         self.by_day = np.concatenate([self.by_day, total[None]])
         monday = (day - 1) % 7 * 24
         self.week[monday : monday + 24] += hours
-        weight = self.faded(following - day)
-        self.over = (self.over + total) * weight
+        weight = self.faded(next_day - day)
+        self.finished = (self.finished + total) * weight
         self.week = self.week * weight
 
     def faded(self, days: int) -> float:
-        """Return what a day counts some days later, by products."""
+        """Return the weight of a day `days` days later, by repeated products."""
         weight = 1.0
         if self.fade < 1.0:
             for _ in range(min(days, 100_000)):
@@ -218,7 +220,7 @@ class DayCounts:
     @property
     def total(self) -> F64:
         """The weighted sum of all days: float64 (*shape)."""
-        total: F64 = self.over + self.hours.sum(axis=0)
+        total: F64 = self.finished + self.hours.sum(axis=0)
         return total
 
     @property
@@ -232,7 +234,7 @@ class DayCounts:
 
     @property
     def weighted_days(self) -> F64:
-        """The days that are over, each with its weight: float64 (days, *shape)."""
+        """The sums of the finished days times their weights: float64 (days, *shape)."""
         weights = np.array([self.faded(self.today - day) for day in self.days])
         weighted: F64 = self.by_day * weights.reshape(-1, *(1 for _ in self.shape))
         return weighted
@@ -243,16 +245,16 @@ class DayCounts:
             "days": np.array([*self.days, self.today], np.int64),
             "by_day": self.by_day,
             "week": self.week,
-            "over": self.over,
+            "over": self.finished,
             "hours": self.hours,
         }
 
     def recall(self, learned: dict[str, NDArray[np.generic]], today: int) -> None:
-        """Go on from what `remember` returned, as if it had ended before a day.
+        """Restore what `remember` returned, as if it had ended before a day.
 
         Args:
-            learned: What was remembered.
-            today: Ordinal of the day that begins. Days of another time are moved by whole weeks.
+            learned: The learned state.
+            today: Ordinal of the day that begins. Learned days are moved by whole weeks before it.
         """
         day = 1 << 31
         *days, last = array_of(learned, "days", (-1,), np.int64, most=day).tolist()
@@ -260,7 +262,7 @@ class DayCounts:
         self.days = [day - 7 * weeks for day in days]
         self.by_day = array_of(learned, "by_day", (len(days), *self.shape))
         self.week = array_of(learned, "week", self.week.shape)
-        self.over = array_of(learned, "over", self.shape)
+        self.finished = array_of(learned, "over", self.shape)
         self.hours = array_of(learned, "hours", self.hours.shape)
         self.today = last - 7 * weeks if last else 0
         if self.today:

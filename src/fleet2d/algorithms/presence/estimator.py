@@ -1,4 +1,4 @@
-"""The base of what estimates long-term presence."""
+"""The base of estimators of long-term presence."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -17,44 +17,44 @@ from fleet2d.kernels.presence import resampled
 F64 = NDArray[np.float64]
 
 REPLICATES = 200  # of the bootstrap
-FEWEST_DAYS = 2  # that say anything about how much days differ
+FEWEST_DAYS = 2  # fewest days that say anything about how much days differ
 
 
 class Estimator(Component):
-    """Base of what estimates where people are from evidence; a subclass writes `sums` and `shares`.
+    """Base of estimators of presence from evidence; a subclass writes `sums` and `shares`.
 
-    It turns each bin of evidence into numbers that add up over bins (`sums`), and such sums into
-    shares (`shares`). From these two come all variants: over all time, by hour of the week, with
+    `sums` turns each bin of evidence into numbers that add up over bins, and `shares` turns such
+    sums into shares. All variants follow from these two: over all time, by hour of the week, with
     forgetting, and intervals by resampling days.
     """
 
     kind: ClassVar[str] = "presence_estimator"
-    has_interval: ClassVar[bool] = True  # whether `shares` of all days are what it says
+    has_interval: ClassVar[bool] = True  # whether its output is `shares` of the sum of all days
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run.
 
         Args:
-            rooms: How many rooms there are.
-            users: How many users there are.
-            half_life: Days after which a day counts half; None: all count alike.
+            rooms: Number of rooms.
+            users: Number of users.
+            half_life: Days after which a day counts half; None: all days count equally.
         """
         self.rooms, self.users = rooms, users
         self.counts = DayCounts((users + 1, self.width(rooms)), half_life)
 
     def width(self, rooms: int) -> int:
-        """Return how many numbers `sums` has per user."""
+        """Return the number of columns of `sums` for each user."""
         raise NotImplementedError
 
     def sums(self, bins: Bins) -> F64:
-        """Return the numbers of each bin that add up: float64 (bins, users + 1, width).
+        """Return numbers for each bin that add up over bins: float64 (bins, users + 1, width).
 
-        The last of them is 1: it counts bins.
+        The last column is 1: it counts bins.
         """
         raise NotImplementedError
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
-        """Return what sums say.
+        """Return shares from sums.
 
         Args:
             sums: float64 (..., width).
@@ -65,23 +65,23 @@ class Estimator(Component):
         raise NotImplementedError
 
     def observe(self, bins: Bins) -> None:
-        """Take in evidence that follows on that before."""
+        """Add the next bins of evidence."""
         sums = np.asarray(self.sums(bins))
-        wanted = (len(bins.day), self.users + 1, self.width(self.rooms))
-        if sums.shape != wanted:
+        expected = (len(bins.day), self.users + 1, self.width(self.rooms))
+        if sums.shape != expected:
             raise ComponentError(
                 f"{type(self).__name__}.sums returned an array of shape {sums.shape}, but"
-                f" {wanted} is wanted: bins, users + 1, and what width({self.rooms}) says"
-                f"{_written_at(type(self))}"
+                f" {expected} is wanted: bins, users + 1, and width({self.rooms})"
+                f"{_source_line(type(self))}"
             )
         self.counts.add(bins.day, bins.minute, sums)
 
     def presence(self, users: Sequence[str], time: datetime) -> Presence:
-        """Return what all evidence so far says, over all time."""
+        """Return the presence from all evidence so far, over all time."""
         return Presence(users, *self.shares(self.counts.total), time)
 
     def weekly(self, users: Sequence[str], time: datetime, smoothing: float) -> Presence:
-        """Return what all evidence so far says by hour of the week.
+        """Return the presence from all evidence so far, by hour of the week.
 
         Args:
             users: Names of the users.
@@ -92,22 +92,22 @@ class Estimator(Component):
         return WeeklyPresence(users, self.shares(self.smoothed_week(smoothing)), time)
 
     def smoothed_week(self, smoothing: float) -> F64:
-        """Return the sums of each hour of the week and of some bins of average evidence."""
+        """Return the sums of each hour of the week plus `smoothing` bins of average evidence."""
         total = self.counts.total
         bins = np.maximum(total[..., -1:], 1)
         week: F64 = self.counts.by_hour_of_week + smoothing / bins * total
         return week
 
     def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
-        """Return the ends of intervals for the shares, by resampling whole days.
+        """Return intervals for the shares, by resampling whole days.
 
         Minutes of a day depend on each other, days hardly: so days are drawn with replacement, and
-        the quantiles (1 - level) / 2 and (1 + level) / 2 of the shares so found are the ends. Of
-        fewer than two whole days nothing is known: 0 and 1.
+        the ends are the quantiles (1 - level) / 2 and (1 + level) / 2 of the resulting shares. With
+        fewer than two whole days they are 0 and 1.
 
         Args:
-            key: Of the stream of draws.
-            level: How often the interval should hold the truth, as 0.9.
+            key: Key of the stream of random draws.
+            level: Probability with which the interval should hold the truth, such as 0.9.
 
         Returns:
             Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
@@ -116,38 +116,38 @@ class Estimator(Component):
         shape = (self.users + 1, self.rooms + 1)
         if len(days) < FEWEST_DAYS:
             return np.zeros(shape), np.ones(shape)
-        drawn = resampled(key, days.reshape(len(days), -1), REPLICATES)
-        home, away = self.shares(drawn.reshape(REPLICATES, *self.counts.shape))
+        sums = resampled(key, days.reshape(len(days), -1), REPLICATES)
+        home, away = self.shares(sums.reshape(REPLICATES, *self.counts.shape))
         values = np.sort(np.concatenate([home, away[..., None]], axis=-1), axis=0, kind="stable")
         cut = min(int((1 - level) / 2 * REPLICATES), (REPLICATES - 1) // 2)
         return values[cut], values[REPLICATES - 1 - cut]
 
     def remember(self) -> dict[str, Any]:
-        """Return all that was learned, as arrays in mappings."""
+        """Return the learned state, as arrays in mappings."""
         return {"counts": self.counts.remember()}
 
     def recall(self, learned: Mapping[str, Any], today: int) -> None:
-        """Go on from what `remember` returned; called after `begin`.
+        """Restore what `remember` returned; called after `begin`.
 
         Args:
-            learned: What was remembered.
+            learned: The learned state.
             today: Ordinal of the day that begins.
 
         Raises:
             ComponentError: It was learned with other rooms or users, or by another estimator.
         """
-        found = np.asarray(learned.get("counts", {}).get("over", ())).shape
-        if found != self.counts.shape:
+        shape = np.asarray(learned.get("counts", {}).get("over", ())).shape
+        if shape != self.counts.shape:
             raise ComponentError(
-                f"what was learned has sums of shape {found}, but {self.type_name} needs"
+                f"what was learned has sums of shape {shape}, but {self.type_name} needs"
                 f" {self.counts.shape} here (users and anyone, numbers of each): it is from another"
                 " home, other users or another estimator"
             )
         self.counts.recall(learned["counts"], today)
 
 
-def _written_at(cls: type[Estimator]) -> str:
-    """Return where a class's `sums` is written, for messages."""
+def _source_line(cls: type[Estimator]) -> str:
+    """Return the file and line of a class's `sums`, for messages."""
     code = cls.sums.__code__
     return f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in sums)"
 

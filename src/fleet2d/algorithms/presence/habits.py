@@ -1,4 +1,4 @@
-"""Habits: how somebody goes on by the hour, as far as time is spent elsewhere then."""
+"""Habits: transition probabilities that depend on the hour of the day."""
 
 from typing import NamedTuple
 
@@ -8,19 +8,19 @@ from fleet2d.algorithms.presence.estimator import F64
 from fleet2d.kernels.stays import Ways
 
 WEEKEND = 5  # its first day, Monday being 0
-FEWEST = 1440  # bins, below which nothing is known of hours
-MOST = 20.0  # times as often, or as seldom
+FEWEST_BINS = 1440  # with fewer bins of evidence, hours aren't distinguished
+MAX_RATIO = 20.0  # largest ratio, and inverse of the smallest, of an hour's share to the mean share
 LEAST = 1e-9
-LEAVE = 0.5  # chance a bin to leave, at most, where it wasn't more already
+MAX_LEAVE = 0.5  # largest probability per bin to leave, unless it was larger before
 
 
 class Habits(NamedTuple):
-    """What was learned of each hour of the week.
+    """Time spent in each place, by hour of the week.
 
     Attributes:
         week: float64 (168, rooms + 2), bins in each room, away, and all, from Monday 00:00.
-        total: float64 (rooms + 2,), the same of all time.
-        smoothing: Bins of average evidence that each hour is given beforehand.
+        total: float64 (rooms + 2,), the same over all hours.
+        smoothing: Bins of average evidence that are added to each hour.
     """
 
     week: F64
@@ -28,33 +28,33 @@ class Habits(NamedTuple):
     smoothing: float
 
     def at(self, ways: Ways, weekday: int, hour: int) -> Ways:
-        """Return how somebody goes on at an hour.
+        """Return the transition probabilities at an hour.
 
-        With c the share of time in each place at that hour of working days, or of weekends, by
-        that of all time, from 1/20 to 20, who would go from i to j with chance T_ij goes with
-        T_ij sqrt(c_j / c_i). If T alone leads to the shares of all time, reversibly, this leads to
-        those of the hour: p_i c_i T_ij sqrt(c_j / c_i) = p_i T_ij sqrt(c_i c_j) is as much there as
-        back.
+        Let c be the share of time in each place at that hour of working days, or of weekends,
+        divided by the share over all hours, clipped to 1/20 … 20. The probability T_ij to go from i
+        to j becomes T_ij sqrt(c_j / c_i). If T is reversible and has the overall shares p as its
+        stationary distribution, the result has those of the hour: the flow p_i c_i T_ij
+        sqrt(c_j / c_i) = p_i T_ij sqrt(c_i c_j) is symmetric.
 
         Args:
-            ways: How somebody goes on at any time.
-            weekday: 0 is Monday.
-            hour: Of the day.
+            ways: The transition probabilities over all hours.
+            weekday: Day of the week, 0 is Monday.
+            hour: Hour of the day.
         """
-        if self.total[-1] < FEWEST:
+        if self.total[-1] < FEWEST_BINS:
             return ways
         days = self.week.reshape(7, 24, -1)[:, hour]
-        alike = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
-        then = alike.sum(axis=0) + self.smoothing / self.total[-1] * self.total
-        usual, now = self.total[:-1] / self.total[-1], then[:-1] / then[-1]
-        ratio = np.maximum(now, LEAST) / np.maximum(usual, LEAST)
-        drawn = np.sqrt(np.clip(ratio, 1 / MOST, MOST))
-        places = len(drawn)
+        same_days = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
+        at_hour = same_days.sum(axis=0) + self.smoothing / self.total[-1] * self.total
+        mean_share, share = self.total[:-1] / self.total[-1], at_hour[:-1] / at_hour[-1]
+        ratio = np.maximum(share, LEAST) / np.maximum(mean_share, LEAST)
+        pull = np.sqrt(np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO))
+        places = len(pull)
         leave = (1 - ways.stay)[:, np.newaxis] * ways.follow
-        leave[:, :places] *= drawn / np.repeat(drawn, len(ways.stay) // places)[:, np.newaxis]
+        leave[:, :places] *= pull / np.repeat(pull, len(ways.stay) // places)[:, np.newaxis]
         chance = np.zeros(len(leave))
-        for column in leave.T:  # in one order on every machine
+        for column in leave.T:  # summed in the same order on every machine
             chance += column
         follow = leave / np.maximum(chance, LEAST)[:, np.newaxis]
-        most = np.maximum(1 - ways.stay, LEAVE)
+        most = np.maximum(1 - ways.stay, MAX_LEAVE)
         return ways._replace(stay=1 - np.minimum(chance, most), follow=follow)

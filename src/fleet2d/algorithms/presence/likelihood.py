@@ -1,4 +1,4 @@
-"""Full likelihood: stays as a hidden chain, of which empty views are evidence, too."""
+"""Full likelihood: stays as a hidden Markov chain, for which empty views are evidence, too."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -12,7 +12,7 @@ from pydantic import Field
 from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import Habits, Layout, Person, watched_patches
+from fleet2d.algorithms.presence.person import Person, Prior, StateLayout, watched_patches
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places
@@ -21,47 +21,46 @@ from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
 
-# Earlier days that are gone through again when a day is over, in turn; and how many are kept.
+# Number of earlier days that are revisited in turn when a day is over, and of those stored.
 REVISITS = 2
-KEPT = 64
+STORED_DAYS = 64
 
 
 @register("presence_estimator", "likelihood", aliases=("hmm",))
 class Likelihood(Estimator):
-    """Expected share of time per room given all that was and wasn't seen, in a hidden chain.
+    """Expected share of time in each room given all evidence, in a hidden Markov chain.
 
-    Each user is in one patch of one room, or away (`fleet2d.algorithms.patches`). A stay in a room
-    lasts a number of bins that is geometric, or with several `stages` a sum of such (a Coxian
-    distribution: a hidden semi-Markov model), and is followed by one in another room; who stays
-    changes patch at times. Who comes to a patch is in its part that is in view with the chance of
-    `shown`, the largest share of it in view at once in the bin, and is so until moving, or until
-    what is in view changes: who sits behind a corner stays there, however long the robot looks.
-    Evidence is explained
+    Each user is in one patch of one room, or away (`fleet2d.algorithms.patches`). The length of a
+    stay in a room is geometric, or with several `stages` a sum of geometric lengths (a Coxian
+    distribution: a hidden semi-Markov model); then the user goes to another room. During a stay the
+    user changes patch at times. A user who comes to a patch is in its visible part with the
+    probability `shown`, the largest share of the patch in view at once in the bin, and stays in or
+    out of view until the user moves or the view changes: a person who sits behind a corner stays
+    hidden, however long the robot looks. The likelihood of evidence is
 
-    - if the user was perceived: by a patch with the share of sightings in it; by anything else,
-      as somebody else was taken for the user, with 0.001 of what follows;
-    - if not: by who is in view with 1 - detection, by who isn't with 1. A patch in which somebody
-      unknown was perceived, who may be the user, isn't in view.
+    - if the user was perceived: for each patch the share of sightings in it; for any other place,
+      as another person may have been mistaken for the user, 0.001 of the likelihood below;
+    - if not: 1 - detection for a user in view, 1 for a user out of view. A patch in which an
+      unknown person was perceived, who may be the user, counts as out of view.
 
-    Consecutive bins of an hour in which the same was in view and perceived are taken `together`;
-    what happens within them is taken to happen as they begin, once. With 1 it is exact, and takes
-    as much longer.
+    Consecutive bins of an hour with the same view and the same sightings are merged, at most
+    `together` bins; the model allows one transition as they begin. With 1 it is exact, and takes
+    correspondingly longer.
 
-    Shares are the means of P(room | all evidence), by smoothing. Lengths of stay, what follows
-    what, who comes to which patch and changes it how often are learned by expectation and
-    maximization with one event each beforehand (`fleet2d.algorithms.presence.person`). When a day
-    is over it is smoothed as a whole, and so are two of the last 64 days, in turn, with messages
-    from and to the days beside them (incremental, after Neal and Hinton 1998); the day under way
-    is only filtered.
+    Shares are the means of P(room | all evidence), by smoothing. Lengths of stays, transitions
+    between rooms, and the choice and change of patches are learned by expectation maximization
+    with a prior of one event each (`fleet2d.algorithms.presence.person`). When a day is over it is
+    smoothed as a whole, and so are two of the last 64 days, in turn, with messages from and to the
+    days next to them (incremental, after Neal and Hinton 1998); the present day is only filtered.
 
-    Right when the robot acts on what it has perceived only (then where it looks can be ignored:
-    missing at random, Rubin 1976) and looks at every patch at times. Breaks when the model is
-    wrong: stays that differ much by time of day, people who follow each other, patches never
-    looked at (there the prior speaks: such time is mostly taken for away), users who are hardly
-    ever recognized.
+    It is right when the robot acts only on what it has perceived (then the choice of looks can be
+    ignored: missing at random, Rubin 1976) and looks at every patch at times. It fails when the
+    model is wrong: stays that depend strongly on the time of day, people who follow each other,
+    patches that are never watched (the prior decides: such time mostly counts as away), users who
+    are hardly ever recognized.
 
-    Anyone is taken from all users, apart from each other, and unknown people where seen; without
-    users it is one person's chain.
+    Anyone follows from all users, taken as independent, and from unknown people where they are
+    seen; without users it is the chain of one person.
     """
 
     detection: Share = Field(
@@ -69,7 +68,7 @@ class Likelihood(Estimator):
     )
     restless: Share = Field(
         default=0.05,
-        description="chance a bin that who stays in a room changes patch, before it is learned",
+        description="chance per bin that a person in a room changes patch, before it is learned",
     )
     stages: int = Field(
         default=1, ge=1, le=4, description="of a stay; above 1 its length isn't geometric"
@@ -78,7 +77,7 @@ class Likelihood(Estimator):
         default=5,
         ge=1,
         le=60,
-        description="most bins, alike in what was in view and seen, that are taken together",
+        description="largest number of consecutive bins with equal evidence that are merged",
     )
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
@@ -86,34 +85,34 @@ class Likelihood(Estimator):
         super().begin(rooms, users, half_life)
         self.people: list[Person] = []
         self.learned: Mapping[str, Any] = {}
-        self.parts: list[Day] = []  # of the day under way
-        self.days: list[Day] = []  # those that are gone through again, without their views
-        self.hours: list[F64] = []  # their sums by hour
-        self.turn = 0  # of the day gone through last
+        self.parts: list[DayEvidence] = []  # the parts of the present day
+        self.days: list[DayEvidence] = []  # the days that are revisited, without their views
+        self.hours: list[F64] = []  # the sums by hour of these days
+        self.turn = 0  # index of the day that was revisited last
 
     def width(self, rooms: int) -> int:
-        """Return how many numbers `sums` has: of rooms and away bins and their doubt, and all."""
+        """Return the number of columns of `sums`: p and p (1 - p) of each place, and bins."""
         return 2 * (rooms + 1) + 1
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
-        """Return expected bins per room by all at home, and those away by all."""
+        """Return the expected share of rooms given at home, and of away."""
         rooms, bins = (sums.shape[-1] - 3) // 2, sums[..., -1]
         away = np.where(bins > 0, sums[..., rooms] / np.where(bins > 0, bins, 1), 0.0)
         return normalized(np.maximum(sums[..., :rooms], 0)), np.clip(away, 0, 1)
 
     def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
-        """Return the ends of intervals for the shares of time in each room of the time so far.
+        """Return intervals for the shares of time in each room, over the time so far.
 
-        What is in doubt is the time in which nobody saw the user: with p = P(room | all evidence)
-        of each bin, the number of bins in a room has the variance 2 l sum p (1 - p), where l is how
-        long a stay there lasts on average, because bins of a stay depend on each other. That is
-        doubled, for what isn't known of the stays themselves, and the ends are those of a normal
-        distribution; below the share of one bin, the lower end is 0. Of fewer than two whole days
-        little is known: 0 and 1.
+        The time in which nobody saw the user is uncertain: with p = P(room | all evidence) of each
+        bin, the number of bins in a room has the variance 2 l sum p (1 - p), where l is the mean
+        length of a stay there, because the bins of a stay depend on each other. The variance is
+        doubled, as the model of stays is uncertain, too, and the ends are quantiles of a normal
+        distribution; below the share of one bin, the lower end is 0. With fewer than two whole days
+        the ends are 0 and 1.
 
         Args:
-            key: Of the stream of draws, which it has no need of.
-            level: How often the interval should hold the truth, as 0.9.
+            key: Key of the stream of random draws, which isn't used.
+            level: Probability with which the interval should hold the truth, such as 0.9.
 
         Returns:
             Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
@@ -123,32 +122,32 @@ class Likelihood(Estimator):
             return np.zeros(shape), np.ones(shape)
         total, lengths = self.counts.total, [person.length_of_stay for person in self.people]
         anyone = [np.max(lengths, axis=0)] if self.users else []
-        doubt = np.maximum(total[:, self.rooms + 1 : -1], 0) * np.array(lengths + anyone)
+        variance = np.maximum(total[:, self.rooms + 1 : -1], 0) * np.array(lengths + anyone)
         at_home = np.maximum(total[:, : self.rooms].sum(axis=1, keepdims=True), 1)
-        of = np.concatenate([np.repeat(at_home, self.rooms, axis=1), total[:, -1:]], axis=1)
+        bins = np.concatenate([np.repeat(at_home, self.rooms, axis=1), total[:, -1:]], axis=1)
         home, away = self.shares(total)
         share = np.concatenate([home, away[:, None]], axis=1)
-        # Rounded to where no library disagrees.
+        # Rounded so that all math libraries agree.
         quantile = round(NormalDist().inv_cdf((1 + level) / 2), 6)
-        half = quantile * np.sqrt(4 * doubt) / of
-        low = np.where(share - half < 1 / of, 0.0, share - half)
+        half = quantile * np.sqrt(4 * variance) / bins
+        low = np.where(share - half < 1 / bins, 0.0, share - half)
         return low, np.minimum(share + half, 1)
 
     def observe(self, bins: Bins) -> None:
-        """Take in evidence that follows on that before."""
+        """Process the next bins of evidence."""
         for day in by_day(bins):
-            part = self.take_in(day)
+            part = self.add(day)
             places = [
                 person.follow(part.stretches(user, self.together))
                 for user, person in enumerate(self.people)
             ]
             self.counts.add_hours(*self._by_hour(places, part))
 
-    def take_in(self, bins: Bins) -> "Day":
-        """Take in evidence of one day, from which is learned when the next has begun."""
+    def add(self, bins: Bins) -> "DayEvidence":
+        """Add evidence of one day, which is learned from when the next day begins."""
         if not self.people:
-            self._meet(bins)
-        part = Day.of(bins)
+            self._create_people(bins)
+        part = DayEvidence.of(bins)
         if part.number != self.counts.today:
             if self.parts:
                 self._end_day(part.number)
@@ -156,37 +155,37 @@ class Likelihood(Estimator):
         self.parts.append(part)
         return part
 
-    def _meet(self, bins: Bins) -> None:
-        layout, habits = Layout.of(bins, self.stages), Habits(self.detection, self.restless)
-        self.people = [Person(layout, habits) for _ in range(max(self.users, 1))]
+    def _create_people(self, bins: Bins) -> None:
+        layout, prior = StateLayout.of(bins, self.stages), Prior(self.detection, self.restless)
+        self.people = [Person(layout, prior) for _ in range(max(self.users, 1))]
         for i, person in enumerate(self.people):
             if self.learned and not person.recall(self.learned.get(str(i), {})):
                 raise ComponentError(
-                    f"what was learned doesn't tell of stays of {self.stages} stages in"
-                    f" {len(layout.room) - 1} patches of {self.rooms} rooms: it is from another"
-                    " home, other users, another estimator, or one with other stages"
+                    f"what was learned doesn't fit {self.stages} stages in {len(layout.room) - 1}"
+                    f" patches of {self.rooms} rooms: it is from another home, other users, another"
+                    " estimator, or one with other stages"
                 )
 
-    def _by_hour(self, places: list[F64], day: "Day") -> tuple[I64, F64]:
-        """Return the hours of bins, as ordinal * 24 + hour, and what adds up in each.
+    def _by_hour(self, places: list[F64], day: "DayEvidence") -> tuple[I64, F64]:
+        """Return the hours of the bins, as ordinal * 24 + hour, and the sums of each hour.
 
-        That is places p, p (1 - p), and 1: float64 (hours, users + 1, width).
+        The sums are those of p, p (1 - p), and 1: float64 (hours, users + 1, width).
         """
         hour = day.minute // 60
         first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
         sums = sum_places(np.stack(places), day.unknown, self.users, first)
         return day.number * 24 + hour[first], sums
 
-    def _whole_day(self, places: list[F64], day: "Day") -> F64:
-        """Return what adds up in each hour of a day: float64 (24, users + 1, width)."""
+    def _whole_day(self, places: list[F64], day: "DayEvidence") -> F64:
+        """Return the sums of each hour of a day: float64 (24, users + 1, width)."""
         hours, sums = self._by_hour(places, day)
-        found = np.zeros((24, *sums.shape[1:]))
-        found[hours % 24] = sums
-        return found
+        by_hour = np.zeros((24, *sums.shape[1:]))
+        by_hour[hours % 24] = sums
+        return by_hour
 
-    def _end_day(self, following: int) -> None:
-        """Smooth the day under way as a whole, learn from it, and go through earlier ones again."""
-        day, self.parts = Day.joined(self.parts), []
+    def _end_day(self, next_day: int) -> None:
+        """Smooth the present day as a whole, learn from it, and revisit earlier days."""
+        day, self.parts = DayEvidence.joined(self.parts), []
         places = [
             person.end_day(day.stretches(user, self.together))
             for user, person in enumerate(self.people)
@@ -197,14 +196,14 @@ class Likelihood(Estimator):
         for _ in range(REVISITS):
             self.turn = (self.turn - 1) % len(self.days)
             self._revisit(self.turn)
-        fade = self.counts.faded(following - self.counts.today)
+        fade = self.counts.faded(next_day - self.counts.today)
         for person in self.people:
             person.fade(fade)
-            person.forget(KEPT)
-        del self.days[:-KEPT], self.hours[:-KEPT]
+            person.forget(STORED_DAYS)
+        del self.days[:-STORED_DAYS], self.hours[:-STORED_DAYS]
 
     def _revisit(self, number: int) -> None:
-        """Go through a day again, and put what it says now in place of what it said."""
+        """Smooth a day with the present model, and replace its sums."""
         day = self.days[number]
         weight = self.counts.faded(self.counts.today - day.number)
         places = [person.revisit(number, weight) for person in self.people]
@@ -213,42 +212,44 @@ class Likelihood(Estimator):
         self.hours[number] = hours
 
     def remember(self) -> dict[str, Any]:
-        """Return all that was learned, as arrays in mappings."""
+        """Return the learned state, as arrays in mappings."""
         stays = {str(i): person.remember() for i, person in enumerate(self.people)}
         return {**super().remember(), "stays": stays or self.learned}
 
     def recall(self, learned: Mapping[str, Any], today: int) -> None:
-        """Go on from what `remember` returned; called after `begin`."""
+        """Restore what `remember` returned; called after `begin`."""
         super().recall(learned, today)
         self.learned = learned.get("stays", {})
 
 
-class Day(NamedTuple):
+class DayEvidence(NamedTuple):
     """Evidence of one day, or of a part of it, as the chains of users need it.
 
     Attributes:
-        number: Of the day, as `date.toordinal` counts.
-        minute: int64 (bins,), since midnight.
-        unknown: bool (bins, rooms), where somebody was perceived who is no user.
-        watched: uint8 (bins, patches), from `watched_patches`; None once the day is learned from.
-        sightings: Who was perceived where; None likewise.
+        number: The day, as `date.toordinal` counts.
+        minute: int64 (bins,), begin of each bin [minutes since midnight].
+        unknown: bool (bins, rooms), where an unknown person was perceived.
+        watched: uint8 (bins, patches), from `watched_patches`; None after the day was learned from.
+        sightings: Where users were perceived; None after the day was learned from.
     """
 
     number: int
     minute: I64
     unknown: NDArray[np.bool_]
     watched: NDArray[np.uint8] | None
-    sightings: "Sightings | None"
+    sightings: "SightingCounts | None"
 
     @classmethod
     def of(cls, bins: Bins) -> Self:
-        """Return evidence of one day."""
+        """Return the evidence of bins of one day."""
         number, watched = int(bins.day[0]), watched_patches(bins)
-        return cls(number, bins.minute, unknown_seen(bins), watched, Sightings.of(bins.parts.seen))
+        return cls(
+            number, bins.minute, unknown_seen(bins), watched, SightingCounts.of(bins.parts.seen)
+        )
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return parts of a day that follow each other as one."""
+        """Return consecutive parts of a day as one."""
         if len(parts) == 1:
             return parts[0]
         lengths = [len(part.minute) for part in parts]
@@ -257,25 +258,25 @@ class Day(NamedTuple):
             np.concatenate([part.minute for part in parts]),
             np.concatenate([part.unknown for part in parts]),
             np.concatenate([part.watched for part in parts if part.watched is not None]),
-            Sightings.joined([part.sightings for part in parts if part.sightings], lengths),
+            SightingCounts.joined([part.sightings for part in parts if part.sightings], lengths),
         )
 
     def stretches(self, user: int, longest: int) -> Stretches:
-        """Return the evidence of one user, bins that are alike taken together."""
+        """Return the evidence of one user, with equal bins merged."""
         assert self.watched is not None
         assert self.sightings is not None
         seen = self.sightings.of_user(user, self.watched.shape)
         return take_together(self.minute, self.watched, seen, longest)
 
 
-class Sightings(NamedTuple):
-    """Where users were perceived, which is hardly anywhere at most times: arrays of one length.
+class SightingCounts(NamedTuple):
+    """Where users were perceived, as sparse counts: arrays of one length.
 
     Attributes:
-        user: int64, rising.
-        bin: int64, rising for each user.
-        patch: int64.
-        steps: int64, at how many steps.
+        user: int64 (n,), ascending, row of the user.
+        bin: int64 (n,), ascending for each user.
+        patch: int64 (n,), the patch.
+        steps: int64 (n,), number of steps at which the user was perceived there.
     """
 
     user: I64
@@ -287,23 +288,23 @@ class Sightings(NamedTuple):
     def of(cls, seen: I64) -> Self:
         """Return the sightings in counts (bins, users + 1, patches), as in Parts."""
         steps = seen.ravel()
-        places = np.flatnonzero(steps > 0)  # quicker than with three axes, or of the numbers
+        places = np.flatnonzero(steps > 0)  # quicker than np.nonzero over three axes
         bins, user, patch = np.unravel_index(places, seen.shape)
         return cls(user, bins, patch, steps[places])._by_user()
 
     @classmethod
     def joined(cls, parts: Sequence[Self], lengths: Sequence[int]) -> Self:
-        """Return sightings in parts of so many bins that follow each other as one."""
+        """Return sightings in consecutive parts of `lengths` bins as one."""
         first = np.cumsum([0, *lengths[:-1]])
-        moved = [part._replace(bin=part.bin + at) for part, at in zip(parts, first, strict=True)]
-        return cls(*(np.concatenate(column) for column in zip(*moved, strict=True)))._by_user()
+        shifted = [part._replace(bin=part.bin + at) for part, at in zip(parts, first, strict=True)]
+        return cls(*(np.concatenate(column) for column in zip(*shifted, strict=True)))._by_user()
 
     def _by_user(self) -> Self:
         order = np.argsort(self.user, kind="stable")
         return type(self)(*(column[order] for column in self))
 
     def of_user(self, user: int, shape: tuple[int, ...]) -> I64:
-        """Return those of a user as counts, int64 of a shape (bins, patches)."""
+        """Return the sightings of a user as counts: int64 (bins, patches), of a given shape."""
         begin, end = np.searchsorted(self.user, [user, user + 1])
         seen = np.zeros(shape, np.int64)
         seen[self.bin[begin:end], self.patch[begin:end]] = self.steps[begin:end]
@@ -311,6 +312,6 @@ class Sightings(NamedTuple):
 
 
 def by_day(bins: Bins) -> list[Bins]:
-    """Return evidence as that of its days."""
+    """Split evidence into days."""
     ends = [*(np.flatnonzero(np.diff(bins.day)) + 1).tolist(), len(bins.day)]
     return [bins.part(a, b) for a, b in pairwise([0, *ends]) if a < b]

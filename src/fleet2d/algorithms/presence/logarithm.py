@@ -1,4 +1,4 @@
-"""Logarithms that are the same on every machine, which those of the system's library are not."""
+"""Logarithms that are the same on every machine, unlike those of the system's math library."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,5 +26,5 @@ def natural_log(values: ArrayLike) -> F64:
     square, series = s * s, np.zeros_like(s)
     for k in range(TERMS, -1, -1):
         series = series * square + 1 / (2 * k + 1)
-    found: F64 = e * LN_2 + 2 * s * series
-    return found
+    logarithm: F64 = e * LN_2 + 2 * s * series
+    return logarithm

@@ -28,10 +28,10 @@ SECOND_US = 1_000_000
 
 @register("algorithm", "long_term_presence", aliases=("ltp",))
 class LongTermPresence(Algorithm):
-    """How much of the time each user, and anyone, spends in each room, as robots' evidence says.
+    """Share of time that each user, and anyone, spends in each room, from robots' evidence.
 
-    Its output is a `Presence`: `share` is given at home, `with_away` of all time, and with `by:
-    hour_of_week` both are those of the hour, and `at` tells of any other.
+    Its output is a `Presence`: `share` is given at home, `with_away` of all time; with `by:
+    hour_of_week` both are for the present hour of the week, and `at` returns other hours.
     """
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})
@@ -44,7 +44,7 @@ class LongTermPresence(Algorithm):
     )
     smoothing: PositiveDuration = Field(
         default=timedelta(hours=1),
-        description="of average evidence that each hour of the week is given beforehand",
+        description="duration of average evidence added to each hour of the week",
     )
     half_life: PositiveDuration | None = Field(
         default=None, description="after which evidence counts half; null: all counts alike"
@@ -67,16 +67,16 @@ class LongTermPresence(Algorithm):
     def start(self, home: "Home") -> None:
         """Begin without evidence."""
         self.rooms = len(home.rooms)
-        self.begun = False
-        self.recalled: Mapping[str, Any] | None = None
+        self.has_begun = False
+        self.learned_state: Mapping[str, Any] | None = None
         self.ends: tuple[F64, F64] | None = None
 
     def update(self, history: History, state: Present) -> Presence:
-        """Take in what was watched and seen; return what all of it says."""
+        """Process the evidence of the period; return the presence from all evidence so far."""
         step_us = round(history.step_s * SECOND_US)
         evidence = history.evidence
         bins = in_time(evidence, state.start, step_us)
-        if not self.begun:
+        if not self.has_begun:
             self._begin(state)
         self.estimator.observe(bins)
         time = state.time + timedelta(microseconds=step_us)
@@ -88,22 +88,22 @@ class LongTermPresence(Algorithm):
 
     def _begin(self, state: Present) -> None:
         self._prepare(self.estimator, len(state.users), state.start)
-        self.begun, self.until = True, -1
+        self.has_begun, self.until = True, -1
 
     def _prepare(self, estimator: Estimator, users: int, start: datetime) -> None:
         half_life = None if self.half_life is None else self.half_life / DAY
         estimator.begin(self.rooms, users, half_life)
-        if self.recalled is not None:
-            estimator.recall(self.recalled, start.toordinal())
+        if self.learned_state is not None:
+            estimator.recall(self.learned_state, start.toordinal())
 
     def check_learned(self, users: Sequence[str], start: datetime) -> None:
-        """Begin on trial with what was learned, which must fit the users."""
-        if self.recalled is not None:
-            check_numbers("", self.recalled, self.type_name)
+        """Restore the learned state in a copy, which raises if it doesn't fit the users."""
+        if self.learned_state is not None:
+            check_numbers("", self.learned_state, self.type_name)
             self._prepare(self.estimator.model_copy(deep=True), len(users), start)
 
     def _with_interval(self, presence: Presence, state: Present) -> Presence:
-        """Add the interval, which changes when a day is over, and always holds the estimate."""
+        """Add the interval, which is updated when a day is over and always holds the estimate."""
         assert self.interval is not None
         if self.until != self.estimator.counts.today:
             self.until = self.estimator.counts.today
@@ -116,11 +116,11 @@ class LongTermPresence(Algorithm):
         return Presence(presence.users, home, away, presence.time, ends)
 
     def remember(self) -> dict[str, Any]:
-        """Return what was learned, to start another run from."""
-        if not self.begun:
-            return {} if self.recalled is None else dict(self.recalled)
+        """Return the learned state, from which another run can start."""
+        if not self.has_begun:
+            return {} if self.learned_state is None else dict(self.learned_state)
         return self.estimator.remember()
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Go on from what another run has learned."""
-        self.recalled = learned or None
+        """Restore the learned state of another run."""
+        self.learned_state = learned or None

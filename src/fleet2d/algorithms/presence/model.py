@@ -1,4 +1,4 @@
-"""The base of models of real-time presence, and those without a chain: last seen, and long-term."""
+"""The base of models of real-time presence, and the models without a Markov chain."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -16,10 +16,9 @@ NEVER = -1
 
 
 class Model(Component):
-    """Base of what tells where people are now; a subclass writes `observe` and `presence`.
+    """Base of models of where people are now; a subclass writes `observe` and `presence`.
 
-    A model that was learned elsewhere is one more subclass: a scenario names it by `model:
-    module:Class`.
+    A scenario names a model of your own, such as one learned elsewhere, by `model: module:Class`.
     """
 
     kind: ClassVar[str] = "presence_model"
@@ -28,16 +27,16 @@ class Model(Component):
         """Prepare for a run.
 
         Args:
-            rooms: How many rooms there are.
-            users: How many users there are.
-            day: Ordinal of its first day.
+            rooms: Number of rooms.
+            users: Number of users.
+            day: First day of the run, as `date.toordinal` counts.
         """
         self.rooms, self.users = rooms, users
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
-        """Take in evidence that follows on that before; return what is believed after each bin.
+        """Process the next bins of evidence; return the belief after each bin.
 
-        Nothing may be used that came later than the bin.
+        The belief after a bin may use evidence up to that bin only.
 
         Returns:
             Shares of rooms given at home, float64 (bins, users + 1, rooms), and of away, float64
@@ -46,30 +45,30 @@ class Model(Component):
         raise NotImplementedError
 
     def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
-        """Return what is believed now, which may tell of later times by `at`.
+        """Return the present belief, which may forecast later times by `at`.
 
         Args:
             users: Names of the users.
-            time: The local time at which the last bin ended.
+            time: Local time at which the last bin ended.
             bin_us: Length of a bin [us].
-            track: What was believed on the way here, its last bin now.
+            track: The belief after each bin of the period; its last bin is the present belief.
         """
         return Presence(users, track.home[-1], track.away[-1], time, track=track)
 
     def remember(self) -> dict[str, Any]:
-        """Return all that was learned, as arrays in mappings."""
+        """Return the learned state, as arrays in mappings."""
         return {}
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Go on from what `remember` returned; called after `begin`."""
+        """Restore what `remember` returned; called after `begin`."""
 
 
 @register("presence_model", "last_seen")
 class LastSeen(Model):
-    """The room in which the user was perceived last, for sure; before that all rooms are alike.
+    """Probability 1 for the room in which the user was perceived last; uniform before that.
 
-    Of a bin with sightings in several rooms, that with most; nobody is ever away. The naive
-    baseline: right just after a sighting, and then surer of itself than it should be.
+    In a bin with sightings in several rooms, the room with most of them counts; nobody is ever
+    away. The naive baseline: right just after a sighting, and overconfident later.
     """
 
     def begin(self, rooms: int, users: int, day: int) -> None:
@@ -79,8 +78,8 @@ class LastSeen(Model):
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
         """Return the last room of each user after each bin."""
-        found = np.any(bins.seen > 0, axis=2)
-        room = np.where(found, bins.seen.argmax(axis=2), NEVER)
+        is_seen = np.any(bins.seen > 0, axis=2)
+        room = np.where(is_seen, bins.seen.argmax(axis=2), NEVER)
         room = np.concatenate([self.last[np.newaxis], room])
         newest = np.where(room != NEVER, np.arange(len(room))[:, np.newaxis], 0)
         room = np.take_along_axis(room, np.maximum.accumulate(newest, axis=0), axis=0)
@@ -92,7 +91,7 @@ class LastSeen(Model):
 
 @register("presence_model", "long_term")
 class LongTerm(Model):
-    """Long-term presence, whatever was seen just now."""
+    """Long-term presence, regardless of recent sightings."""
 
     estimator: Annotated[Estimator, OneOf("presence_estimator")] = Field(
         cast("Any", "likelihood"), description="how it is estimated"
@@ -105,40 +104,40 @@ class LongTerm(Model):
         self.estimator.begin(rooms, users)
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
-        """Return what was believed before these bins, for each of them."""
+        """Return the belief before these bins, repeated for each of them."""
         home, away = self.estimator.shares(self.estimator.counts.total)
         self.estimator.observe(bins)
         count = len(bins.day)
         return np.repeat(home[np.newaxis], count, axis=0), np.repeat(away[np.newaxis], count, 0)
 
     def remember(self) -> dict[str, Any]:
-        """Return all that was learned, as arrays in mappings."""
+        """Return the learned state, as arrays in mappings."""
         return self.estimator.remember()
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Go on from what `remember` returned; called after `begin`."""
+        """Restore what `remember` returned; called after `begin`."""
         self.estimator.recall(learned, self.day)
 
 
 @register("presence_model", "hour_of_week")
 class HourOfWeek(LongTerm):
-    """Long-term presence of the hour of the week, whatever was seen just now."""
+    """Long-term presence of the hour of the week, regardless of recent sightings."""
 
     smoothing: float = Field(
-        default=60, gt=0, description="bins of average evidence each hour is given beforehand"
+        default=60, gt=0, description="bins of average evidence added to each hour"
     )
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
-        """Return what was believed before these bins of the hour of each of them."""
+        """Return the belief before these bins, for the hour of each of them."""
         home, away = self.week()
         self.estimator.observe(bins)
         hour = ((bins.day - 1) * 24 + bins.minute // 60) % HOURS
         return home[hour], away[hour]
 
     def week(self) -> tuple[F64, F64]:
-        """Return what is believed of each hour of the week."""
+        """Return shares of rooms and of away for each hour of the week."""
         return self.estimator.shares(self.estimator.smoothed_week(self.smoothing))
 
     def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
-        """Return what is believed of the present hour, and by `at` of others."""
+        """Return the belief for the present hour, and by `at` for others."""
         return WeeklyPresence(users, self.week(), time, track=track)

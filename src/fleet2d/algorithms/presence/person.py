@@ -1,4 +1,4 @@
-"""One person's stays, as far as they are known: learned from all days, and gone through again."""
+"""The stays of one person: a hidden Markov model, learned from all days."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,19 +14,20 @@ from fleet2d.kernels.stays import WHOLE_PATCH, Moments, Stretches, Ways, follow,
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
-# Bins that one stay lasts before anything was learned, and first and last of several stages.
+# Mean length of a stay before anything was learned, and of the first and last of several stages.
+# All in bins.
 STAY = 120.0
 SHORT, LONG = 5.0, 240.0
 
 
-class Layout(NamedTuple):
-    """What a person's states are.
+class StateLayout(NamedTuple):
+    """The states of a person's model.
 
     Attributes:
-        room: int64 (patches + 1,), the room of each patch, and last away, one past the last room.
+        room: int64 (patches + 1,), the room of each patch; the last is away, one past the rooms.
         spread: float64 (patches + 1,), the share of each patch in the floor of its room.
-        rooms: How many rooms there are.
-        stages: Stages of a stay.
+        rooms: Number of rooms.
+        stages: Number of stages of a stay.
     """
 
     room: I64
@@ -36,7 +37,7 @@ class Layout(NamedTuple):
 
     @classmethod
     def of(cls, bins: Bins, stages: int) -> Self:
-        """Return the layout of evidence."""
+        """Return the states for the rooms and patches of evidence."""
         room, cells = bins.parts.room, bins.parts.cells
         rooms = bins.watched.shape[1]
         floor = np.maximum(cells, 1)
@@ -45,15 +46,15 @@ class Layout(NamedTuple):
 
     @property
     def anywhere(self) -> F64:
-        """A state that nothing is known of: rooms and away alike, (stages, patches + 1)."""
+        """The uninformed distribution, equal for rooms and away: (stages, patches + 1)."""
         return np.tile(self.spread / ((self.rooms + 1) * self.stages), (self.stages, 1))
 
     def unknown_view(self) -> I64:
-        """Return what part of each patch is in view, which isn't known: int64 (patches + 1,)."""
+        """Return -1, for unknown, as the part of each patch in view: int64 (patches + 1,)."""
         return np.full(len(self.room), -1, np.int64)
 
     def no_moments(self) -> Moments:
-        """Return moments of nothing."""
+        """Return moments that are all zero."""
         places, nodes = self.rooms + 1, (self.rooms + 1) * self.stages
         return Moments(
             np.zeros(nodes),
@@ -64,25 +65,25 @@ class Layout(NamedTuple):
         )
 
 
-class Habits(NamedTuple):
-    """What is known of a person beforehand.
+class Prior(NamedTuple):
+    """What is assumed of a person before anything was learned.
 
     Attributes:
-        detection: Chance that who is in view is perceived.
-        restless: Chance a bin that who stays in a room changes patch.
+        detection: Probability that a person in view is perceived.
+        restless: Probability per bin that a person in a room changes patch.
     """
 
     detection: float
     restless: float
 
 
-def ways_of(moments: Moments, layout: Layout, habits: Habits) -> Ways:
-    """Return how a person goes on, most probably: expected counts by expected time, and a prior.
+def ways_of(moments: Moments, layout: StateLayout, prior: Prior) -> Ways:
+    """Return the most probable transitions: expected counts by expected time, with a prior.
 
-    A stage is given one end after STAY bins beforehand (of several stages, 5 to 240 bins), and one
-    follower, drawn as rooms are entered overall; with several stages, half of it the next one. A
-    room is given one arrival, spread over its floor; and one change of patch, after as many bins
-    as `restless` says.
+    The prior of a stage is one end after STAY bins (with several stages, 5 to 240 bins), and one
+    next room, distributed as rooms are entered overall; with several stages, half of it goes to the
+    next stage. The prior of a room is one arrival, spread over its floor, and one change of patch
+    after 1 / `restless` bins.
     """
     places, stages = layout.rooms + 1, layout.stages
     lengths = np.linspace(SHORT, LONG, stages) if stages > 1 else np.array([STAY])
@@ -92,27 +93,27 @@ def ways_of(moments: Moments, layout: Layout, habits: Habits) -> Ways:
     others = np.tile(entered, (places, 1))
     np.fill_diagonal(others, 0.0)
     others = np.repeat(others / others.sum(axis=1, keepdims=True), stages, axis=0)
-    onward = np.tile(np.arange(stages) < stages - 1, places) / 2
-    before = np.concatenate([others * (1 - onward)[:, None], onward[:, None]], axis=1)
-    follows = (moments.exits + before) / (ends + 1)[:, None]
+    next_stage = np.tile(np.arange(stages) < stages - 1, places) / 2
+    prior_exits = np.concatenate([others * (1 - next_stage)[:, None], next_stage[:, None]], axis=1)
+    follow = (moments.exits + prior_exits) / (ends + 1)[:, None]
     spread = moments.arrivals + layout.spread
     spread = spread / np.bincount(layout.room, spread)[layout.room]
-    trials = moments.moves + moments.rests + 1 / max(habits.restless, 1e-6)
+    trials = moments.moves + moments.rests + 1 / max(prior.restless, 1e-6)
     restless = (moments.moves + 1) / np.maximum(trials, 1)
     restless[-1] = 0.0  # away has no patches
     first = np.searchsorted(layout.room, np.arange(places + 1)).astype(np.int64)
-    return Ways(stay, follows, spread, np.minimum(restless, 1), first, habits.detection)
+    return Ways(stay, follow, spread, np.minimum(restless, 1), first, prior.detection)
 
 
 @dataclass
-class Visit:
-    """A day of a person.
+class PersonDay:
+    """The evidence of one day of a person, and what was learned from it.
 
     Attributes:
         stretches: The evidence.
-        dawn: float64 (stages, patches), probability before it.
-        dusk: float64 (stages, patches), how likely each makes the days after.
-        moments: What is expected of it.
+        dawn: float64 (stages, patches), the distribution before the day.
+        dusk: float64 (stages, patches), the likelihood of the later days given each state.
+        moments: The expected moments of the day.
     """
 
     stretches: Stretches
@@ -122,27 +123,27 @@ class Visit:
 
 
 class Person:
-    """What was learned of one user.
+    """The model of one user.
 
     Attributes:
-        ways: How the user goes on.
-        total: Moments of all days, older ones faded.
-        now: float64 (stages, patches), probability after the last bin.
-        days: The days that are over, as far as they are gone through again.
+        ways: The transition probabilities.
+        total: Sum of the moments of all days, with decayed weights of older ones.
+        now: float64 (stages, patches), the distribution after the last bin.
+        days: The finished days that are still revisited.
     """
 
-    def __init__(self, layout: Layout, habits: Habits) -> None:
-        """Begin without knowing anything."""
-        self.layout, self.habits = layout, habits
+    def __init__(self, layout: StateLayout, prior: Prior) -> None:
+        """Begin with the prior."""
+        self.layout, self.prior = layout, prior
         self.total = layout.no_moments()
-        self.ways = ways_of(self.total, layout, habits)
+        self.ways = ways_of(self.total, layout, prior)
         self.now = self.dawn = layout.anywhere
         self.ones = np.ones_like(self.now)
-        self.days: list[Visit] = []
+        self.days: list[PersonDay] = []
 
     @property
     def length_of_stay(self) -> F64:
-        """How many bins a stay in each room, and away, lasts on average: float64 (rooms + 1,)."""
+        """Mean length of a stay in each room, and away [bins]: float64 (rooms + 1,)."""
         places = self.layout.rooms + 1
         time = self.total.time.reshape(places, -1).sum(axis=1)
         ends = self.total.exits[:, :places].reshape(places, -1).sum(axis=1)
@@ -150,10 +151,10 @@ class Person:
         return length
 
     def follow(self, stretches: Stretches) -> F64:
-        """Go on over some stretches.
+        """Filter over the next stretches.
 
         Returns:
-            P(room | evidence up to there) in each bin, float64 (bins, rooms + 1).
+            P(room | evidence up to the bin) of each bin, float64 (bins, rooms + 1).
         """
         now = np.stack([np.zeros_like(self.now), self.now])
         places = follow(self.ways, stretches, now, self.layout.unknown_view())
@@ -161,23 +162,24 @@ class Person:
         return np.repeat(places, stretches.bins, axis=0)
 
     def end_day(self, stretches: Stretches) -> F64:
-        """Smooth the day that is over as a whole, and learn from it.
+        """Smooth the finished day as a whole, and learn from it.
 
         Returns:
-            P(room) in each of its bins, float64 (bins, rooms + 1).
+            P(room) of each of its bins, float64 (bins, rooms + 1).
         """
-        nothing = self.layout.no_moments()
-        self.days.append(Visit(stretches, self.dawn, self.ones, nothing))
+        moments = self.layout.no_moments()
+        self.days.append(PersonDay(stretches, self.dawn, self.ones, moments))
         return self.revisit(len(self.days) - 1, 1.0)
 
     def revisit(self, number: int, weight: float) -> F64:
-        """Go through a day again, by what is known now; learn what that changes.
+        """Smooth a day with the present model, and update the model by the difference.
 
-        Messages go to the day before and to the next, which use them when their turn comes.
+        The day before and the next day get new boundary messages, which they use when they are
+        revisited.
 
         Args:
-            number: Of the day, in `days`.
-            weight: What it counts.
+            number: Index of the day in `days`.
+            weight: Weight of the day.
         """
         day, moments = self.days[number], self.layout.no_moments()
         places, end, begin = smooth(self.ways, day.stretches, day.dawn, day.dusk, moments)
@@ -194,36 +196,36 @@ class Person:
             )
         )
         day.moments = moments
-        self.ways = ways_of(self.total, self.layout, self.habits)
+        self.ways = ways_of(self.total, self.layout, self.prior)
         return np.repeat(places, day.stretches.bins, axis=0)
 
     def fade(self, weight: float) -> None:
-        """Let all that was learned count less."""
+        """Multiply the moments learned so far by a weight."""
         if weight < 1:
             self.total = Moments(*(weight * part for part in self.total))
 
-    def forget(self, kept: int) -> None:
-        """Keep the last days only; what was learned of the others stays."""
-        del self.days[:-kept]
+    def forget(self, count: int) -> None:
+        """Keep the last `count` days only; what was learned from the others stays."""
+        del self.days[:-count]
 
     def remember(self) -> dict[str, Any]:
-        """Return what was learned, as arrays."""
+        """Return the learned state, as arrays."""
         return self.total._asdict()
 
     def recall(self, learned: Mapping[str, Any]) -> bool:
-        """Go on from what `remember` returned; tell whether it is of the same rooms and stages."""
-        found = {name: np.asarray(learned.get(name, ())) for name in Moments._fields}
-        if any(found[name].shape != part.shape for name, part in self.total._asdict().items()):
+        """Restore what `remember` returned; return whether it has the same rooms and stages."""
+        arrays = {name: np.asarray(learned.get(name, ())) for name in Moments._fields}
+        if any(arrays[name].shape != part.shape for name, part in self.total._asdict().items()):
             return False
-        self.total = Moments(**{name: np.array(part, np.float64) for name, part in found.items()})
-        self.ways = ways_of(self.total, self.layout, self.habits)
+        self.total = Moments(**{name: np.array(part, np.float64) for name, part in arrays.items()})
+        self.ways = ways_of(self.total, self.layout, self.prior)
         return True
 
 
 def watched_patches(bins: Bins) -> NDArray[np.uint8]:
-    """Return how much of each patch was watched, up to WHOLE_PATCH: uint8 (bins, patches).
+    """Return how much of each patch was watched, 0 to WHOLE_PATCH: uint8 (bins, patches).
 
-    One in which somebody unknown was perceived, who may be any user, doesn't count as watched.
+    A patch in which an unknown person was perceived, who may be any user, counts as unwatched.
     """
     seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
     shown = bins.parts.shown_parts
@@ -239,14 +241,13 @@ def watched_patches(bins: Bins) -> NDArray[np.uint8]:
 def stretches_of(
     bins: Bins, user: int, longest: int, watched: NDArray[np.uint8] | None = None
 ) -> Stretches:
-    """Return the evidence of one user, bins that are alike taken together.
+    """Return the evidence of one user, with equal bins merged.
 
     Args:
         bins: The evidence.
-        user: Row of the user; the last is anybody.
-        longest: Most bins of a stretch.
-        watched: `watched_patches` of these bins, where it is known already: for all users it is
-            the same.
+        user: Row of the user; the last row is anybody.
+        longest: Largest number of bins in a stretch.
+        watched: `watched_patches` of these bins, the same for all users; None: it is computed.
     """
     watched = watched_patches(bins) if watched is None else watched
     seen = np.ascontiguousarray(bins.parts.seen[:, user])

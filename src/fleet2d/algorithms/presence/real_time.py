@@ -1,4 +1,4 @@
-"""Real-time presence: where each user is now, given all that was and wasn't seen."""
+"""Real-time presence: where each user is now, given all evidence so far."""
 
 from collections.abc import Mapping, Sequence, Set
 from datetime import datetime, timedelta
@@ -25,10 +25,10 @@ SECOND_US = 1_000_000
 
 @register("algorithm", "real_time_presence", aliases=("rtp",))
 class RealTimePresence(Algorithm):
-    """Where each user, and anyone, is now: P(room | all that was and wasn't seen so far).
+    """Where each user, and anyone, is now: P(room | all evidence so far).
 
-    Its output is a `Presence` of the time of the update; `at` tells of later times, as far as the
-    model can. Until the first whole bin (a minute, or a step where that is longer) there is none.
+    Its output is a `Presence` at the time of the update; `at` forecasts later times, as far as the
+    model can. There is none until the first whole bin (a minute, or a step where that is longer).
     """
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})
@@ -37,21 +37,21 @@ class RealTimePresence(Algorithm):
         default=timedelta(minutes=5), description="how often it is updated"
     )
     model: Annotated[Model, OneOf("presence_model")] = Field(
-        cast("Any", "hmm"), description="how it is worked out"
+        cast("Any", "hmm"), description="how it is computed"
     )
 
     def start(self, home: "Home") -> None:
         """Begin without evidence."""
         self.rooms = len(home.rooms)
-        self.begun = False
-        self.recalled: Mapping[str, Any] | None = None
+        self.has_begun = False
+        self.learned_state: Mapping[str, Any] | None = None
 
     def update(self, history: History, state: Present) -> Presence | None:
-        """Take in what was watched and seen; return what is believed now."""
+        """Process the evidence of the period; return the present belief."""
         step_us = round(history.step_s * SECOND_US)
         evidence = history.evidence
         bins = in_time(evidence, state.start, step_us)
-        if not self.begun:
+        if not self.has_begun:
             self._begin(state)
         if not len(bins.day):
             return None
@@ -65,45 +65,46 @@ class RealTimePresence(Algorithm):
 
     def _begin(self, state: Present) -> None:
         self._prepare(self.model, len(state.users), state.start)
-        self.begun = True
+        self.has_begun = True
 
     def _prepare(self, model: Model, users: int, start: datetime) -> None:
         model.begin(self.rooms, users, start.toordinal())
-        if self.recalled is not None:
-            model.recall(self.recalled)
+        if self.learned_state is not None:
+            model.recall(self.learned_state)
 
     def check_learned(self, users: Sequence[str], start: datetime) -> None:
-        """Begin on trial with what was learned, which must fit the users."""
-        if self.recalled is not None:
-            check_numbers("", self.recalled, self.type_name)
+        """Restore the learned state in a copy, which raises if it doesn't fit the users."""
+        if self.learned_state is not None:
+            check_numbers("", self.learned_state, self.type_name)
             self._prepare(self.model.model_copy(deep=True), len(users), start)
 
     def _check(self, home: Any, away: Any, bins: int, state: Present) -> None:
-        """Refuse what a model says of some bin that is no distribution."""
+        """Refuse a model's belief if it has wrong shapes or isn't a distribution."""
         users = len(state.users) + 1
         shapes = np.shape(home), np.shape(away)
-        wanted = (bins, users, self.rooms), (bins, users)
-        if shapes != wanted:
+        expected = (bins, users, self.rooms), (bins, users)
+        if shapes != expected:
             raise ComponentError(
-                f"the model {self.model.type_name} said of {bins} bins, {users - 1} users and"
-                f" anyone, and {self.rooms} rooms arrays of shapes {shapes[0]} and {shapes[1]};"
-                f" {wanted[0]} (rooms, given at home) and {wanted[1]} (away) are wanted"
+                f"the model {self.model.type_name} returned arrays of shapes {shapes[0]} and"
+                f" {shapes[1]} for {bins} bins, {users - 1} users and anyone, and {self.rooms}"
+                f" rooms; {expected[0]} (rooms, given at home) and {expected[1]} (away) are wanted"
             )
-        good = are_distributions(home, away)
-        if not good.all():
-            k, row = np.argwhere(~good)[0].tolist()
+        is_valid = are_distributions(home, away)
+        if not is_valid.all():
+            k, row = np.argwhere(~is_valid)[0].tolist()
             raise ComponentError(
-                f"the model {self.model.type_name} said of {(*state.users, ANYONE)[row]!r} in bin"
-                f" {k} of {bins} what is no distribution: shares {home[k, row].tolist()}, which sum"
-                f" to {home[k, row].sum():g}, away {away[k, row]:g}"
+                f"the model {self.model.type_name} returned no distribution for"
+                f" {(*state.users, ANYONE)[row]!r} in bin {k} of {bins}: shares"
+                f" {home[k, row].tolist()}, which sum to {home[k, row].sum():g}, away"
+                f" {away[k, row]:g}"
             )
 
     def remember(self) -> dict[str, Any]:
-        """Return what was learned, to start another run from."""
-        if not self.begun:
-            return {} if self.recalled is None else dict(self.recalled)
+        """Return the learned state, from which another run can start."""
+        if not self.has_begun:
+            return {} if self.learned_state is None else dict(self.learned_state)
         return self.model.remember()
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Go on from what another run has learned."""
-        self.recalled = learned or None
+        """Restore the learned state of another run."""
+        self.learned_state = learned or None

@@ -1,4 +1,4 @@
-"""Sighting share: in which rooms somebody was seen, whatever was watched."""
+"""Sighting share: the share of sightings in each room, regardless of what was watched."""
 
 import numpy as np
 
@@ -9,33 +9,34 @@ from fleet2d.component import register
 
 @register("presence_estimator", "sighting_share")
 class SightingShare(Estimator):
-    """Share of a user's sightings per room: n_r / sum of n.
+    """Share of a user's sightings in each room: n_r / sum of n.
 
     n_r is the number of steps at which the user was perceived in room r. Away is the share of the
     bins with a view of any room in which the user was not perceived at all: sightings alone can't
-    tell who is away from who wasn't found, so that is far too high.
+    distinguish a user who is away from one who wasn't found, so that is far too high.
 
-    Right when every room is watched equally. Breaks under feedback: a robot that goes where it saw
-    somebody sees somebody there more often (the rich get richer), until all shares are of one room.
+    It is right when every room is watched equally. It fails under feedback: a robot that goes to
+    the rooms where it saw somebody sees somebody there even more often, until one room has all.
 
-    Without any sighting all rooms are alike, and nobody is away until something was watched.
+    Without any sighting all rooms are equal, and nobody is away until a room was watched.
     """
 
     def width(self, rooms: int) -> int:
-        """Return how many numbers `sums` has: of each room, bins watched, not found, and all."""
+        """Return the number of columns of `sums`: each room, bins watched, not seen, and all."""
         return rooms + 3
 
     def sums(self, bins: Bins) -> F64:
-        """Count sightings per room, and bins with a view, with a view but nobody, and all."""
+        """Return sightings per room, and bins with a view, with a view but nobody, and all."""
         seen = bins.seen.astype(np.float64)
-        found = np.any(bins.seen > 0, axis=2)
-        view = np.any(bins.watched > 0, axis=1)[:, np.newaxis] | found
+        is_seen = np.any(bins.seen > 0, axis=2)
+        has_view = np.any(bins.watched > 0, axis=1)[:, np.newaxis] | is_seen
         return np.concatenate(
-            [seen, np.stack([view, view & ~found, np.ones_like(found)], axis=-1)], axis=-1
+            [seen, np.stack([has_view, has_view & ~is_seen, np.ones_like(is_seen)], axis=-1)],
+            axis=-1,
         )
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
-        """Return sightings per room by all, and bins in vain by those with a view."""
+        """Return sightings per room by all, and bins without a sighting by bins with a view."""
         watched = sums[..., -3]
         away = np.where(watched > 0, sums[..., -2] / np.where(watched > 0, watched, 1), 0.0)
         return normalized(sums[..., :-3]), away
