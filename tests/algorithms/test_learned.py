@@ -88,7 +88,7 @@ def test_what_no_file_can_hold_is_said_and_the_run_is_whole(tmp_path: Path) -> N
 def test_what_was_learned_in_another_home_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mine.npz"
     save_learned({"counts": np.zeros(99)}, path, "mine")
-    with pytest.raises(ComponentError, match=r"'counts' of shape \(99,\).*somewhere else"):
+    with pytest.raises(ComponentError, match=r"'counts' of shape \(99,\).*in another home"):
         run(content("Counts", learned=str(path)))
 
 
@@ -119,8 +119,8 @@ def test_looking_back_gives_the_steps_that_were_asked_for() -> None:
     assert whole["moved"][0].as_py() > 0
 
 
-def test_looking_back_farther_than_was_said_is_refused() -> None:
-    with pytest.raises(ComponentError, match="say by looks_back"):
+def test_looking_back_farther_than_declared_is_refused() -> None:
+    with pytest.raises(ComponentError, match="set looks_back in the class"):
         run(content("LooksBack", minutes=31))
 
 

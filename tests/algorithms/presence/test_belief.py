@@ -42,8 +42,8 @@ def test_it_never_changes_and_is_not_copied() -> None:
         presence.share("ana")[0] = 1
 
 
-def test_somebody_it_does_not_tell_of_is_refused_by_name() -> None:
-    with pytest.raises(ComponentError, match=r"'anna'.*it tells of: ana, anyone"):
+def test_presence_of_an_unknown_user_is_refused_by_name() -> None:
+    with pytest.raises(ComponentError, match=r"'anna'.*There are: ana, anyone"):
         some().share("anna")
 
 

@@ -19,7 +19,7 @@ from fleet2d.algorithms.presence.belief import Presence, Track
 from fleet2d.algorithms.presence.chain_model import (
     Filter,
     MarkovDecay,
-    Routine,
+    RoutineModel,
     SemiMarkov,
     steps_of,
 )
@@ -28,7 +28,7 @@ from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
 from fleet2d.algorithms.presence.model import HourOfWeek, LastSeen, LongTerm, Model
 from fleet2d.metrics.presence.scores import log_loss
 
-CHAINS = [MarkovDecay, Filter, SemiMarkov, Routine]
+CHAINS = [MarkovDecay, Filter, SemiMarkov, RoutineModel]
 ALL = [LastSeen, LongTerm, HourOfWeek, *CHAINS]
 MINUTE = 60_000_000
 
@@ -198,7 +198,7 @@ def sleeper(days: int, seed: int) -> np.ndarray:
 
 def test_who_goes_by_the_hour_is_better_of_those_who_do() -> None:
     """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
-    scores = {cls: [] for cls in (SemiMarkov, Routine)}
+    scores = {cls: [] for cls in (SemiMarkov, RoutineModel)}
     for seed in range(2):
         where = sleeper(20, seed)
         bins = bins_of(evidence(where, 3, patrol, seed))
@@ -207,12 +207,12 @@ def test_who_goes_by_the_hour_is_better_of_those_who_do() -> None:
             home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
             belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
             values.append(log_loss(belief, where[10 * DAY :]).mean())
-    assert np.mean(scores[Routine]) < 0.9 * np.mean(scores[SemiMarkov])
+    assert np.mean(scores[RoutineModel]) < 0.9 * np.mean(scores[SemiMarkov])
 
 
 def test_a_forecast_of_the_routine_goes_by_the_hours_on_the_way() -> None:
     where = sleeper(8, 3)
-    now = followed(Routine(), bins_of(evidence(where, 3, patrol, 3)), 3, 1)
+    now = followed(RoutineModel(), bins_of(evidence(where, 3, patrol, 3)), 3, 1)
     night = now.at(MONDAY + timedelta(hours=3)).with_away("u0")
     noon = now.at(MONDAY + timedelta(hours=13)).with_away("u0")
     assert night[0] > 0.6 > 0.4 > noon[0]
