@@ -28,7 +28,7 @@ from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.seen import SeenArea
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.metrics.metric import Metric
 
 spent: Counter[str] = Counter()
@@ -53,7 +53,7 @@ def timed(part: Callable[..., str], function: Callable[..., Any]) -> Callable[..
     return call
 
 
-def decides(actor: Actor, *_: Any) -> str:
+def decides(actor: DecidingActor, *_: Any) -> str:
     """Return the part of a decision."""
     return "users decide" if actor.path.startswith("users.") else "robots decide"
 
@@ -76,7 +76,7 @@ PARTS: tuple[tuple[Any, str, str | Callable[..., str]], ...] = (
         for watcher in (Clearance, Encounters, Sensors)
         for name in ("limit", "take")
     ),
-    (Actor, "decide", decides),
+    (DecidingActor, "decide", decides),
     (Learners, "update", "algorithms and metrics: call, check"),
     (Learners, "_update", learns),
     (Learners, "_store", "algorithms and metrics: store"),

@@ -12,7 +12,7 @@ from tests.scenes import digests, run, table
 
 import fleet2d
 from fleet2d import Algorithm, InputError
-from fleet2d.entities.objects.sensor import Memory
+from fleet2d.entities.objects.sensor import SensorState
 
 
 @pytest.fixture
@@ -223,11 +223,11 @@ def test_sensor_of_what_is_not_there_is_refused(
 def test_sensor_goes_off_when_it_was_quiet_for_its_hold(
     excited: set[int], hold: int, spans: list[int]
 ) -> None:
-    memory, said, begin = Memory(hold), [], 0
+    state, readings, begin = SensorState(hold), [], 0
     for length in spans:
         end = min(40, begin + length)
         steps = np.array([s for s in sorted(excited) if begin <= s < end], np.int64)
-        said += [(r.step, r.on) for r in memory.read(steps, np.zeros_like(steps), end)]
+        readings += [(r.step, r.on) for r in state.read(steps, np.zeros_like(steps), end)]
         begin = end
     expected, on, last = [], False, 0
     for step in range(40):
@@ -238,4 +238,4 @@ def test_sensor_goes_off_when_it_was_quiet_for_its_hold(
         elif on and step > last + hold:
             expected.append((step, False))
             on = False
-    assert expected == said
+    assert expected == readings

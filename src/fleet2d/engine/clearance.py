@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING, Crowd
 from fleet2d.events import Event
@@ -31,7 +31,7 @@ class Clearance:
         robots: The robots that give way, by their rows among the bodies.
     """
 
-    def __init__(self, users: Sequence[Actor], robots: Sequence[Actor]) -> None:
+    def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
         self.taken = 0
         self._users = users
         self.robots = {
@@ -59,7 +59,7 @@ class Clearance:
         return end
 
     def _next_look(
-        self, robot: Actor, xs: I64, ys: I64, away: NDArray[np.uint8], first: int, end: int
+        self, robot: DecidingActor, xs: I64, ys: I64, away: NDArray[np.uint8], first: int, end: int
     ) -> int:
         """Return the step at which a robot that waits looks whether its way is clear."""
         waiting = robot.waiting
@@ -87,7 +87,7 @@ class Clearance:
         """Return nothing: it is asked at every decision."""
         return ()
 
-    def in_way(self, bodies: Bodies, row: int) -> Actor | None:
+    def in_way(self, bodies: Bodies, row: int) -> DecidingActor | None:
         """Return the person at whom a robot would drive next, with everybody where they are."""
         robot = self.robots.get(row)
         if robot is None:
@@ -102,7 +102,7 @@ class Clearance:
         met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], step, begin=0)
         return None if met is None else self._users[met[1]]
 
-    def crowd(self, robot: Actor) -> Crowd:
+    def crowd(self, robot: DecidingActor) -> Crowd:
         """Return where people are at present."""
         units = robot.home.plan.lattice.units_per_m
         rows = [
@@ -116,7 +116,7 @@ class Clearance:
 
     def _first(
         self,
-        robot: Actor,
+        robot: DecidingActor,
         poses: Poses,
         xs: I64,
         ys: I64,
@@ -156,6 +156,6 @@ class Clearance:
         return best
 
 
-def _sees(robot: Actor, x: int, y: int, there: tuple[int, int]) -> bool:
+def _sees(robot: DecidingActor, x: int, y: int, there: tuple[int, int]) -> bool:
     walls = robot.home.walls
     return bool(line_of_sight(walls, x, y, locate(walls, x, y), *there))

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.engine.bodies import Bodies, PoseBlock
-from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Attention, SightEvent
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels.mesh import locate
@@ -36,7 +36,7 @@ class Happening(NamedTuple):
 
     column: int
     event: str
-    robot: Actor
+    robot: DecidingActor
     pair: "Pair"
 
 
@@ -57,9 +57,9 @@ class Pair:
         at: Where the robot was at the last step.
     """
 
-    user: Actor
+    user: DecidingActor
     user_row: int
-    robot: Actor
+    robot: DecidingActor
     robot_row: int
     attention: Attention
     near: bool = True
@@ -168,7 +168,7 @@ class Encounters:
         taken: The step before which everything is taken in.
     """
 
-    def __init__(self, users: Sequence[Actor], robots: Sequence[Actor]) -> None:
+    def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
         self._robots = [(len(users) + i, robot) for i, robot in enumerate(robots)]
         self.pairs = [
             Pair(user, row, robot, robot_row, user.attention)
@@ -179,14 +179,14 @@ class Encounters:
         self.taken = 0
         self._calls: list[tuple[int, int, str]] = []  # made as plans ended: step, row, user
         self._ahead: list[Happening] = []
-        self._last: list[tuple[int, Actor, SightEvent]] = []
+        self._last: list[tuple[int, DecidingActor, SightEvent]] = []
 
     @property
     def waits(self) -> bool:
         """Whether anybody reacts to robots."""
         return bool(self.pairs)
 
-    def before_plan(self, row: int, actor: Actor, step: int) -> None:
+    def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Keep the calls at `step` of a robot's plan that is about to be replaced."""
         if self.pairs:
             self._calls += [call for call in _calls(row, actor) if call[0] == step]
@@ -229,7 +229,7 @@ class Encounters:
                 yield row, event
 
 
-def _calls(row: int, robot: Actor) -> list[tuple[int, int, str]]:
+def _calls(row: int, robot: DecidingActor) -> list[tuple[int, int, str]]:
     """Return the calls of a robot's plan: step, the robot's row, and the user it calls."""
     return [
         (robot.clock.step_at_or_after(note.time_us), row, note.detail)

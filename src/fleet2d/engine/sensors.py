@@ -15,10 +15,10 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.objects.contact_sensor import ContactSensor
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.objects.sensor import (
-    Memory,
-    Reading,
     Sensor,
     SensorFault,
+    SensorReading,
+    SensorState,
     SensorView,
     in_order,
 )
@@ -64,14 +64,14 @@ class Sensors:
                 self.sensors.append(sensor)
         self.rooms = [sensor.room or sensor.place(home) for sensor in self.sensors]
         self.words = [sensor.words for sensor in self.sensors]
-        self._memories = [Memory(sensor.hold_us() // clock.step_us) for sensor in self.sensors]
+        self._states = [SensorState(sensor.hold_us() // clock.step_us) for sensor in self.sensors]
         self._before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self._doing: dict[str, list[tuple[int, str]]] = {user: [] for user in users}
 
     @property
     def on(self) -> dict[str, bool]:
         """Whether each sensor is on at present."""
-        return {name: memory.on for name, memory in zip(self.names, self._memories, strict=True)}
+        return {name: state.on for name, state in zip(self.names, self._states, strict=True)}
 
     @property
     def waits(self) -> bool:
@@ -84,8 +84,8 @@ class Sensors:
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
             self._before = before
-            for number, memory in enumerate(self._memories):
-                readings = self._read(number, copy(memory), view, end)
+            for number, state in enumerate(self._states):
+                readings = self._read(number, copy(state), view, end)
                 end = min([end, *(reading.step + 1 for reading in readings)])
         return end
 
@@ -97,16 +97,18 @@ class Sensors:
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
             readings = []
-            for number, memory in enumerate(self._memories):
-                readings += [(number, each) for each in self._read(number, memory, view, end)]
+            for number, state in enumerate(self._states):
+                readings += [(number, each) for each in self._read(number, state, view, end)]
         self._rows += [
             SensorRow(reading.step, number, reading.on, self._activity(reading.user, reading.step))
             for number, reading in in_order(readings)
         ]
         return ()
 
-    def _read(self, number: int, memory: Memory, view: SensorView, end: int) -> list[Reading]:
-        """Return what a sensor says up to step `end` - 1, and carry on its memory."""
+    def _read(
+        self, number: int, state: SensorState, view: SensorView, end: int
+    ) -> list[SensorReading]:
+        """Return the readings of a sensor before step `end`, and update its state."""
         steps, users = self.sensors[number].sense(view, self.home)
         fault = self.stuck.get(self.names[number])
         if fault == "on":
@@ -114,7 +116,7 @@ class Sensors:
             users = np.full(len(steps), -1)
         elif fault == "off":
             steps, users = steps[:0], users[:0]
-        readings = memory.read(steps, users, end)
+        readings = state.read(steps, users, end)
         return [] if fault == "silent" else readings
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:

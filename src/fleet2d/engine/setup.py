@@ -21,7 +21,7 @@ from fleet2d.engine.script import take_up
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
 from fleet2d.engine.tables import camera_names, sensor_table, table_specs
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
@@ -39,7 +39,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         InputError: The floor plan or a place in the scenario is wrong, or names what there isn't.
     """
     home = _furnished_home(scenario)
-    people: dict[str, Actor | None] = dict.fromkeys(scenario.users)
+    people: dict[str, DecidingActor | None] = dict.fromkeys(scenario.users)
     users = _actors(scenario, "users", home, clock, seed, people)
     robots = _actors(scenario, "robots", home, clock, seed, people)
     actors = [*users, *robots]
@@ -157,21 +157,21 @@ def _actors(
     home: Home,
     clock: Clock,
     seed: int,
-    people: dict[str, Actor | None],
-) -> list[Actor]:
+    people: dict[str, DecidingActor | None],
+) -> list[DecidingActor]:
     """Return the users or the robots; `people` are told who they are."""
     entities: Mapping[str, Any] = getattr(scenario, bucket)
     actors = []
     for name, entity in entities.items():
         path = f"{bucket}.{name}"
         with _placing(scenario, path):
-            actors.append(Actor(name, path, entity, home, clock, seed, people=people))
+            actors.append(DecidingActor(name, path, entity, home, clock, seed, people=people))
         if name in people:
             people[name] = actors[-1]
     return actors
 
 
-def _check_reads(scenario: Scenario, actors: list[Actor]) -> None:
+def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
     """Refuse behaviors that go by an algorithm that there isn't."""
     known = scenario.algorithms
     for actor in actors:
@@ -222,7 +222,11 @@ def _learners(scenario: Scenario, home: Home, clock: Clock, seed: int, store: Ru
 
 
 def _log(
-    home: Home, actors: list[Actor], bodies: Bodies, cameras: list[Cameras], recorder: Recorder
+    home: Home,
+    actors: list[DecidingActor],
+    bodies: Bodies,
+    cameras: list[Cameras],
+    recorder: Recorder,
 ) -> Log:
     log = Log(home, [actor.name for actor in actors], bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]

@@ -23,8 +23,8 @@ from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.watcher import Watcher
-from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
@@ -69,7 +69,7 @@ class State:
     """
 
     bodies: Bodies
-    actors: list[Actor]
+    actors: list[DecidingActor]
     home: Home
     changes: Changes
     clearance: Clearance

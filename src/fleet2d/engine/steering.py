@@ -13,7 +13,7 @@ from fleet2d.clock import Clock, next_time
 from fleet2d.engine.script import take_up
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.events import Event, EventKind, Listener
@@ -88,7 +88,7 @@ class Steering(Verbs):
         return bodies | doors | {name: {"on": on} for name, on in self._state.sensors.on.items()}
 
     @property
-    def actors(self) -> dict[str, Actor]:
+    def actors(self) -> dict[str, DecidingActor]:
         """Everybody in the run, by name: configuration, behaviors and plan."""
         return {actor.name: actor for actor in self._state.actors}
 
@@ -341,7 +341,7 @@ class Steering(Verbs):
             if self.pending():
                 return
 
-    def _body(self, name: str) -> Actor:
+    def _body(self, name: str) -> DecidingActor:
         actors = self.actors
         if name not in actors:
             raise ScenarioError(
@@ -350,7 +350,7 @@ class Steering(Verbs):
             )
         return actors[name]
 
-    def _state_of(self, actor: Actor) -> dict[str, Any]:
+    def _state_of(self, actor: DecidingActor) -> dict[str, Any]:
         state = actor.state
         x, y = self.home.plan.lattice.to_metres([state.x, state.y]).tolist()
         room = None if state.away else self.home.plan.room_at(x, y)

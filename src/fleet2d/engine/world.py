@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fleet2d.clock import Clock
 from fleet2d.engine.state import State
-from fleet2d.entities.actor import Actor
 from fleet2d.entities.arbitration import Arbiter
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.objects.sensor import SensorFault
 from fleet2d.events import Event, EventKind
@@ -33,12 +33,12 @@ class EngineWorld:
         return self._state.changes.clock
 
     @cached_property
-    def users(self) -> dict[str, Actor]:
+    def users(self) -> dict[str, DecidingActor]:
         """The people, by name."""
         return {actor.name: actor for actor in self._state.actors[: self._state.bodies.users]}
 
     @cached_property
-    def robots(self) -> dict[str, Actor]:
+    def robots(self) -> dict[str, DecidingActor]:
         """The robots, by name."""
         return {actor.name: actor for actor in self._state.actors[self._state.bodies.users :]}
 
@@ -99,13 +99,13 @@ class EngineWorld:
         """Let all but metrics read something else of an algorithm; see `Learners.replace`."""
         self._state.learners.replace(algorithm, output)
 
-    def move(self, actor: Actor, pose: Pose, part: int) -> None:
+    def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
         """Put a body elsewhere, in a part of its space; it decides anew there."""
         actor.state, actor.part = pose, part
         self._state.recorder.move_body(actor.row)
         actor.decide_anew(self.step)
 
-    def drive(self, actor: Actor) -> None:
+    def drive(self, actor: DecidingActor) -> None:
         """Take the decisions of a body out of the hands of its behaviors."""
         actor.behaviors, actor.arbiter, actor.order = [], Arbiter([]), None
         self._state.driven.add(actor.row)

@@ -1,4 +1,4 @@
-"""Batteries: how long a robot drives and stands on a charge, and what is left of it."""
+"""Batteries: how long a robot drives and stands on a charge, and its charge during a run."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,16 +14,16 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.units import PositiveDuration, Share, micros
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.body import Body
 
-# A row `battery` in the table of events tells the charge when it has changed by so much.
-TOLD = 0.05
+# The table of events gets a row `battery` when the charge has changed by this much.
+RECORDED_CHANGE = 0.05
 
 I64 = NDArray[np.int64]
 
 
 class Battery(Settings):
-    """A battery, by how long it lasts; the charge goes down evenly at either rate."""
+    """A battery, described by how long it lasts; the charge falls at one of two constant rates."""
 
     driving: PositiveDuration = Field(description="how long a full charge lasts driving or turning")
     standing: PositiveDuration = Field(description="how long a full charge lasts standing still")
@@ -35,12 +35,12 @@ class Battery(Settings):
 
 
 class Course(NamedTuple):
-    """How a charge goes on while a motion is followed.
+    """The charge over time while a motion is followed.
 
     Attributes:
         level: Charge at `begins[0]`, 0 to 1.
-        begins: Moments from which on it changes at another rate [us], int64 (n,).
-        rates: The rates [1/us], (n,).
+        begins: Moments at which the rate changes [us], int64 (n,).
+        rates: The rate from each of those moments on [1/us], (n,).
     """
 
     level: float
@@ -48,7 +48,7 @@ class Course(NamedTuple):
     rates: list[float]
 
     def levels(self, moments: I64) -> NDArray[np.float64]:
-        """Return the charge at some moments, none of them before it begins [us]."""
+        """Return the charge, float64 (n,), at moments from `begins[0]` on [us], int64 (n,)."""
         level, rows = self.level, []
         for i, rate in enumerate(self.rates):
             rows.append(level)
@@ -69,17 +69,17 @@ class Charge:
         charger: Where the charger is [lattice].
     """
 
-    def __init__(self, battery: Battery, actor: "Actor") -> None:
+    def __init__(self, battery: Battery, body: "Body") -> None:
         self.level = battery.charge
         self._drain = 1 / micros(battery.driving), 1 / micros(battery.standing)  # per us
         self._gain = 1 / micros(battery.charging)
-        self.charger = stop_at(actor, battery.charger)
-        self._told = -1.0
+        self.charger = stop_at(body, battery.charger)
+        self._recorded = -1.0
         self._since_us = 0
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is left."""
+        """Whether the charge is 0."""
         return self.level <= 0
 
     @property
@@ -88,12 +88,12 @@ class Charge:
         return f"{100 * self.level:.1f} %"
 
     def set(self, level: float, motion: Motion, now_us: int) -> None:
-        """Have another charge from a moment on, at which a motion is being followed."""
+        """Set the charge at a moment, up to which a motion was followed."""
         self.follow(motion, now_us)
         self.level = level
 
     def follow(self, motion: Motion, until_us: int) -> None:
-        """Take in that a motion was followed from the last decision to a moment."""
+        """Update the charge: a motion was followed from the last decision to a moment."""
         begins, rates = self._rates(motion, self._since_us)
         ends = np.append(begins[1:], until_us)
         for begin, end, rate in zip(begins.tolist(), ends.tolist(), rates, strict=True):
@@ -103,11 +103,11 @@ class Charge:
         self._since_us = until_us
 
     def course(self, motion: Motion) -> Course:
-        """Return how the charge goes on from the last decision, if a motion is followed."""
+        """Return the charge from the last decision on, if a motion is followed."""
         return Course(self.level, *self._rates(motion, self._since_us))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
-        """Return when a motion that begins now brings the charge down to a level [us], or None."""
+        """Return when the charge falls to a level [us], if a motion is followed; None: never."""
         begins, rates = self._rates(motion, self._since_us)
         now, charge = self._since_us, self.level
         for begin, end, rate in zip(
@@ -122,20 +122,21 @@ class Charge:
         return None
 
     def full_in_us(self, level: float) -> int:
-        """Return how long it charges to a level [us]."""
+        """Return how long it takes to charge to a level [us]."""
         return max(0, int((level - self.level) / self._gain) + 1)
 
-    def tell(self, plan: Plan) -> None:
-        """Note the charge at the beginning of a plan if it isn't what was noted last."""
-        if abs(self.level - self._told) >= TOLD or (self.level <= 0) != (self._told <= 0):
-            self._told = self.level
+    def record(self, plan: Plan) -> None:
+        """Note the charge at the beginning of a plan, if it differs from the last one noted."""
+        change = abs(self.level - self._recorded)
+        if change >= RECORDED_CHANGE or (self.level <= 0) != (self._recorded <= 0):
+            self._recorded = self.level
             begin_us = plan.began[0] * plan.step_us
             plan.notes.insert(0, Note(begin_us, "battery", self.percent))
 
     def _rates(self, motion: Motion, since_us: int) -> tuple[I64, list[float]]:
-        """Return the moments from which on the charge changes at which rate [1/us]."""
+        """Return the moments at which the rate of the charge changes [us], and the rates [1/us]."""
         driving, standing = -self._drain[0], -self._drain[1]
-        if not isinstance(motion, Track):  # it wanders about all the time
+        if not isinstance(motion, Track):  # a random walk never stands still
             return np.array([since_us], np.int64), [driving]
         track = motion.breakpoints
         time, x, y = track.time, track.x, track.y

@@ -1,4 +1,4 @@
-"""Behaviors: what decides where a body goes next."""
+"""Behaviors: the base class of what decides where a body goes next, and what it knows then."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 class Attention(NamedTuple):
-    """What somebody takes notice of in robots: distances [lattice units] between the bodies.
+    """How near a robot has to be for a person to react: distances between the middles [lattice].
 
     Attributes:
-        notices: Nearer robots in sight are noticed: the event robot_near.
-        in_way: Nearer robots that drive up to somebody who stands are in the way: robot_coming.
-        too_close: Nearer ones are too close, when that lasts: robot_close.
-        patience: For so many steps.
-        hears: Within that a call is heard: robot_calls.
+        notices: A robot in sight and nearer than this is the event robot_near.
+        in_way: A robot nearer than this that drives up to a standing person: robot_coming.
+        too_close: A robot that stays nearer than this: robot_close.
+        patience: Number of steps after which a robot that is too close is an event.
+        hears: A robot that calls within this distance: robot_calls.
     """
 
     notices: int
@@ -42,9 +42,9 @@ class Command(NamedTuple):
     """What a user or an app calls a robot to do: see `Behavior.answers`.
 
     Attributes:
-        do: What it is to do: "come", "find", "dock", or what a behavior of one's own answers to.
-        target: The person to find; empty for others.
-        place: Where to come to; () for others.
+        do: The kind of command: "come", "find", "dock", or one that a custom behavior answers.
+        target: The person to find; empty for other kinds.
+        place: The place to come to; () for other kinds.
     """
 
     do: str
@@ -54,19 +54,26 @@ class Command(NamedTuple):
     @property
     def text(self) -> str:
         """The command for the table of events."""
-        where = self.place if self.place and isinstance(self.place[0], str) else None
-        spot = [f"({self.place[0]:g}, {self.place[1]:g})"] if self.place and not where else []
-        return " ".join([self.do, *filter(None, [self.target]), *(where or spot)])
+        names = self.place if self.place and isinstance(self.place[0], str) else None
+        point = [f"({self.place[0]:g}, {self.place[1]:g})"] if self.place and not names else []
+        return " ".join([self.do, *filter(None, [self.target]), *(names or point)])
 
 
 class SightEvent(NamedTuple):
-    """Somebody came into view of a camera, or was lost from it; or a robot met somebody."""
+    """An event that interrupts a plan: somebody in or out of view, a robot near, a command.
 
-    # user_seen | user_lost; of a user's camera, robot_seen | robot_lost; of Attention, robot_near |
-    # robot_coming | robot_close | robot_calls; called, of a robot that was: see Situation.command
+    Attributes:
+        event: user_seen or user_lost of a robot's camera, robot_seen or robot_lost of a user's;
+            robot_near, robot_coming, robot_close or robot_calls, see `Attention`; called, when a
+            robot got a command, see `Situation.command`.
+        user: The user as perceived, empty if not recognized; or the robot.
+        x: Where the user or the robot was perceived last [m].
+        y: Likewise.
+    """
+
     event: str
-    user: str  # for whom somebody was taken; empty for somebody not recognized; or the robot
-    x: float  # where that was perceived last [m]
+    user: str
+    x: float
     y: float
 
 
@@ -75,8 +82,9 @@ class Situation:
     """What a behavior knows when it is asked for a plan.
 
     Attributes:
+        actor: The body, and what it does.
         step: The step at which the plan begins.
-        events: The events that interrupted the last plan; empty when it just ended.
+        events: The events that interrupted the last plan; empty if it just ended.
         outputs: The newest output of every algorithm, by its name in the scenario.
     """
 
@@ -108,19 +116,19 @@ class Situation:
 
     @property
     def in_view(self) -> Mapping[str, "Point"]:
-        """Whom the body's cameras have in view, and where each was perceived last [m].
+        """The people in view of the body's cameras, and where each was perceived last [m].
 
-        Somebody counts as in view until lost. The empty name is somebody not recognized.
+        A person counts as in view until lost. The empty name is somebody not recognized.
         """
         return self.actor.in_view()
 
     @property
     def command(self) -> Command | None:
-        """What the body was called to do, as long as no behavior has taken it up."""
+        """What the body was called to do, until a behavior takes it up."""
         return self.actor.command
 
     def take_command(self, do: str) -> Command | None:
-        """Take up a command of a kind, if the body was called to do that: nobody else gets it."""
+        """Return the body's command and remove it, if it is of a kind; else None."""
         command = self.actor.command
         if command is None or command.do != do:
             return None
@@ -131,26 +139,27 @@ class Situation:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
         actor, lattice = self.actor, self.home.plan.lattice
         at_x, at_y = lattice.point_at((x, y))
-        found = (at_x, at_y)
+        point = (at_x, at_y)
         if actor.space.part_at(at_x, at_y) != actor.part:
-            found = actor.space.nearest(at_x, at_y, actor.part) or (actor.state.x, actor.state.y)
-        near_x, near_y = lattice.to_metres(found).tolist()
+            point = actor.space.nearest(at_x, at_y, actor.part) or (actor.state.x, actor.state.y)
+        near_x, near_y = lattice.to_metres(point).tolist()
         return near_x, near_y
 
     def random(self, purpose: str) -> Draws:
-        """Return random draws of this body, for a purpose of the behavior's own, at this step."""
+        """Return the random draws of this body at this step, for one purpose of the behavior."""
         return Draws(self.actor.stream(purpose), self.step)
 
     def plan(self) -> Plan:
-        """Return a plan that begins here and now, to be filled."""
+        """Return an empty plan that begins at the present step."""
         return Plan(self.actor, self.step)
 
 
 class Behavior(Component):
-    """Base of what decides; a subclass declares its configuration as fields and writes `decide`.
+    """Base of behaviors; a subclass declares its configuration as fields and implements `decide`.
 
-    Behaviors of a body stand in order: the first that returns a plan is followed. The state that a
-    behavior keeps between decisions is set in `start`, as attributes that aren't fields.
+    The behaviors of a body are in order of priority: the first one that returns a plan is followed.
+    State that a behavior keeps between decisions is set in `start`, as attributes that aren't
+    fields.
 
     Example:
         >>> from fleet2d import Behavior, Plan, Situation
@@ -167,79 +176,78 @@ class Behavior(Component):
     """
 
     kind: ClassVar[str] = "behavior"
-    # Whether, broken off by one before it, it later goes on with the rest of its plan.
+    # Whether, after an interruption by a behavior before it, it resumes the rest of its plan.
     resumes: ClassVar[bool] = False
-    # Layers of what its robot has seen that it goes by: explored, first_seen, last_seen …
+    # Layers of what its robot has seen that it reads: explored, first_seen, last_seen …
     needs: ClassVar[frozenset[str]] = frozenset()
-    # Kinds of events that its plans record: all of its own, and of those of EventKind the ones that
-    # a script may wait for.
+    # Kinds of events that its plans record: all of its own, and those of EventKind that a script
+    # may wait for.
     records: ClassVar[frozenset[str]] = frozenset()
-    # Events of its cameras at which it may break in on those behind it.
+    # Events of its cameras at which it may interrupt the behaviors after it.
     listens: ClassVar[frozenset[str]] = frozenset()
-
-    # What it does when its robot is called to: find, come, dock, or a word of one's own.
+    # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
 
     when: Hours = Field(
-        default=(), description="the hours in which it may have its way; left out: at all times"
+        default=(), description="the hours in which it may decide; left out: at all times"
     )
     cooldown: Duration = Field(
-        default=timedelta(0), description="how long it isn't asked again after it had its way"
+        default=timedelta(0), description="how long it isn't asked again after its plan has ended"
     )
     preempts: bool = Field(
-        default=True, description="whether it may break in on behaviors behind it; else it waits"
+        default=True, description="whether it may interrupt behaviors after it; else it waits"
     )
 
     def start(self, actor: "Actor") -> None:
         """Prepare for a run; check here that the places it names exist."""
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
-        """Return where the body is when the run begins; None leaves it to chance, () is away."""
+        """Return where the body is when the run begins: None: drawn; (): away."""
         return None
 
     def attention(self, actor: "Actor") -> Attention | None:
-        """Return what of robots interrupts any plan of the body; None: nothing does."""
+        """Return which actions of robots interrupt any plan of the body; None: none do."""
         return None
 
     def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
-        """Tell whether something that it pays attention to interrupts the plan."""
+        """Tell whether an event of its `attention` interrupts the plan."""
         return True
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
-        """Return the name of the piece of furniture of a kind that it uses for good, if any."""
+        """Return the name of the piece of furniture of a kind that it always uses, if any."""
         return None
 
     def give_up(self, now: Situation) -> None:
-        """Don't go on with what one is doing, when the next plan is made."""
+        """Stop what it is doing: its present plan can't be continued."""
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when it wants to be asked while the body follows the plan of one behind it."""
+        """Return when it wants to be asked while the body follows a plan of a later behavior."""
         return None
 
     def about(self) -> tuple[str, ...]:
-        """Return the users that its fields name: a scenario without one of them is refused."""
+        """Return the users that its fields name; a scenario that lacks one of them is refused."""
         return ()
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithms that it goes by: a scenario without one of them is refused."""
+        """Return the algorithms that it reads; a scenario that lacks one of them is refused."""
         return ()
 
     def takes(self, command: Command) -> bool:
-        """Tell whether it would do what its robot is called to do."""
+        """Tell whether it carries out a command."""
         return command.do in self.answers
 
     def activities(self) -> tuple[str, ...]:
-        """Return the activities that it knows how to perform."""
+        """Return the names of the activities that it can perform."""
         return ()
 
     def perform(self, plan: Plan, activity: str) -> None:
-        """Let a plan lead to where one of its activities is done."""
+        """Add the way to where one of its activities is done to a plan."""
         raise NotImplementedError
 
     def busy(self) -> bool:
-        """Tell whether it is in the middle of something, which neither hours nor cooldown end."""
+        """Tell whether it is in the middle of something that hours and cooldown don't end."""
         return False
 
     def decide(self, now: Situation) -> Plan | None:
-        """Return what to do from now on; None leaves it to the next behavior."""
+        """Return the plan from now on; None leaves the decision to the next behavior."""
         raise NotImplementedError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.clock import Clock
-from fleet2d.entities.entity import Entity
+from fleet2d.entities.body_settings import BodySettings
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
@@ -29,7 +29,7 @@ class Bodies(Protocol):
 
     Attributes:
         step: The present step.
-        ask_at: int64 (bodies,), the step at which each decides next; NEVER for never.
+        ask_at: The step at which each body decides next, int64 (bodies,); NEVER for never.
     """
 
     step: int
@@ -39,11 +39,21 @@ class Bodies(Protocol):
         """Return where a body is at the present step."""
 
     def hold(self, row: int, pose: Pose) -> None:
-        """Let a body rest at a pose from the present step on."""
+        """Set the pose of a body, at which it rests from the present step on."""
 
 
 class PlaceAt(NamedTuple):
-    """A place to use an object from, on the lattice."""
+    """A place to use an object from.
+
+    Attributes:
+        thing: The object.
+        name: Its name.
+        x: Where the body is while it uses it [lattice].
+        y: Likewise.
+        heading: Where the body faces [1/4096 turn].
+        posture: How the body is there.
+        approach: The free point from which it steps there [lattice].
+    """
 
     thing: PlacedObject
     name: str
@@ -60,23 +70,25 @@ class Body:
 
     Attributes:
         name: Its name in the scenario.
-        path: Its path there, "users.ana"; names its random streams and errors.
+        path: Its path in the scenario, "users.ana"; names its random streams and errors.
         entity: Its configuration.
-        home: Where it lives.
-        clock: Of the run.
-        seed: Of the run.
-        people: All users of the scenario by name, None while one isn't made.
-        part: The part of its space that it is in.
+        home: The home that it is in.
+        clock: The clock of the run.
+        seed: The seed of the run.
+        people: All users of the scenario by name; None for one that isn't built yet.
+        notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
+        part: The connected part of its space that it is in.
         row: Its row among the bodies of the run.
     """
 
     name: str
     path: str
-    entity: Entity
+    entity: BodySettings
     home: Home
     clock: Clock
     seed: int
     people: Mapping[str, "Body | None"] = field(default_factory=dict, kw_only=True, repr=False)
+    notes: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
@@ -91,7 +103,7 @@ class Body:
         self.row = 0
 
     def join(self, bodies: Bodies, row: int) -> None:
-        """Take part in a run."""
+        """Become one of the bodies of a run, whose clock and poses it uses from then on."""
         self._bodies, self.row = bodies, row
 
     @property
@@ -112,7 +124,7 @@ class Body:
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
-        (version, costs_version), space = self._space  # nearly always the one of before
+        (version, costs_version), space = self._space  # nearly always up to date
         if version == self.home.version and not (costs_version or self.entity.minds_costs):
             return space
         if self._space[0] != self.arrangement:
@@ -122,7 +134,7 @@ class Body:
 
     @property
     def arrangement(self) -> tuple[int, int]:
-        """What its space depends on: it is another whenever that is."""
+        """Versions of the home and of its costs: its space changes whenever they do."""
         return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
 
     def _present_space(self) -> Space:
@@ -132,8 +144,8 @@ class Body:
 
     def _present_part(self) -> int:
         """Return the part of a changed space that it is in, or nearest to."""
-        space, here = self._space[1], (self.state.x, self.state.y)
-        x, y = self.home.approach_of(here) or here
+        space, position = self._space[1], (self.state.x, self.state.y)
+        x, y = self.home.approach_of(position) or position
         part = space.part_at(x, y)
         return part if part >= 0 else space.part_near(x, y)
 
@@ -141,13 +153,22 @@ class Body:
         """Return the piece of furniture of a kind that is its own, if its behaviors say so."""
         return None
 
+    def posture_code(self, time_us: int) -> int:
+        """Return the posture at a moment, by its number in POSTURES; a plain body stands."""
+        return 0
+
+    @property
+    def event_kinds(self) -> frozenset[str]:
+        """The kinds of events that its behaviors declare in `records`."""
+        return frozenset()
+
     @property
     def way_out(self) -> tuple[int, int]:
         """The lattice point where it leaves the home."""
         return self.home.way_out(self.space, self.part)
 
     def place_at(self, thing: PlacedObject | str, place: int) -> PlaceAt:
-        """Return a place to use an object from, and remember it while the home stays as it is.
+        """Return a place to use an object from; kept until the body's space changes.
 
         Raises:
             PlacementError: There is no such object, or no place to use it from.
@@ -166,9 +187,9 @@ class Body:
         x, y = lattice.point_at((use.x, use.y))
         heading = round(use.heading / (2 * np.pi) * TURN) % TURN
         approach = home.approach(use, self.space, self.part)
-        found = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
-        self._places[1][name, place] = found
-        return found
+        at = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
+        self._places[1][name, place] = at
+        return at
 
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
@@ -184,7 +205,7 @@ class Body:
         """Return the rooms that a list of names stands for: those of the first name that fits.
 
         Raises:
-            PlacementError: It names no room, or none that can be reached.
+            PlacementError: No name is that of a room that can be reached.
         """
         return room_of_furniture(self, names) or self._match(names)[1]
 
@@ -200,20 +221,20 @@ class Body:
     ) -> tuple[int, int]:
         """Return the lattice point of a place: the point itself, or a spot drawn in the room.
 
-        Of several rooms of a kind, a body has its own for the whole run; of ``any`` room, it draws
-        one.
+        Of several rooms of a kind, a body uses one for the whole run; of ``any`` room, it draws one
+        each time.
 
         Raises:
             PlacementError: There is no such room, or it can't be reached.
         """
-        where = parse_place(place)
-        if is_point(where):
-            return self.point(where)  # type: ignore[arg-type]
-        thing = furniture_of(self, where)
+        target = parse_place(place)
+        if is_point(target):
+            return self.point(target)  # type: ignore[arg-type]
+        thing = furniture_of(self, target)
         if thing is not None:
             return self.place_at(thing, 0).approach
         draws = Draws(self.stream(purpose), time_us)
-        name, rooms = self._match(where)  # type: ignore[arg-type]
+        name, rooms = self._match(target)  # type: ignore[arg-type]
         habit = Draws(self.stream(f"room of {name}"), 0)
         room = (draws if name == ANY else habit).choice(rooms)
         cells = self.space.cells(room.index, self.part)
@@ -221,15 +242,14 @@ class Body:
         return self.home.plan.lattice.cell_centre(row, column)
 
     def find_anywhere(self, place: Any, time_us: int, purpose: str) -> tuple[int, int]:
-        """Return the lattice point of a place that it may be carried to: also one without a way.
+        """Return the lattice point of a place to put the body at; no way has to lead there.
 
         Raises:
-            PlacementError: There is no such room, or its body fits nowhere there.
+            PlacementError: There is no such room, or the body fits nowhere in it.
         """
-        where = parse_place(place)
-        if not is_point(where):
-            names = where
-            rooms = matching_rooms(names, self.home.rooms, self.home.rooms)[1]  # type: ignore[arg-type]
+        target = parse_place(place)
+        if not is_point(target):
+            rooms = matching_rooms(target, self.home.rooms, self.home.rooms)[1]  # type: ignore[arg-type]
             draws = Draws(self.stream(purpose), time_us)
             for part in range(self.space.parts):
                 cells = self.space.cells(rooms[0].index, part)
@@ -237,29 +257,36 @@ class Body:
                     row, column = cells[draws.below(len(cells))].tolist()
                     return self.home.plan.lattice.cell_centre(row, column)
             raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
-        x, y = self.home.plan.lattice.point_at(where)  # type: ignore[arg-type]
+        x, y = self.home.plan.lattice.point_at(target)  # type: ignore[arg-type]
         if self.space.part_at(x, y) < 0:
             near = self.space.nearest(x, y)
-            there = None if near is None else self._shown(near)
+            free = None if near is None else self._shown(near)
             raise PlacementError(
-                f"{self.path}: the point {list(where)} is in a wall or nearer to one than its"
-                f" radius of {self.entity.radius:g} m; the nearest free point is {there}"
+                f"{self.path}: the point {list(target)} is in a wall or nearer to one than its"
+                f" radius of {self.entity.radius:g} m; the nearest free point is {free}"
             )
         return x, y
 
     def middle(self, room: Room) -> tuple[int, int]:
-        """Return the point of a room that it can reach, nearest to the room's deepest inside."""
+        """Return the reachable lattice point nearest to the room's anchor.
+
+        The anchor is the point of the room that is farthest from its walls.
+
+        Raises:
+            PlacementError: The room can't be reached.
+        """
         x, y = self.home.plan.lattice.point_at(room.anchor_xy)
-        found = self.space.nearest(x, y, self.part, room.index)
-        if found is None:
+        point = self.space.nearest(x, y, self.part, room.index)
+        if point is None:
             raise PlacementError(f"{self.path}: {room.name} can't be reached from where it starts")
-        return found
+        return point
 
     def point(self, xy: Point) -> tuple[int, int]:
         """Return a point [m] on the lattice.
 
         Raises:
-            PlacementError: Its body can't stand there, or can't get there; says what is near.
+            PlacementError: The body can't stand there, or can't get there; the message has the
+                nearest free point.
         """
         lattice = self.home.plan.lattice
         x, y = lattice.point_at(xy)
@@ -267,18 +294,18 @@ class Body:
         if part == self.part:
             return x, y
         near = self.space.nearest(x, y, self.part)
-        there = None if near is None else self._shown(near)
+        free = None if near is None else self._shown(near)
         why = f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
         if part >= 0:
             why = "can't be reached from where it starts"
         elif self.home.space(self.entity.radius).part_at(x, y) >= 0:
-            why = "is where the costmap lets no way lead"
+            why = "is where the costmap lets no route pass"
         raise PlacementError(
-            f"{self.path}: the point {list(xy)} {why}; the nearest free point is {there}"
+            f"{self.path}: the point {list(xy)} {why}; the nearest free point is {free}"
         )
 
     def _shown(self, point: tuple[int, int]) -> list[float]:
-        """Return a free lattice point in metres, with as few decimals as leave it free."""
+        """Return a free lattice point [m], with two decimals if it is still free then, else 4."""
         lattice = self.home.plan.lattice
         short: list[float] = lattice.to_metres(point).round(2).tolist()
         if self.space.part_at(*lattice.point_at(short)) == self.part:
@@ -287,13 +314,13 @@ class Body:
         return exact
 
     def _has_any(self, names: RoomChoice | Point) -> bool:
-        """Tell whether the largest part of its space has a room of these kinds."""
+        """Tell whether the home has such furniture, or a reachable room of such a name or kind."""
         if furniture_of(self, names) is not None:
             return True
         return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
 
     def _first_part(self, names: RoomChoice) -> int:
-        """Return the largest part of its space with one of these rooms; else the largest."""
+        """Return the largest part of its space with one of these rooms; else the largest of all."""
         for part in range(self.space.parts):
             reachable = [r for r in self.home.rooms if len(self.space.cells(r.index, part))]
             if {ANY, *(r.name for r in reachable), *(r.type for r in reachable)} & set(names):

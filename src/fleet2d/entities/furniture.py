@@ -1,4 +1,4 @@
-"""Furniture as places: "sofa" is where a body uses the sofa, or stands before it."""
+"""Furniture as places: "sofa" is where a body uses the sofa, or stands in front of it."""
 
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def furniture_of(body: "Body", place: RoomChoice | Point) -> "PlacedObject | None":
     """Return the piece of furniture that a place names, if it names one and no room before it.
 
-    Of several of a kind, a body has its own for the whole run, among those that it gets to.
+    Of several of a kind that it can get to, a body uses one for the whole run.
     """
     if is_point(place):
         return None
@@ -39,24 +39,24 @@ def furniture_of(body: "Body", place: RoomChoice | Point) -> "PlacedObject | Non
 
 
 def _owned(body: "Body", kind: str, person: str) -> "PlacedObject | None":
-    """Return the piece of furniture of a kind that a person uses for good.
+    """Return the piece of furniture of a kind that a person uses for the whole run.
 
     Raises:
         PlacementError: There is no such person.
     """
     if person not in body.people:
         raise PlacementError(
-            f"there is no user {person!r} whose {kind} that could be"
+            f"there is no user {person!r} who could have a {kind}"
             f"{did_you_mean(person, body.people)}"
         )
     owner = body.people[person]
-    if owner is None:  # comes later in the scenario, and is asked when somebody goes there
+    if owner is None:  # not built yet; asked again when somebody goes there
         owner = body
     return owner.own_furniture(kind) or furniture_of(owner, (kind,))
 
 
 def room_of_furniture(body: "Body", place: RoomChoice | Point) -> "list[Room]":
-    """Return the room from which the furniture of a place is used; none if it names none."""
+    """Return the room from which the furniture of a place is used; empty if it names none."""
     thing = furniture_of(body, place)
     if thing is None:
         return []
@@ -66,14 +66,14 @@ def room_of_furniture(body: "Body", place: RoomChoice | Point) -> "list[Room]":
 
 
 def seat_at(body: "Body", place: object) -> "PlacedObject | None":
-    """Return the furniture that a person sits on, lies on or stands at for a place, if any."""
+    """Return the furniture that a place names, if the body uses furniture; else None."""
     return furniture_of(body, parse_place(place)) if body.entity.uses_furniture else None
 
 
 def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
     """Return the lattice point at which a body stops for a place.
 
-    A point is that itself, a room the middle of it, furniture where one steps up to it.
+    For a point, that point; for a room, its middle; for furniture, the point in front of it.
 
     Raises:
         PlacementError: There is no such place, or it can't be reached.
@@ -87,19 +87,19 @@ def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
 
 
 def stops_at(body: "Body", place: RoomChoice | Point) -> list[tuple[int, int]]:
-    """Return all lattice points at which a body stops for a place: one in each room of a kind."""
+    """Return the lattice points at which a body stops for a place: one per room of its kind."""
     if is_point(place) or furniture_of(body, place) is not None:
         return [stop_at(body, place)]
     return [body.middle(room) for room in body.rooms(place)]  # type: ignore[arg-type]
 
 
 def _gets_to(body: "Body", thing: "PlacedObject") -> bool:
-    """Tell whether a body gets to the first place at which a piece of furniture is used."""
+    """Tell whether a body can get to the first place at which a piece of furniture is used."""
     if not thing.uses:
         return False
     x, y = body.place_at(thing, 0).approach
     use = thing.uses[0]
     at = body.home.plan.lattice.point_at(use.approach or (use.x, use.y))
-    # From nearby if that is too tight, but not from another room behind a wall.
-    far = body.home.plan.lattice.units_per_m
-    return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= far * far)
+    # Within a metre, if the place itself is too tight: not from another room behind a wall.
+    metre = body.home.plan.lattice.units_per_m
+    return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= metre * metre)

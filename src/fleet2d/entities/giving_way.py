@@ -1,4 +1,4 @@
-"""Giving way: a robot that stops before people, waits, and goes round them or gives up."""
+"""Giving way: a robot that stops in front of people, waits, and goes round them or gives up."""
 
 from datetime import timedelta
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,16 +14,17 @@ from fleet2d.floorplan.home.costmap import NO_WAY, route_by_cost
 from fleet2d.units import Length, PositiveDuration, micros
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
     from fleet2d.entities.behavior import Situation
+    from fleet2d.entities.body import Body
 
-# It looks so often whether the way is clear again: at first, then whenever it has waited a tenth
-# longer, and at the least.
+# Time between two looks whether the way is clear again: a tenth of the time waited so far, within
+# these limits.
 LOOKS_EVERY = timedelta(seconds=1), timedelta(seconds=10)
-# So soon after it waited it goes on counting; going round, it minds for so long not to touch.
+# A wait that begins this soon after another one continues it. For this long after going round
+# people begins, the robot may come as near to them as TOUCHING.
 JUST_WAITED = timedelta(seconds=15)
-# Beside who doesn't go on it passes with so much between the bodies, where there is no more room,
-# and with so much at the very least [m].
+# Gap between the bodies at which it passes a person where there is no more room, and the gap below
+# which it counts as touching [m].
 PASSING = 0.1
 TOUCHING = 0.03
 
@@ -47,13 +48,13 @@ class GivesWay(Settings):
 
 
 class Crowd(NamedTuple):
-    """What a robot that waits has before it: while it stays the same, waiting goes on.
+    """The people and obstacles around a robot that waits; it waits while they stay the same.
 
     Attributes:
-        people: Where people at home are, and at which distance the bodies touch [lattice], int64
-            (n, 3).
-        everybody: Where everybody is, and whether away, int64 (users, 3).
-        arrangement: Of doors and furniture.
+        people: x and y of the people at home, and the distance between the middles at which the
+            bodies touch [lattice], int64 (n, 3).
+        everybody: x and y of all users, and whether they are away, int64 (users, 3).
+        arrangement: The versions of doors and furniture, see `Body.arrangement`.
     """
 
     people: I64
@@ -61,24 +62,24 @@ class Crowd(NamedTuple):
     arrangement: tuple[int, int]
 
     def is_as(self, other: "Crowd") -> bool:
-        """Tell whether nobody and nothing has moved."""
+        """Tell whether no person and no object has moved."""
         same = np.array_equal(self.everybody, other.everybody)
         return same and self.arrangement == other.arrangement
 
 
 class Waiting:
-    """A robot that has stopped before somebody.
+    """The wait of a robot that has stopped in front of a person.
 
-    It looks at steps that are fixed beforehand. A look at which nothing has moved since the last
-    one finds what that found, so it isn't made: the plan to wait reaches up to the first look that
-    matters even so, and `Clearance` ends it at an earlier one if somebody moves.
+    The steps at which it looks are fixed beforehand. A look is skipped if nothing has moved since
+    the one before, as its result is known: the plan to wait lasts until the first look that has a
+    result in any case, and `Clearance` ends it at an earlier look if somebody moves.
 
     Attributes:
         broken: The plan that it was following.
         step: The step at which it stopped following it.
-        since: The step at which it first stopped before somebody.
-        interrupts: What that plan wants to hear of.
-        crowd: What it has seen at its last look.
+        since: The step at which it first stopped in front of a person.
+        interrupts: The events that interrupt that plan.
+        crowd: The people and obstacles at its last look.
     """
 
     def __init__(
@@ -103,21 +104,22 @@ class Waiting:
         return look
 
     def _look_after(self, look: int) -> int:
-        often, seldom = (micros(moment) for moment in LOOKS_EVERY)
-        moment = min(max(often, self._waited(look) // 10), seldom)
-        return look + max(-(-moment // self._step_us), 1)
+        shortest, longest = (micros(interval) for interval in LOOKS_EVERY)
+        interval = min(max(shortest, self._waited(look) // 10), longest)
+        return look + max(-(-interval // self._step_us), 1)
 
     def _waited(self, step: int) -> int:
+        """Return how long it has waited at a step [us]."""
         return (step - self.since) * self._step_us
 
-    def wait(self, now: "Situation", whom: str, gives_way: GivesWay) -> Plan:
-        """Stand still until it is time to do something else, if nobody moves."""
+    def wait(self, now: "Situation", person: str, gives_way: GivesWay) -> Plan:
+        """Stand still until it goes round or gives up, if nobody moves."""
         plan, look, patience = now.plan(), self._look_after(now.step), micros(gives_way.patience)
         if now.step == self.since:
-            plan.note("gives_way", whom)
-        if self._waited(now.step) >= patience:  # it has looked for a way round
+            plan.note("gives_way", person)
+        if self._waited(now.step) >= patience:  # it has already looked for a way round
             patience = max(patience, micros(gives_way.gives_up))
-        # At its first look it may turn to where it would go on.
+        # At its first look it may still turn towards its next leg.
         while self.broken.began[0] == now.step and self._waited(look) < patience:
             look = self._look_after(look)
         plan.stay_until(look * self._step_us)
@@ -126,60 +128,60 @@ class Waiting:
 
     def go_on(self, now: "Situation") -> Plan | None:
         """Return the rest of the plan; None if nothing is left."""
-        return self._heard(resumed(now.actor, now.plan(), self.broken, self.step))
+        return self._with_interrupts(resumed(now.actor, now.plan(), self.broken, self.step))
 
     def go_round(self, now: "Situation", people: I64, distance: float) -> Plan | None:
-        """Return the rest of the plan by a way that keeps clear; None if there is none.
+        """Return the rest of the plan by a way that keeps clear of people; None without such a way.
 
         Args:
             now: The situation.
-            people: Where people are, and at which distance the bodies touch, int64 (n, 3).
-            distance: How far to keep where there is room [m].
+            people: As `Crowd.people`.
+            distance: The gap to keep where there is room [m].
         """
         actor, lattice = now.actor, now.actor.home.plan.lattice
         for gap in (max(distance, PASSING) + lattice.cell, PASSING):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
-            begun, detour = self._looking_again(now), _Detour(actor, around)
-            plan = resumed(actor, begun, self.broken, self.step, detour)
-            if plan is not None:
-                return self._heard(plan)
+            plan, detour = self._stand_for_a_step(now), _Detour(actor, around)
+            rest = resumed(actor, plan, self.broken, self.step, detour)
+            if rest is not None:
+                return self._with_interrupts(rest)
         return None
 
-    def leave_out(self, now: "Situation", whom: str) -> Plan | None:
+    def leave_out(self, now: "Situation", person: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""
-        plan = self._looking_again(now).note("gives_up", whom)
-        return self._heard(without_next_stop(now.actor, plan, self.broken, self.step))
+        plan = self._stand_for_a_step(now).note("gives_up", person)
+        return self._with_interrupts(without_next_stop(now.actor, plan, self.broken, self.step))
 
-    def give_up(self, now: "Situation", whom: str) -> Plan:
-        """Stand for a step, after which the behaviors are asked anew."""
-        return self._looking_again(now).note("gives_up", whom)
+    def give_up(self, now: "Situation", person: str) -> Plan:
+        """Stand for a step, after which the behaviors are asked again."""
+        return self._stand_for_a_step(now).note("gives_up", person)
 
-    def _looking_again(self, now: "Situation") -> Plan:
-        """Return a plan that begins with a step of standing: whoever is in the way is seen."""
+    def _stand_for_a_step(self, now: "Situation") -> Plan:
+        """Return a plan that begins with a step of standing, so that people in the way are seen."""
         return now.plan().stay(timedelta(microseconds=now.actor.clock.step_us))
 
-    def _heard(self, plan: Plan | None) -> Plan | None:
+    def _with_interrupts(self, plan: Plan | None) -> Plan | None:
         if plan is not None:
             plan.interrupts = self.interrupts
         return plan
 
 
 class _Detour:
-    """Ways that keep clear of people who stand about.
+    """Routes that keep clear of people who stand in the way.
 
     Args:
-        actor: The robot.
-        people: Lattice points and how far to keep from each, int64 (n, 3).
+        body: The robot.
+        people: x and y of each person, and the distance to keep [lattice], int64 (n, 3).
     """
 
-    def __init__(self, actor: "Actor", people: I64) -> None:
-        self._space = actor.space
-        xs, ys = actor.home.plan.lattice.centre_axes()
-        self._cost = np.zeros(actor.space.part_of_cell.shape, np.int32)
+    def __init__(self, body: "Body", people: I64) -> None:
+        self._space = body.space
+        xs, ys = body.home.plan.lattice.centre_axes()
+        self._cost = np.zeros(body.space.part_of_cell.shape, np.int32)
         for x, y, reach in people.tolist():
             near = (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach
             self._cost[near] = NO_WAY
 
     def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
-        """Return a way, or None if there is none that keeps clear."""
+        """Return a route between two lattice points, or None if none keeps clear."""
         return route_by_cost(self._space, self._cost, start, goal)

@@ -13,14 +13,14 @@ from fleet2d.weekdays import weekdays_of
 DAY = timedelta(days=1)
 
 
-class Span(NamedTuple):
-    """Hours of some days of the week; past midnight where they end before they begin.
+class HoursSpan(NamedTuple):
+    """Hours of some days of the week; those that end before they begin last past midnight.
 
     Attributes:
-        days: The days on which they begin, 0 is Monday.
-        begin: Since midnight.
-        end: Since the same midnight, up to a day after `begin`.
-        text: As it was written.
+        days: The days on which the hours begin, 0 is Monday.
+        begin: Their begin, since midnight.
+        end: Their end, since the same midnight, up to a day after `begin`.
+        text: The hours in a scenario.
     """
 
     days: tuple[int, ...]
@@ -29,7 +29,7 @@ class Span(NamedTuple):
     text: str
 
     def holds_at(self, time: datetime) -> datetime | None:
-        """Return when the hours that a moment is in are over; None if it is in none."""
+        """Return the end of the hours that a moment lies in; None if it lies outside."""
         midnight = _midnight(time)
         for day in (midnight - DAY, midnight):
             if day.weekday() in self.days and day + self.begin <= time < day + self.end:
@@ -37,14 +37,14 @@ class Span(NamedTuple):
         return None
 
     def next_begin(self, time: datetime) -> datetime:
-        """Return when they begin next after a moment."""
+        """Return when the hours begin next after a moment."""
         midnight = _midnight(time)
         days = (midnight + i * DAY for i in range(8))
         begins = (day + self.begin for day in days if day.weekday() in self.days)
         return next(begin for begin in begins if begin > time)
 
 
-def parse_span(value: object) -> Span:
+def parse_span(value: object) -> HoursSpan:
     """Read hours: ``08:00-18:00``, ``weekdays 22:00-06:00`` or ``monday,friday 9:00-12:00``.
 
     Example:
@@ -52,7 +52,7 @@ def parse_span(value: object) -> Span:
         >>> span.holds_at(datetime(2026, 1, 12, 5)), span.holds_at(datetime(2026, 1, 10, 5))
         (datetime.datetime(2026, 1, 12, 6, 0), None)
     """
-    if isinstance(value, Span):
+    if isinstance(value, HoursSpan):
         return value
     words = value.split() if isinstance(value, str) else []
     if not 1 <= len(words) <= 2 or words[-1].count("-") != 1:
@@ -66,21 +66,21 @@ def parse_span(value: object) -> Span:
     days = sorted(weekdays_of((words[0] if words[1:] else "daily").split(",")))
     names = "" if len(words) == 1 else f"{words[0]} "
     text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"
-    return Span(tuple(days), begin, end if end > begin else end + DAY, text)
+    return HoursSpan(tuple(days), begin, end if end > begin else end + DAY, text)
 
 
 def _midnight(time: datetime) -> datetime:
     return datetime.combine(time.date(), datetime.min.time())
 
 
-def _parse_hours(value: object) -> tuple[Span, ...]:
-    if isinstance(value, Sequence) and not isinstance(value, str | Span):
+def _parse_hours(value: object) -> tuple[HoursSpan, ...]:
+    if isinstance(value, Sequence) and not isinstance(value, str | HoursSpan):
         return tuple(parse_span(item) for item in value)
     return (parse_span(value),)
 
 
 Hours = Annotated[
-    tuple[Span, ...],
+    tuple[HoursSpan, ...],
     BeforeValidator(_parse_hours),
     PlainSerializer(lambda spans: [span.text for span in spans]),
     WithJsonSchema(
@@ -93,10 +93,10 @@ Hours = Annotated[
         }
     ),
 ]
-"""Hours of the week, in one or several spans; an empty list is never, unless a field says else."""
+"""Hours of the week, in one or several spans; what an empty list means is up to the field."""
 
 
-def holds(hours: Sequence[Span], time: datetime) -> datetime | None:
-    """Return when the hours that a moment is in are over; None if it is in none."""
+def holds(hours: Sequence[HoursSpan], time: datetime) -> datetime | None:
+    """Return the end of the hours that a moment lies in; None if it lies outside."""
     ends = [end for span in hours if (end := span.holds_at(time))]
     return max(ends, default=None)

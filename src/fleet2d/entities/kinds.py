@@ -1,8 +1,8 @@
-"""One rule for what a home lacks: kinds are left out with a note, single things are refused.
+"""Places that a home lacks: kinds of places are left out with a note, single ones are refused.
 
-A scenario names a kind ("bathroom", "sofa") or one thing ("bathroom_0", a point). A kind that this
-home lacks, or that a body can't reach, is left out wherever there is something left to do; the
-actor's `notes` say so. One thing that isn't there is refused, by a message that names the key.
+A scenario names a kind ("bathroom", "sofa") or a single place ("bathroom_0", a point). A kind that
+this home lacks, or that the body can't reach, is left out as long as another place remains; the
+body's `notes` say so. A single place that is missing is an error that names the key.
 """
 
 from collections.abc import Iterable
@@ -14,61 +14,61 @@ from fleet2d.floorplan.furniture.catalogue import FURNITURE
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.body import Body
     from fleet2d.floorplan.plan import Room
 
 P = TypeVar("P", bound=RoomChoice | Point)
 
 
-def kept_places(actor: "Actor", key: str, places: Iterable[P], *, needed: bool = True) -> list[P]:
-    """Return the places that there are, and note which kinds of places there are not.
+def available_places(
+    body: "Body", key: str, places: Iterable[P], *, needed: bool = True
+) -> list[P]:
+    """Return the places that the home has, and note which kinds of places it lacks.
 
     Args:
-        actor: The body that goes there.
-        key: Of the scenario, below the body: "patrol.rooms"; for messages.
+        body: The body that goes there.
+        key: The key of the scenario, below the body, for messages: "patrol.rooms".
         places: Rooms, furniture, kinds of them, lists of those, or points.
-        needed: Whether one of them at least has to be there.
+        needed: Whether at least one place has to remain.
 
     Raises:
-        PlacementError: A single thing is not there, or nothing is left.
+        PlacementError: The home lacks a single place, or no place remains.
     """
-    kept, missing, last = [], [], None
+    available, missing, last_error = [], [], None
     for place in places:
         try:
             if not is_point(place):
-                actor.rooms(place)  # type: ignore[arg-type]
-            kept.append(place)
+                body.rooms(place)  # type: ignore[arg-type]
+            available.append(place)
         except PlacementError as error:
-            if not is_kind(actor, place):
+            if not is_kind(body, place):
                 raise PlacementError(f"{key}: {error}") from None
             missing.append(" or ".join(map(str, place)))
-            last = error
-    if last is not None and not kept and needed:
-        raise PlacementError(f"{key}: nothing is left of it in this home: {last}") from None
+            last_error = error
+    if last_error is not None and not available and needed:
+        raise PlacementError(f"{key}: nothing is left of it in this home: {last_error}") from None
     if missing:
-        actor.notes.append(
-            f"{key}: left out, for this home has none to go to: {', '.join(missing)}"
-        )
-    return kept
+        body.notes.append(f"{key}: left out, for this home has none to go to: {', '.join(missing)}")
+    return available
 
 
-def kept_rooms(
-    actor: "Actor", key: str, names: Iterable[str], *, needed: bool = True
+def available_rooms(
+    body: "Body", key: str, names: Iterable[str], *, needed: bool = True
 ) -> "list[Room]":
-    """Return the rooms that names and kinds of rooms stand for, left out as `kept_places` says."""
-    kept = kept_places(actor, key, [(name,) for name in names], needed=needed)
-    return list(dict.fromkeys(room for name in kept for room in actor.rooms(name)))
+    """Return the rooms of some names and kinds, as `available_places` does."""
+    places = available_places(body, key, [(name,) for name in names], needed=needed)
+    return list(dict.fromkeys(room for place in places for room in body.rooms(place)))
 
 
-def is_kind(actor: "Actor", place: RoomChoice | Point) -> bool:
-    """Tell whether a place names kinds of things, and no single one of this home."""
+def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
+    """Tell whether a place names only kinds of things, and no single one of this home."""
     if is_point(place):
         return False
-    names = {room.name for room in actor.home.rooms} | {t.name for t in actor.home.objects}
-    types = {room.type for room in actor.home.rooms} | {t.type for t in actor.home.objects}
+    names = {room.name for room in body.home.rooms} | {t.name for t in body.home.objects}
+    types = {room.type for room in body.home.rooms} | {t.type for t in body.home.objects}
     return all(
         name not in names
-        and not str(name)[-1:].isdigit()  # bathroom_7 is one bathroom
+        and not str(name)[-1:].isdigit()  # bathroom_7 is a single bathroom
         and (name in types or name in FURNITURE or usual_type(str(name)) in PRIORITY)
         for name in place
         if name != ANY

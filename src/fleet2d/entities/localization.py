@@ -1,4 +1,4 @@
-"""Localization: how wrong a robot is about where it is, and so about where it sees people."""
+"""Localization: the error of a robot's own position, and so of the positions of people it sees."""
 
 from datetime import timedelta
 from functools import cache
@@ -18,7 +18,7 @@ from fleet2d.units import AngleDeg, Length, PositiveDuration, micros
 
 LONGEST = timedelta(days=1)
 MINUTE_US = 60_000_000
-# Noise is 2**-16 of what it is added to, per unit of random_bell.
+# Noise is in 1/65536 of the unit of what it is added to, per unit of random_bell.
 FINE = 1 << 16
 PURPOSES = (
     "drift x", "drift y", "turn", "left x", "left y", "jump x", "jump y", "jumps", "when",
@@ -28,10 +28,10 @@ I64 = NDArray[np.int64]
 
 
 class Localization(Settings):
-    """How wrong a robot is about where it is. Left as it is, it knows.
+    """The error of a robot's estimate of its own pose; by default there is none.
 
-    The error drifts away from what is left of it after a correction, may jump once between two
-    corrections, and is corrected again at fixed intervals. What the robot sees is off with it.
+    The error drifts from a residual after each correction, may jump once between two corrections,
+    and is corrected at fixed intervals. The people that the robot sees are misplaced by it, too.
     """
 
     drift: Length = Field(
@@ -66,15 +66,21 @@ class Localization(Settings):
 
 
 class Offsets(NamedTuple):
-    """Where a robot believes to be, less where it is: int64 (n,) each."""
+    """The believed pose of a robot minus its true pose, int64 (n,) each.
 
-    x: I64  # lattice units
+    Attributes:
+        x: Error along x [lattice].
+        y: Error along y [lattice].
+        turn: Error of the heading [1/4096 turn].
+    """
+
+    x: I64
     y: I64
-    turn: I64  # 1/4096 turn
+    turn: I64
 
 
 class Runs(NamedTuple):
-    """Poses of a body, one run for each step: a window as those who read poses need it."""
+    """The poses of a body at each step of a window, in the form of a `Window` of runs."""
 
     first: int
     end: int
@@ -98,19 +104,19 @@ class Drift:
     def __init__(
         self, settings: Localization, units_per_m: float, step_us: int, seed: int, path: str
     ) -> None:
-        """Give each draw a stream of its own.
+        """Derive one random stream per kind of draw.
 
         Args:
-            settings: How it errs.
-            units_per_m: Lattice units of a metre.
-            step_us: Length of a step.
-            seed: Of the run.
-            path: Of the robot.
+            settings: The sizes of the errors.
+            units_per_m: Lattice units per metre.
+            step_us: Length of a step [us].
+            seed: The seed of the run.
+            path: The path of the robot in the scenario, "robots.astro".
         """
         self._step_us, self._every_us = step_us, micros(settings.corrected_every)
         hours = settings.corrected_every / timedelta(hours=1)
         self._jump_chance = settings.jumps_per_hour * hours
-        self._drift, self._jump, self._left = (
+        self._drift, self._jump, self._residual = (
             _noise(metres * units_per_m)
             for metres in (settings.drift, settings.jump, settings.left)
         )
@@ -118,37 +124,37 @@ class Drift:
         self._keys = {p: stream_key(seed, path, f"localization: {p}") for p in PURPOSES}
 
     def at(self, steps: I64) -> Offsets:
-        """Return the error at some steps, in any order."""
+        """Return the error at some steps, int64 (n,), in any order."""
         moments = steps * self._step_us
         numbers, which = np.unique(moments // self._every_us, return_inverse=True)
         intervals: list[int] = numbers.tolist()
         elapsed_us = moments - numbers[which] * self._every_us
         jumps_at = np.array([self._jumps_at(interval) for interval in intervals], np.int64)
-        jumped = elapsed_us >= jumps_at[which]
+        has_jumped = elapsed_us >= jumps_at[which]
 
-        def drawn(purpose: str, noise: int) -> I64:
-            """Return a draw of the interval of each step."""
+        def sample(purpose: str, noise: int) -> I64:
+            """Return for each step the draw of its interval."""
             draws = [self._draw(purpose, interval) for interval in intervals]
             return (np.array(draws, np.int64) * noise)[which]
 
         x, y = (
-            drawn(f"left {axis}", self._left)
-            + jumped * drawn(f"jump {axis}", self._jump)
-            + _after(drawn(f"drift {axis}", self._drift), elapsed_us)
+            sample(f"left {axis}", self._residual)
+            + has_jumped * sample(f"jump {axis}", self._jump)
+            + _after(sample(f"drift {axis}", self._drift), elapsed_us)
             for axis in "xy"
         )
-        turn = _after(drawn("turn", self._turn), elapsed_us)
+        turn = _after(sample("turn", self._turn), elapsed_us)
         return Offsets(x // FINE, y // FINE, turn // FINE)
 
     def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:
-        """Return where the robot puts points [lattice] that it sees at some steps.
+        """Return where the robot believes that points are which it sees, x and y [lattice].
 
         Args:
-            x: Where they are, int64 (n,).
-            y: Likewise.
-            robot_x: Where the robot is, int64 (n,).
-            robot_y: Likewise.
-            steps: int64 (n,).
+            x: The points' true x [lattice], int64 (n,).
+            y: The points' true y [lattice], int64 (n,).
+            robot_x: The robot's true x [lattice], int64 (n,).
+            robot_y: The robot's true y [lattice], int64 (n,).
+            steps: The steps, int64 (n,).
         """
         off = self.at(steps)
         along, up = _cosines()[off.turn % TURN], _cosines()[(off.turn - QUARTER) % TURN]
@@ -159,7 +165,7 @@ class Drift:
         )
 
     def believed(self, runs: Window) -> Runs:
-        """Return the poses that the robot believes to have."""
+        """Return the poses that the robot believes it has."""
         lengths = np.diff(runs.step, append=runs.end)
         steps = np.arange(runs.first, runs.end, dtype=np.int64)
         off = self.at(steps)
@@ -172,7 +178,7 @@ class Drift:
         return int(random_bell(self._keys[purpose], interval))
 
     def _jumps_at(self, interval: int) -> int:
-        """Return when in an interval the error jumps [us]; its end if it doesn't."""
+        """Return the time within an interval at which the error jumps [us]; its end: never."""
         if random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
             return self._every_us
         return int(random_below(self._keys["when"], interval, self._every_us))
@@ -189,6 +195,6 @@ def _noise(deviation: float) -> int:
 
 
 def _after(speed: I64, elapsed_us: I64) -> I64:
-    """Return a drift per minute after some time; milliseconds keep it inside 64 bits."""
+    """Return a drift [per minute] after some time; milliseconds keep products within 64 bits."""
     drifted: I64 = speed * (elapsed_us // 1000) // (MINUTE_US // 1000)
     return drifted

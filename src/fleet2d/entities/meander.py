@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
 
-# A step longer than any home: it is never taken, and its products stay inside 64 bits.
+# A step longer than any home is never possible; this limit keeps products within 64 bits.
 LONGEST_STRIDE = 256 << 21
 
 
 @register("behavior", "meander")
 class Meander(Behavior):
-    """Walk at random, for good: two-dimensional Brownian motion with a steady pace.
+    """Walk at random, for good: two-dimensional Brownian motion at a constant speed.
 
     In each step the body turns by a normally distributed angle, no faster than its turn rate, and
     goes forward at its speed. Where a wall is in the way it turns instead, by any angle that its
-    turn rate allows; with `at_walls: stay` by the same small angles as everywhere, as the published
-    Fleet2D does: so it stands at walls for most of the time.
+    turn rate allows. With `at_walls: stay` it turns by the same small angles as everywhere, like
+    the published Fleet2D, and so spends most of the time at walls.
     """
 
     turn_std_deg: AngleDeg = Field(
@@ -44,7 +44,7 @@ class Meander(Behavior):
     )
 
     def start(self, actor: "Actor") -> None:
-        """Work out the walk in lattice units per step."""
+        """Convert the rule of the walk to lattice units per step."""
         step_s = actor.clock.step_us / 1e6
         std = self.turn_std_deg / 360 * TURN * math.sqrt(step_s)  # headings per step
         self.rule = WalkRule(

@@ -8,7 +8,14 @@ from fleet2d.kernels.motion import Breakpoints, WalkRule
 
 
 class Pose(NamedTuple):
-    """Where a body is at one step: lattice units, 1/4096 turn, 1 = away."""
+    """The pose of a body at one step.
+
+    Attributes:
+        x: Position [lattice].
+        y: Position [lattice].
+        heading: Counter-clockwise from +x [1/4096 turn].
+        away: 1 if the body is out of the home, else 0.
+    """
 
     x: int
     y: int
@@ -18,7 +25,7 @@ class Pose(NamedTuple):
 
 @dataclass(frozen=True)
 class Track:
-    """A motion known beforehand."""
+    """A motion along breakpoints that are known beforehand."""
 
     breakpoints: Breakpoints
     step_us: int

@@ -1,4 +1,4 @@
-"""The free places nearest to many points: what a space answers for one, by an index."""
+"""The free cells nearest to many points at once, found by a spatial index."""
 
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -8,17 +8,17 @@ import shapely
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.body import Body
 
 I64 = NDArray[np.int64]
 
 
 class Nearest:
-    """Centres of the free cells that a body can get to, in one room or in all."""
+    """Centres [lattice] of the free cells that a body can get to, in one room or in all."""
 
-    def __init__(self, actor: "Actor", room: int | None = None) -> None:
-        cells = actor.space.cells(room, actor.part)
-        xs, ys = actor.home.plan.lattice.centre_axes()
+    def __init__(self, body: "Body", room: int | None = None) -> None:
+        cells = body.space.cells(room, body.part)
+        xs, ys = body.home.plan.lattice.centre_axes()
         self.centres: I64 = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], 1)
 
     @cached_property
@@ -26,10 +26,13 @@ class Nearest:
         return shapely.STRtree([shapely.Point(x, y) for x, y in self.centres.tolist()])
 
     def of(self, points: I64) -> I64:
-        """Return the nearest centre to each point (n, 2); of equal ones lowest row, then column."""
+        """Return the centre nearest to each point, int64 (n, 2).
+
+        Of several at the same distance, the one of the lowest row, then of the lowest column.
+        """
         if not len(points) or not len(self.centres):
             return np.empty((0, 2), np.int64)
-        asked, found = self._tree.query_nearest(shapely.points(points), all_matches=True)
+        of_point, centre = self._tree.query_nearest(shapely.points(points), all_matches=True)
         best = np.full(len(points), len(self.centres), np.int64)
-        np.minimum.at(best, asked, found)
+        np.minimum.at(best, of_point, centre)
         return self.centres[best]

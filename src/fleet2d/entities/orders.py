@@ -1,7 +1,7 @@
-"""Orders: what a body does in place of its behaviors, until it is handed back to them.
+"""Orders: what a body does in place of its behaviors, until it is released.
 
 A body has one order at a time. Nothing interrupts it, but a robot still gives way and its battery
-still runs down. An order is over when its time is, when another one comes, or on release.
+still runs down. An order ends after its duration, with the next order, or on release.
 """
 
 from datetime import timedelta
@@ -35,7 +35,7 @@ class Hold:
         self._until_us: int | None = None
 
     def decide(self, now: "Situation") -> Plan | None:
-        """Stay for what is left of the time."""
+        """Stay for the rest of the time."""
         plan = now.plan()
         if self._lasts_us is None:
             return plan.stay()
@@ -44,8 +44,8 @@ class Hold:
         return None if plan.time_us >= self._until_us else plan.stay_until(self._until_us)
 
 
-class Errand:
-    """Go somewhere and stay there: the base of the orders that lead elsewhere.
+class Trip:
+    """Go somewhere and stay there: the base of orders that move the body.
 
     Args:
         duration: For how long it stays once it is there; None: for good.
@@ -57,7 +57,7 @@ class Errand:
         self._goal: tuple[int, int, int] | None = None  # where it stays: x, y, away
 
     def decide(self, now: "Situation") -> Plan | None:
-        """Go there, unless it is there already, and stay for what is left of the time."""
+        """Go there, unless it is there already, and stay for the rest of the time."""
         plan = now.plan()
         if self._goal != (plan.x, plan.y, plan.away):
             self.go(now, plan)
@@ -68,16 +68,16 @@ class Errand:
         return plan.stay() if self._until_us is None else plan.stay_until(self._until_us)
 
     def go(self, now: "Situation", plan: Plan) -> None:
-        """Let the plan lead there."""
+        """Add the way there to the plan."""
         raise NotImplementedError
 
 
-class GoTo(Errand):
-    """Go to a place on foot, and stay there: at home again, if it was away.
+class GoTo(Trip):
+    """Walk to a place and stay there; a body that is away comes home first.
 
     Args:
         place: A room, furniture, or a point [m].
-        heading: Where it faces then [1/4096 turn]; None: as it came.
+        heading: Where it faces on arrival [1/4096 turn]; None: as on its last leg.
         duration: For how long it stays; None: for good.
     """
 
@@ -97,7 +97,7 @@ class GoTo(Errand):
             plan.turn_by(turn_between(plan.heading, self._heading) / TURN)
 
 
-class GoOut(Errand):
+class GoOut(Trip):
     """Leave the home, and stay away."""
 
     def go(self, now: "Situation", plan: Plan) -> None:
@@ -105,12 +105,12 @@ class GoOut(Errand):
         plan.leave_home()
 
 
-class DoActivity(Errand):
-    """Do something that people do, where they do it.
+class DoActivity(Trip):
+    """Do an activity at its place.
 
     Args:
-        activity: Its name, for the events table.
-        place: Where; None: where the body's own behavior does it.
+        activity: The activity's name, for the events table.
+        place: Where to do it; None: where the body's own behavior does it.
         duration: For how long; None: for good.
     """
 
@@ -125,6 +125,6 @@ class DoActivity(Errand):
         if self._place is not None:
             plan.come_home().go_to(self._place, "send")
         else:
-            doers = (b for b in now.actor.behaviors if self._activity in b.activities())
-            next(doers).perform(plan, self._activity)
+            capable = (b for b in now.actor.behaviors if self._activity in b.activities())
+            next(capable).perform(plan, self._activity)
         plan.note("activity", self._activity)

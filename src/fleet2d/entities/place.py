@@ -13,7 +13,7 @@ from fleet2d.floorplan.plan import Room
 from fleet2d.units import problem
 
 ANY = "any"
-# Between a piece of furniture and whose it is.
+# Separates a piece of furniture from its owner: "bed of ana".
 OF = " of "
 
 RoomChoice = tuple[str, ...]
@@ -96,43 +96,42 @@ def matching_rooms(
     reachable: Sequence[Room],
     objects: Sequence[PlacedObject] = (),
 ) -> tuple[str, list[Room]]:
-    """Return the first name that fits a reachable room, and all reachable rooms that it fits.
+    """Return the first name that matches a reachable room, and all reachable rooms it matches.
 
     Args:
         names: Rooms and kinds of rooms to try in turn.
         rooms: All rooms of the home.
-        reachable: Those that the body gets to.
-        objects: Furniture, which a place may name as well; for the message.
+        reachable: The rooms that the body can get to.
+        objects: Furniture, which a place may name as well; only for the message.
 
     Raises:
-        PlacementError: No name fits a room that can be reached; says which rooms there are.
+        PlacementError: No name matches a reachable room; the message lists the rooms.
     """
     for name in names:
         if name == ANY:
             return ANY, list(reachable)
-        found = [room for room in reachable if name in (room.name, room.type)]
-        if found:
-            return name, found
-    known = any(name in (room.name, room.type) for name in names for room in rooms)
-    wanted = " or ".join(repr(name) for name in names)
-    listed = ", ".join(room.name for room in reachable)
-    if known:
+        matches = [room for room in reachable if name in (room.name, room.type)]
+        if matches:
+            return name, matches
+    requested = " or ".join(repr(name) for name in names)
+    room_names = ", ".join(room.name for room in reachable)
+    if any(name in (room.name, room.type) for name in names for room in rooms):
         raise PlacementError(
-            f"{wanted} can't be reached from where it starts; it can reach: {listed}"
+            f"{requested} can't be reached from where it starts; it can reach: {room_names}"
         )
     choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
     choices += [thing.name for thing in objects] + sorted({thing.type for thing in objects})
     close = difflib.get_close_matches(names[0].split(OF)[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     if any(name.split(OF)[0] in (t.name, t.type) for name in names for t in objects):
-        raise PlacementError(f"{wanted} has no place to use it from that can be reached")
+        raise PlacementError(f"{requested} has no place to use it from that can be reached")
     raise PlacementError(
-        f"there is no room {wanted}{hint or '.'} The rooms are: {listed}.{_furniture(objects)}"
-        " A list that ends in 'any' works in every home"
+        f"there is no room {requested}{hint or '.'} The rooms are: {room_names}."
+        f"{_furniture(objects)} A list that ends in 'any' works in every home"
     )
 
 
 def _furniture(objects: Sequence[PlacedObject]) -> str:
-    """Return the kinds of furniture that are places, for messages."""
+    """Return a sentence that lists the kinds of furniture that are places, for messages."""
     kinds = sorted({thing.type for thing in objects if thing.uses})
     return f" The furniture is: {', '.join(kinds)}." if kinds else ""

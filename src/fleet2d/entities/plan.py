@@ -1,4 +1,4 @@
-"""Plans: the timed path that a behavior decided on, followed until it is over or interrupted."""
+"""Plans: the timed paths that behaviors return, followed until they are over or interrupted."""
 
 from collections.abc import Iterable, Mapping
 from datetime import datetime, timedelta
@@ -19,14 +19,14 @@ from fleet2d.problems import did_you_mean
 from fleet2d.units import LONGEST_DURATION, micros
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.body import Body
     from fleet2d.entities.place import Point, RoomChoice
 
 I64 = NDArray[np.int64]
 
 
 class Note(NamedTuple):
-    """Something that a plan says happens at a moment: a row of the events table."""
+    """A row that a plan adds to the events table: when, what, and any detail of it."""
 
     time_us: int
     event: str
@@ -43,24 +43,26 @@ class Plan:
         time_us: The moment up to which it is planned [us since the start].
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
-        asks_us: When the behavior is asked at the latest [us since the start]; None: at its end.
-        posture, postures: How the body stands in the end; when it takes another [us], and which.
+        asks_us: When the behavior is asked again at the latest [us since the start]; None: at the
+            plan's end.
+        posture: The posture of the body at the end of the plan.
+        postures: When the posture changes [us since the start], and its number in POSTURES then.
     """
 
-    def __init__(self, actor: "Actor", step: int) -> None:
-        state = actor.state
-        self._actor = actor
+    def __init__(self, body: "Body", step: int) -> None:
+        state = body.state
+        self._body = body
         self.began = (step, state)
         self._legs = Legs()
         self._motion: Motion | None = None
-        self.time_us = step * actor.clock.step_us
+        self.time_us = step * body.clock.step_us
         self.x, self.y, self.heading, self.away = state
         self.notes: list[Note] = []
         self.interrupts: frozenset[str] = frozenset()
         self.asks_us: int | None = None
         self._root: Plan | None = None
         self.endless = False
-        self._posture_before = actor.posture_code(self.time_us)
+        self._posture_before = body.posture_code(self.time_us)
         self.posture: Posture = POSTURES[self._posture_before]
         self.postures: list[tuple[int, int]] = []
         self._posture_begins, self._posture_codes = np.empty(0, np.int64), np.empty(0, np.int8)
@@ -68,7 +70,7 @@ class Plan:
 
     @property
     def root(self) -> "Plan":
-        """The plan that it goes on with; itself, unless one was broken off."""
+        """The plan that it continues; itself, unless it resumes one that was broken off."""
         return self if self._root is None else self._root
 
     @root.setter
@@ -79,12 +81,12 @@ class Plan:
     @property
     def step_us(self) -> int:
         """Length of a step [us]."""
-        return self._actor.clock.step_us
+        return self._body.clock.step_us
 
     @property
     def time(self) -> datetime:
         """The local time up to which it is planned."""
-        return self._actor.clock.start + timedelta(microseconds=self.time_us)
+        return self._body.clock.start + timedelta(microseconds=self.time_us)
 
     def go_to(
         self, place: "RoomChoice | Point | str | Iterable[object]", purpose: str = "spot"
@@ -93,13 +95,13 @@ class Plan:
 
         A robot takes the cheapest path where the home has a costmap.
 
-        In a room, the place is a spot drawn from its free cells by the stream `purpose`. Furniture
-        is used by people; robots stop where one steps up to it.
+        In a room, the place is a spot drawn from its free cells by the stream `purpose`. People use
+        furniture that they go to; robots stop in front of it.
         """
-        thing = seat_at(self._actor, place)
+        thing = seat_at(self._body, place)
         if thing is not None:
             return self.use(thing)
-        return self.go_to_point(*self._actor.find(place, self.time_us, purpose))
+        return self.go_to_point(*self._body.find(place, self.time_us, purpose))
 
     def go_to_point(self, x: int, y: int, *, route: I64 | None = None) -> Self:
         """Walk to a lattice point by the shortest path, or by a route (n, 2) that leads there.
@@ -109,37 +111,37 @@ class Plan:
         """
         self.come_home()
         self._check_goes_on()
-        actor = self._actor
+        body = self._body
         self._get_up()
         if route is None:
-            route = actor.space.route((self.x, self.y), (x, y))
+            route = body.space.route((self.x, self.y), (x, y))
         if route is None:
-            at = actor.home.plan.lattice.to_metres([x, y]).round(2).tolist()
-            raise NoWayError(f"{actor.path}: there is no way to {at} for a body of its radius")
+            at = body.home.plan.lattice.to_metres([x, y]).round(2).tolist()
+            raise NoWayError(f"{body.path}: there is no way to {at} for a body of its radius")
         self._walk(route)
         return self
 
     def _walk(self, route: I64) -> None:
-        actor = self._actor
+        body = self._body
         self.time_us, self.x, self.y, self.heading, _ = self._legs.walk(
-            self.time_us, self.heading, route, actor.speed, actor.turn_rate
+            self.time_us, self.heading, route, body.speed, body.turn_rate
         )
 
     def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
-        """Walk to an object and use it: step to one of its places, face and sit as one does there.
+        """Walk to an object and use it, with the heading and the posture of one of its places.
 
-        The last step may lead onto the object, into a bed or onto a chair; whoever goes on from
-        there gets up first. The events table has a row `uses` with the object's name.
+        The last step may lead onto the object, into a bed or onto a chair; before the next walk,
+        the body gets up. The events table has a row `uses` with the object's name.
 
         Args:
             thing: An object of the home, or its name.
-            place: Which of its places, by number; counted round where it has fewer.
+            place: Which of its places, by number, modulo how many it has.
 
         Raises:
             PlacementError: There is no such object, or no place to use it from.
             NoWayError: There is no way to it, or none at present.
         """
-        at = self._actor.place_at(thing, place)
+        at = self._body.place_at(thing, place)
         if self.away or (self.x, self.y) != (at.x, at.y):
             self.go_to_point(*at.approach)
             self._step_to(at.x, at.y)
@@ -148,68 +150,68 @@ class Plan:
         return self.note("uses", at.name)
 
     def take(self, posture: Posture) -> Self:
-        """Stand, sit or lie from the moment up to which it is planned; walking makes one stand."""
+        """Stand, sit or lie from the moment up to which it is planned, until the next walk."""
         if posture != self.posture:
             self.postures.append((self.time_us, POSTURES.index(posture)))
             self.posture = posture
         return self
 
     def posture_at(self, times_us: I64) -> NDArray[np.int8]:
-        """Return the posture at rising moments within the plan, by number in POSTURES, int8."""
-        if len(self._posture_codes) <= len(self.postures):  # first asked since it grew
+        """Return the posture at ascending moments within the plan, by number in POSTURES, int8."""
+        if len(self._posture_codes) <= len(self.postures):  # out of date
             self._posture_begins = np.array([time for time, _ in self.postures], np.int64)
             codes = [code for _, code in self.postures]
             self._posture_codes = np.array([self._posture_before, *codes], np.int8)
-        begins, known = self._posture_begins, self._posture_codes
+        begins, known_codes = self._posture_begins, self._posture_codes
         first, last = (int(begins.searchsorted(t, "right")) for t in (times_us[0], times_us[-1]))
-        if first == last:  # mostly: nobody sits down all the time
-            return np.full(len(times_us), known[first])
-        taken: NDArray[np.int8] = known[np.searchsorted(begins, times_us, side="right")]
-        return taken
+        if first == last:  # the usual case: no change in between
+            return np.full(len(times_us), known_codes[first])
+        at_times: NDArray[np.int8] = known_codes[np.searchsorted(begins, times_us, side="right")]
+        return at_times
 
     def posture_times(self) -> tuple[I64, NDArray[np.int8]]:
-        """Return when the body takes another posture [us], and the postures, one more."""
+        """Return when the posture changes [us], int64 (n,), and the postures, int8 (n + 1,)."""
         codes = [self._posture_before, *(code for _, code in self.postures)]
         times = [time for time, _ in self.postures]
         return np.array(times, np.int64), np.array(codes, np.int8)
 
     def _get_up(self) -> None:
-        """Stand, and step off the object that one sits or lies on."""
+        """Stand up, and step off the object that the body sits or lies on."""
         self.take("stand")
-        actor, space = self._actor, self._actor.space
-        approach = actor.home.approach_of((self.x, self.y))
+        body, space = self._body, self._body.space
+        approach = body.home.approach_of((self.x, self.y))
         # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
-        if approach is None or space.part_at(self.x, self.y) == actor.part:
+        if approach is None or space.part_at(self.x, self.y) == body.part:
             return
-        if space.part_at(*approach) != actor.part:
-            approach = space.nearest(*approach, actor.part) or approach
+        if space.part_at(*approach) != body.part:
+            approach = space.nearest(*approach, body.part) or approach
         self._step_to(*approach)
 
     def _step_to(self, x: int, y: int) -> None:
-        """Go straight to a point, whatever is in the way."""
+        """Go straight to a lattice point; neither walls nor furniture count."""
         if (x, y) != (self.x, self.y):
             self._walk(straight_way((self.x, self.y), (x, y)))
 
     def reaches(self, x: int, y: int) -> bool:
-        """Tell whether there is a way to a lattice point from where the plan ends at present."""
-        return self._actor.space.route((self.x, self.y), (x, y)) is not None
+        """Tell whether there is a way to a lattice point from where the plan ends so far."""
+        return self._body.space.route((self.x, self.y), (x, y)) is not None
 
     def follow(self, breakpoints: I64) -> Self:
-        """Follow breakpoints known beforehand, from where it is; two of one time are a jump.
+        """Follow given breakpoints; between two of the same time, the body jumps.
 
         Args:
             breakpoints: Time [us since the start], x, y [lattice], heading [1/4096 turn], away;
                 int64 (n, 5).
 
         Raises:
-            ComponentError: Their times run backwards, or begin before what is planned.
+            ComponentError: The times are not ascending, or begin before the end of the plan.
         """
         self._check_goes_on()
         if len(breakpoints):
             times = breakpoints[:, 0]
             if times[0] < self.time_us or bool((times[1:] < times[:-1]).any()):
                 raise ComponentError(
-                    f"{self._actor.path}: breakpoints must be in order of time, from"
+                    f"{self._body.path}: breakpoints must be in order of time, from"
                     f" {self.time_us} us on"
                 )
             self._legs.add(breakpoints)
@@ -220,12 +222,14 @@ class Plan:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
         self._check_goes_on()
         now = self.time_us, self.x, self.y, self.heading, self.away
-        after = self._legs.turn(*now, round(turns * TURN), self._actor.turn_rate)
+        after = self._legs.turn(*now, round(turns * TURN), self._body.turn_rate)
         self.time_us, self.heading = after[0], after[3]
         return self
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
-        """Stay for a while, or until a local time (at once over if that is past); else for good.
+        """Stay for a duration, or until a local time; without either, for good.
+
+        Until a time that is past, it doesn't stay at all.
 
         Raises:
             ComponentError: The duration is negative, or longer than 1000 years.
@@ -234,19 +238,19 @@ class Plan:
         if duration is not None:
             if not timedelta(0) <= duration <= LONGEST_DURATION:
                 raise ComponentError(
-                    f"{self._actor.path}: can't stay for {duration}: 0 to 1000 years are possible;"
+                    f"{self._body.path}: can't stay for {duration}: 0 to 1000 years are possible;"
                     " leave the duration out to stay for good"
                 )
             self.time_us += micros(duration)
         elif until is not None:
-            self.time_us = max(self.time_us, self._actor.clock.elapsed(until))
+            self.time_us = max(self.time_us, self._body.clock.elapsed(until))
         else:
             self.endless = True
         self._mark()
         return self
 
     def stay_until(self, time_us: int) -> Self:
-        """Stay until a moment [us since the start]; at once over if that is past."""
+        """Stay until a moment [us since the start]; not at all if that is past."""
         self._check_goes_on()
         if time_us > self.time_us:
             self.time_us = time_us
@@ -254,16 +258,16 @@ class Plan:
         return self
 
     def leave_home(self) -> Self:
-        """Walk to the way out and be away from then on."""
+        """Walk to the way out of the home, and be away from then on."""
         if not self.away:
-            self.go_to_point(*self._actor.way_out)
+            self.go_to_point(*self._body.way_out)
             self.away = 1
             self.note("left_home")
             self._mark()
         return self
 
     def come_home(self) -> Self:
-        """Be at home again, where the body went away; nothing if it is at home."""
+        """Be at home again, at the point where the body left; no effect if it is at home."""
         if self.away:
             self.away = 0
             self.note("came_home")
@@ -274,12 +278,12 @@ class Plan:
         """Walk at random, for good; must be all that the plan does."""
         self.come_home()
         self._check_goes_on()
-        if len(self._legs) > 2 or self.time_us != self.began[0] * self._actor.clock.step_us:
-            raise ComponentError(f"{self._actor.path}: a plan that meanders can do nothing before")
+        if len(self._legs) > 2 or self.time_us != self.began[0] * self._body.clock.step_us:
+            raise ComponentError(f"{self._body.path}: a plan that meanders can do nothing before")
         self.take("stand")
-        home, actor = self._actor.home, self._actor
-        # Who wanders about takes a shut door for a wall.
-        self._motion = Walk(home.walls, home.space(actor.entity.radius).mesh, rule)
+        home, body = self._body.home, self._body
+        # A random walk doesn't open doors: a shut one is a wall.
+        self._motion = Walk(home.walls, home.space(body.entity.radius).mesh, rule)
         self.endless = True
         return self
 
@@ -287,57 +291,56 @@ class Plan:
         """Add a row to the events table, at the moment up to which it is planned.
 
         Raises:
-            ComponentError: No behavior of the body declares such events, and Fleet2D has none.
+            ComponentError: Neither Fleet2D nor a behavior of the body declares such events.
         """
-        behaviors = self._actor.behaviors
-        if event not in KINDS and not any(event in b.records for b in behaviors):
+        if event not in KINDS and event not in self._body.event_kinds:
             raise ComponentError(
-                f"{self._actor.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
+                f"{self._body.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
                 f" behavior declares its own: records = frozenset({{{event!r}}})"
             )
         self.notes.append(Note(self.time_us, event, detail))
         return self
 
     def call(self, user: str = "") -> Self:
-        """Call somebody by name, or whoever is near: people who react to robots may come."""
+        """Call a person by name, or everybody who is near: people who react to robots may come."""
         return self.note("calls", user)
 
     def interrupt_on(self, *events: str) -> Self:
-        """Ask the behavior again as soon as one of these events of its camera happens.
+        """Ask the behavior again as soon as one of these events of its cameras happens.
 
-        Of a robot they are user_seen and user_lost, of a user with a camera robot_seen and
+        A robot has the events user_seen and user_lost, a user with a camera robot_seen and
         robot_lost.
 
         Raises:
             ComponentError: There is no such event, or the body has no camera to notice it.
         """
-        entity = self._actor.entity
+        entity = self._body.entity
         if not entity.eyes:
             raise ComponentError(
-                f"{self._actor.path}: a camera interrupts plans by what it sees, but there is none"
+                f"{self._body.path}: a camera interrupts plans by what it sees, but there is none"
             )
         unknown = set(events) - set(entity.sight_events)
         if unknown:
             allowed = ", ".join(sorted(entity.sight_events))
             raise ComponentError(
-                f"{self._actor.path}: no event {sorted(unknown)[0]!r}; there are: {allowed}"
+                f"{self._body.path}: no event {sorted(unknown)[0]!r}; there are: {allowed}"
             )
         self.interrupts |= frozenset(events)
         return self
 
     def ask_by(self, time: datetime) -> Self:
-        """Ask the behavior again at a local time at the latest, wherever the body is by then."""
-        asks_us = self._actor.clock.elapsed(time)
+        """Ask the behavior again at a local time at the latest, even if the plan isn't over."""
+        asks_us = self._body.clock.elapsed(time)
         self.asks_us = asks_us if self.asks_us is None else min(asks_us, self.asks_us)
         return self
 
     @property
     def over_at(self) -> int | None:
-        """The step at which it is over, not the one at which it began; None: never."""
+        """The step at which it is over, after the one at which it begins; None: never."""
         ends = [] if self.endless else [self.time_us]
         ends += [] if self.asks_us is None else [self.asks_us]
-        # One that takes no time would be asked for again and again at the same step.
-        clock, least = self._actor.clock, self.began[0] + 1
+        # Else a behavior would be asked forever at one step for plans that take no time.
+        clock, least = self._body.clock, self.began[0] + 1
         return max(clock.step_at_or_after(min(ends)), least) if ends else None
 
     def is_over(self, step: int) -> bool:
@@ -348,11 +351,11 @@ class Plan:
         """Return the motion of the plan."""
         if self._motion is None:
             track = Breakpoints(*self._legs.track())
-            self._motion = Track(track, self._actor.clock.step_us)
+            self._motion = Track(track, self._body.clock.step_us)
         return self._motion
 
     def data(self) -> dict[str, Any]:
-        """Return all that the plan is, as numbers and texts: another run can follow it by `of`."""
+        """Return the plan as numbers and texts, from which `of` makes the same plan again."""
         motion = self.finish()
         walk: list[Any] | None = list(motion.rule) if isinstance(motion, Walk) else None
         return {
@@ -362,13 +365,13 @@ class Plan:
             "interrupts": sorted(self.interrupts),
             "asks_us": self.asks_us,
             "endless": self.endless,
-            "postures": [list(taken) for taken in self.postures],
+            "postures": [list(change) for change in self.postures],
         }
 
     @classmethod
-    def of(cls, actor: "Actor", step: int, data: Mapping[str, Any]) -> Self:
-        """Return the plan of a body that `data` returned, to be followed from a step on."""
-        plan = cls(actor, step)
+    def of(cls, body: "Body", step: int, data: Mapping[str, Any]) -> Self:
+        """Return the plan that `data` describes, for a body to follow from a step on."""
+        plan = cls(body, step)
         if data["walk"] is not None:
             key, *numbers = data["walk"]
             return plan.meander(WalkRule(np.uint64(key), *numbers))
@@ -384,7 +387,7 @@ class Plan:
     def _check_goes_on(self) -> None:
         if self.endless:
             raise ComponentError(
-                f"{self._actor.path}: a plan that stays or meanders for good can't go on: give"
+                f"{self._body.path}: a plan that stays or meanders for good can't go on: give"
                 " stay() a duration, or make that the end"
             )
 

@@ -1,4 +1,4 @@
-"""Resuming: the rest of a plan that was broken off, from wherever the body is by now."""
+"""Resuming: the rest of a plan that was interrupted, from wherever the body is by now."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -13,63 +13,63 @@ from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.body import Body
 
 Detour = Callable[[tuple[int, int], tuple[int, int]], NDArray[np.int64] | None]
 
 
 def resumed(
-    actor: "Actor", plan: Plan, broken: Plan, step: int, detour: Detour | None = None
+    body: "Body", plan: Plan, broken: Plan, step: int, detour: Detour | None = None
 ) -> Plan | None:
-    """Fill a plan with the rest of one that was broken off.
+    """Fill a plan with the rest of one that was interrupted.
 
     The body goes straight to the next place at which it would have stopped. From there on all is as
-    it was planned, only later; of a stop that was under way, what was left of it.
+    it was planned, only later; of a stop that was interrupted, the remaining time.
 
     Args:
-        actor: The body.
-        plan: A plan that begins here and now, and goes nowhere yet.
-        broken: The other plan.
-        step: When it was broken off.
-        detour: Finds ways, if there are any; None: the shortest.
+        body: The body.
+        plan: An empty plan that begins at the present step.
+        broken: The plan that was interrupted.
+        step: The step at which it was interrupted.
+        detour: Returns a route between two lattice points, or None; left out: the shortest route.
 
     Returns:
-        The plan; None where there is nothing to go on with, or no way to it at present.
+        The plan; None if nothing is left to do, or no way leads there at present.
     """
-    return _rest(actor, plan, broken, step * actor.clock.step_us, detour)
+    return _rest(body, plan, broken, step * body.clock.step_us, detour)
 
 
-def without_next_stop(actor: "Actor", plan: Plan, broken: Plan, step: int) -> Plan | None:
-    """Fill a plan with the rest of one that was broken off, but the stop that comes next.
+def without_next_stop(body: "Body", plan: Plan, broken: Plan, step: int) -> Plan | None:
+    """Fill a plan with the rest of one that was interrupted, without its next stop.
 
     Returns:
-        The plan; None where no other stop comes, or there is no way to it at present.
+        The plan; None if there is no later stop, or no way leads to it at present.
     """
     motion = broken.finish()
     if not isinstance(motion, Track):
         return None
     x, y, time = motion.breakpoints.x, motion.breakpoints.y, motion.breakpoints.time
-    stop = _next_stop(actor, motion.breakpoints, step * actor.clock.step_us)
+    stop = _next_stop(body, motion.breakpoints, step * body.clock.step_us)
     if stop is None:
         return None
     leaves = np.flatnonzero((x[stop:] != x[stop]) | (y[stop:] != y[stop]))
-    found = None
-    if len(leaves):
-        found = _rest(actor, plan, broken, int(time[stop + leaves[0]]), None)
-    if found is not None:
-        found.root = found  # which isn't the whole of what was planned
-    return found
+    if not len(leaves):
+        return None
+    rest = _rest(body, plan, broken, int(time[stop + leaves[0]]), None)
+    if rest is not None:
+        rest.root = rest  # a plan of its own: one stop of the interrupted one is missing
+    return rest
 
 
 def _rest(
-    actor: "Actor", plan: Plan, broken: Plan, broken_us: int, detour: Detour | None
+    body: "Body", plan: Plan, broken: Plan, broken_us: int, detour: Detour | None
 ) -> Plan | None:
-    """Fill a plan with what of another one comes after a moment."""
+    """Fill a plan with the part of another one that comes after a moment."""
     motion = broken.finish()
     if not isinstance(motion, Track) or broken.postures or plan.away:
         return None
     track = motion.breakpoints
-    stop = _next_stop(actor, track, broken_us)
+    stop = _next_stop(body, track, broken_us)
     if stop is None or track.away[stop:].any():
         return None
     goes_on_us = max(int(track.time[stop]), broken_us)
@@ -83,7 +83,7 @@ def _rest(
         return None
     plan.turn_by(turn_between(plan.heading, _heading_at(track, stop, goes_on_us)) / TURN)
     later = plan.time_us - goes_on_us
-    # What was to happen on the way happens when it is there.
+    # Rows that were planned for the way there are written on arrival.
     plan.notes += [
         Note(max(n.time_us, goes_on_us) + later, n.event, n.detail)
         for n in broken.notes
@@ -96,14 +96,14 @@ def _rest(
     return plan
 
 
-def _next_stop(actor: "Actor", track: Breakpoints, broken_us: int) -> int | None:
-    """Return the breakpoint at which the body next stands still, where it can be; None for none."""
+def _next_stop(body: "Body", track: Breakpoints, broken_us: int) -> int | None:
+    """Return the index of the breakpoint at which the body next stands still; None: no such."""
     x, y, time = track.x, track.y, track.time
     at = max(int(np.searchsorted(time, broken_us, side="right")) - 1, 0)
     for i in range(at, len(time) - 1):
         still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > broken_us
-        # Where a way turns at a corner it touches the border of the space: that is no stop.
-        if still and actor.space.part_at(int(x[i]), int(y[i])) == actor.part:
+        # A turn at a corner, on the border of the space, is no stop.
+        if still and body.space.part_at(int(x[i]), int(y[i])) == body.part:
             return i
     return None
 

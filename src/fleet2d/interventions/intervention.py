@@ -15,7 +15,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, InitErrorDetails
 
 from fleet2d.component import Codec, Component, components
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
 from fleet2d.problems import did_you_mean, problem, problem_at, rewritten
@@ -68,7 +68,7 @@ class Lasting(Intervention):
         return self.duration
 
 
-def body(world: World, name: str) -> Actor:
+def body(world: World, name: str) -> DecidingActor:
     """Return somebody in the run.
 
     Raises:
@@ -77,7 +77,7 @@ def body(world: World, name: str) -> Actor:
     return _named(name, "nobody named", {**world.users, **world.robots})
 
 
-def user(world: World, name: str) -> Actor:
+def user(world: World, name: str) -> DecidingActor:
     """Return a person in the run.
 
     Raises:
@@ -86,7 +86,7 @@ def user(world: World, name: str) -> Actor:
     return _named(name, "no user", world.users)
 
 
-def robot(world: World, name: str) -> Actor:
+def robot(world: World, name: str) -> DecidingActor:
     """Return a robot in the run.
 
     Raises:
@@ -95,7 +95,7 @@ def robot(world: World, name: str) -> Actor:
     return _named(name, "no robot", world.robots)
 
 
-def _named(name: str, nobody: str, actors: Mapping[str, Actor]) -> Actor:
+def _named(name: str, nobody: str, actors: Mapping[str, DecidingActor]) -> DecidingActor:
     if name not in actors:
         raise ScenarioError(
             f"there is {nobody} {name!r}{did_you_mean(name, actors)}"

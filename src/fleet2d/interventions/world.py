@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Protocol
 
 from fleet2d.clock import Clock
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.objects.sensor import SensorFault
 from fleet2d.events import EventKind
@@ -30,11 +30,11 @@ class World(Protocol):
         """The home, as it is at present."""
 
     @property
-    def users(self) -> Mapping[str, Actor]:
+    def users(self) -> Mapping[str, DecidingActor]:
         """The people, by name."""
 
     @property
-    def robots(self) -> Mapping[str, Actor]:
+    def robots(self) -> Mapping[str, DecidingActor]:
         """The robots, by name."""
 
     @property
@@ -71,10 +71,10 @@ class World(Protocol):
     def replace(self, algorithm: str, output: object) -> None:
         """Let all but metrics read something else of an algorithm; see `Learners.replace`."""
 
-    def move(self, actor: Actor, pose: Pose, part: int) -> None:
+    def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
         """Put a body elsewhere, in a part of its space; it decides anew there."""
 
-    def drive(self, actor: Actor) -> None:
+    def drive(self, actor: DecidingActor) -> None:
         """Take the decisions of a body out of the hands of its behaviors."""
 
     def check_change(self, change: HomeChange) -> None:

@@ -19,7 +19,7 @@ from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.robots.places import Places, fading
+from fleet2d.entities.robots.places import HangoutPlaces, decay
 from fleet2d.errors import InputError
 
 
@@ -35,7 +35,7 @@ def test_it_goes_where_people_are_believed_to_be(near: str) -> None:
     assert names(stored)[-1] == "relocates"
 
 
-def test_nearness_by_path_fades_with_the_time_on_foot() -> None:
+def test_nearness_by_path_falls_with_the_time_on_foot() -> None:
     simulation = fleet2d.Simulation(home_with([hangout(near="path")], **told(kitchen_0=1)))
     astro, places = simulation.actors["astro"], simulation.actors["astro"].behaviors[0].places  # type: ignore[attr-defined]
     kitchen = simulation.home.plan.room("kitchen_0").index
@@ -46,7 +46,7 @@ def test_nearness_by_path_fades_with_the_time_on_foot() -> None:
         seconds = metres.min() / 0.6
         assert near[place, kitchen] == pytest.approx(np.exp(-seconds / 10), rel=1e-3)
     x = np.linspace(0, 60, 500)
-    assert fading(x) == pytest.approx(np.exp(-x), rel=1e-4)
+    assert decay(x) == pytest.approx(np.exp(-x), rel=1e-4)
 
 
 def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
@@ -67,7 +67,7 @@ def test_it_stands_off_doors_ways_and_seats() -> None:
     content["users"]["ana"] = "meander"
     simulation = Simulation(content)
     home, astro = simulation.home, simulation.actors["astro"]
-    places = Places(astro, frozenset(), off_doors=0.8)
+    places = HangoutPlaces(astro, frozenset(), off_doors=0.8)
     points = shapely.points(home.plan.lattice.to_metres(places.points))
     for door in home.plan.doorways:
         line = shapely.LineString([door.start, door.end])
@@ -127,7 +127,7 @@ def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
     assert [] == names(run(elsewhere))
 
 
-def test_called_away_it_goes_back_to_its_place_without_thinking_anew() -> None:
+def test_called_away_it_goes_back_to_its_place_without_deciding_again() -> None:
     visit = {
         "type": "scheduled",
         "visits": [{"at": "07:15", "place": "living_room", "dwell": "2 min"}],
@@ -143,11 +143,11 @@ def test_called_away_it_goes_back_to_its_place_without_thinking_anew() -> None:
 def test_it_explores_all_rooms_with_equal_chances() -> None:
     stored = run(home_with([hangout(explore=1)], "2 d", **told(bathroom_0=1)))
     details = [detail for _, name, detail in events(stored) if name == "explores"]
-    found = {room: details.count(room) / len(details) for room in set(details)}
+    shares = {room: details.count(room) / len(details) for room in set(details)}
     assert len(details) == 288
-    wanted = 1 / len(found)
+    expected = 1 / len(shares)
     # Five standard deviations of a share of 288 draws.
-    assert all(abs(share - wanted) < 5 * (wanted / 288) ** 0.5 for share in found.values())
+    assert all(abs(share - expected) < 5 * (expected / 288) ** 0.5 for share in shares.values())
 
 
 @pytest.mark.parametrize("ana", ["meander", {"type": "routine", "persona": "works_outside"}])
@@ -190,13 +190,13 @@ def test_ways_from_where_it_stands_are_those_of_the_home_as_it_is_then() -> None
     )
     astro = simulation.actors["astro"]
     behavior: Any = astro.behaviors[0]
-    found = {}
+    ways_when = {}
     for change in ({"open": "gate"}, {"shut": "gate"}, {"open": "gate"}):
         simulation.change(**change)
         simulation.advance()
-        found[next(iter(change))] = ways = behavior._ways(astro)
+        ways_when[next(iter(change))] = ways = behavior._ways(astro)
         assert ways is behavior._ways(astro)
         behavior.ways = behavior.ways[0], {}
         assert np.array_equal(ways, behavior._ways(astro))
-    assert np.isinf(found["shut"]).any()
-    assert not np.isinf(found["open"]).any()
+    assert np.isinf(ways_when["shut"]).any()
+    assert not np.isinf(ways_when["open"]).any()

@@ -1,1 +1,1 @@
-"""Objects of a home that have a state: doors, and what senses."""
+"""Objects of a home that have a state: doors and sensors."""

@@ -19,7 +19,7 @@ class ContactSensor(Sensor):
     words: ClassVar[tuple[str, str]] = ("OPEN", "CLOSE")
 
     def watch(self, door: int) -> None:
-        """Take note of which door it is, by its number."""
+        """Set the door that it watches, by its number in the home."""
         self.door = door
 
     def place(self, home: Home) -> str:
@@ -27,7 +27,7 @@ class ContactSensor(Sensor):
         return home.rooms[home.doors[self.door].rooms[0]].name
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return all steps while the door is open: it changes between two spans only."""
+        """Return all steps of the span if the door is open: doors move between spans only."""
         shut = self.door in home.shut
         steps = np.arange(0 if shut else view.steps, dtype=np.int64) + view.first
         return steps, np.full(len(steps), -1, np.int64)

@@ -1,4 +1,4 @@
-"""Doors: what hangs in a doorway, opens and shuts."""
+"""Doors: objects that hang in doorways, open and shut."""
 
 from datetime import timedelta
 from typing import Self
@@ -16,7 +16,7 @@ from fleet2d.units import PositiveDuration, TimeOfDay
 
 
 class Turn(Settings):
-    """What happens to a door at a time of day, every day."""
+    """A change of a door at a time of day, every day."""
 
     at: TimeOfDay = Field(description="when, every day")
     open: bool | None = Field(default=None, description="open it, or shut it")
@@ -31,10 +31,10 @@ class Turn(Settings):
 
 @register("object", "door")
 class Door(HomeObject):
-    """A door: shut, it ends sight and ways at once, exactly as a wall.
+    """A door: while it is shut, it blocks sight and ways exactly like a wall.
 
-    People open it as they come to it, unless it is locked; bodies with `opens_doors: false`, as
-    robots are, take it for a wall. It never shuts on somebody: it waits until the doorway is free.
+    People open it as they come to it, unless it is locked; for bodies with `opens_doors: false`,
+    such as robots, it is a wall. It never shuts on a body: it waits until the doorway is free.
     """
 
     doorway: str | Point = Field(
@@ -65,27 +65,27 @@ class Door(HomeObject):
         """Return its doorway in a floor plan.
 
         Raises:
-            PlacementError: There is no such doorway, or several; says which there are.
+            PlacementError: There is no such doorway, or several; the message lists the doorways.
         """
         if not plan.doorways:
             raise PlacementError(f"{plan.name} has no doorways: give it some, or no doors")
         if not isinstance(self.doorway, str):
             x, y = self.doorway
             return min(plan.doorways, key=lambda d: (_squared(d, x, y), d.index))
-        found = doorways_named(plan, self.doorway)
+        matches = doorways_named(plan, self.doorway)
         names = [doorway.name for doorway in plan.doorways]
-        if not found:
+        if not matches:
             known = [*names, *(room.name for room in plan.rooms)]
             raise PlacementError(
                 f"there is no doorway {self.doorway!r}{did_you_mean(self.doorway, known)}"
                 f" The doorways are: {', '.join(names)}"
             )
-        if len(found) > 1:
+        if len(matches) > 1:
             raise PlacementError(
-                f"{self.doorway!r} has {len(found)} doorways: choose one of"
-                f" {', '.join(doorway.name for doorway in found)}"
+                f"{self.doorway!r} has {len(matches)} doorways: choose one of"
+                f" {', '.join(doorway.name for doorway in matches)}"
             )
-        return found[0]
+        return matches[0]
 
 
 def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
@@ -97,19 +97,18 @@ def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
     pairs = {
         tuple(sorted((rooms[a], rooms[b]))) for a in rooms for b in rooms if f"{a}-{b}" == name
     }
-    found = [d for d in plan.doorways if tuple(sorted(d.rooms)) in pairs]
     if name in rooms:
-        found = [d for d in plan.doorways if rooms[name] in d.rooms]
-    return found
+        return [d for d in plan.doorways if rooms[name] in d.rooms]
+    return [d for d in plan.doorways if tuple(sorted(d.rooms)) in pairs]
 
 
 def how_to_hang_a_door(plan: FloorPlan, name: str) -> str:
-    """Return what to write so that a doorway of a plan can be shut, for messages."""
+    """Return how to add a door to a doorway of a plan in a scenario, for messages."""
     names = [doorway.name for doorway in plan.doorways]
     if not names:
         return ""
-    found = doorways_named(plan, name)
-    doorway = found[0].name if found else names[0]
+    matches = doorways_named(plan, name)
+    doorway = matches[0].name if matches else names[0]
     return (
         ". A doorway that the picture shows is open until a door hangs in it: objects:"
         f" {{{name}: {{type: door, doorway: {doorway}}}}}; the doorways are: {', '.join(names)}"

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.objects.sensor import I64, Mask, Sensor, SensorView, seen_by
+from fleet2d.entities.objects.sensor import I64, Mask, Sensor, SensorView, first_cause
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
@@ -17,9 +17,9 @@ from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
 
 @register("object", "motion_sensor")
 class MotionSensor(Sensor):
-    """Goes on when somebody moves in its field of view, past no wall, and off a while after.
+    """Goes on when a person moves in its field of view past no wall, and off after a while.
 
-    Who stands, sits or sleeps still is not noticed.
+    It doesn't notice people who stand, sit or lie still.
     """
 
     at: Point = Field(description="where it hangs, [x, y] in metres", examples=[[1.0, 2.5]])
@@ -36,7 +36,7 @@ class MotionSensor(Sensor):
     robots: bool = Field(default=False, description="whether robots excite it, too")
 
     def start(self, home: Home, step_us: int) -> None:
-        """Find its place."""
+        """Compute its position on the lattice."""
         x, y = home.plan.lattice.point_at(self.at)
         if home.plan.room_at(*self.at) is None:
             raise PlacementError(
@@ -67,15 +67,15 @@ class MotionSensor(Sensor):
         if len(columns):
             points = np.stack([x[bodies, columns + 1], y[bodies, columns + 1]], axis=1)
             near[bodies, columns] = self._in_view(points, home)
-        return seen_by(near, view.first)
+        return first_cause(near, view.first)
 
     def _in_view(self, points: I64, home: Home) -> Mask:
         x, y = self.eye
         if self.version != home.version:
             self.version, self.walls = home.version, home.walls
             self.region = visible_region(self.walls, x, y)
-        seen: Mask = region_contains_points(self.walls, x, y, *self.region, points)
-        return seen & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
+        is_visible: Mask = region_contains_points(self.walls, x, y, *self.region, points)
+        return is_visible & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
 
     def _in_wedge(self, dx: I64, dy: I64) -> Mask:
         half = round(self.angle_deg / 360 * TURN)

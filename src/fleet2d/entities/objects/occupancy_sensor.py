@@ -7,7 +7,7 @@ import shapely
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, seen_by
+from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, first_cause
 from fleet2d.floorplan.home.home import Home
 from fleet2d.units import Duration, micros
 
@@ -34,21 +34,21 @@ class OccupancySensor(Sensor):
         return micros(self.hold)
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return the steps in which somebody's middle is over the object."""
+        """Return the steps in which the middle of a person is over the object."""
         lattice = home.plan.lattice
         footprint = home.object(self.of).footprint
         x0, y0, x1, y1 = lattice.to_lattice(np.reshape(footprint.bounds, (2, 2))).ravel().tolist()
         x, y = view.x[: view.users, 1:], view.y[: view.users, 1:]
-        there = view.present[: view.users, 1:] & (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
-        bodies, columns = np.nonzero(there)
+        on_object = view.present[: view.users, 1:] & (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
+        bodies, columns = np.nonzero(on_object)
         if len(columns):
             points = lattice.to_metres(np.stack([x[bodies, columns], y[bodies, columns]], axis=1))
-            there[bodies, columns] = shapely.intersects_xy(footprint, points)
-        return seen_by(there, view.first)
+            on_object[bodies, columns] = shapely.intersects_xy(footprint, points)
+        return first_cause(on_object, view.first)
 
 
 def room_of(home: Home, name: str) -> str:
-    """Return the name of the room that an object stands in; empty where it is in none."""
+    """Return the name of the room that an object stands in; empty if it is in none."""
     middle = home.object(name).footprint.centroid
     room = home.plan.room_at(middle.x, middle.y)
     return room.name if room else ""

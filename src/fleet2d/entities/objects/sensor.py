@@ -1,4 +1,4 @@
-"""Sensors: objects that notice what goes on in the home, and say when it begins and ends."""
+"""Sensors: objects that notice people or doors, and report when that begins and ends."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,15 +16,21 @@ Mask = NDArray[np.bool_]
 
 
 SensorFault = Literal["on", "off", "silent"]
-"""What a sensor says instead of what it senses: excited all the time, never, or nothing at all."""
+"""How a sensor fails: it is always excited, never excited, or reports nothing."""
 
 
-class Reading(NamedTuple):
-    """A sensor goes on or off."""
+class SensorReading(NamedTuple):
+    """A change of a sensor's state.
+
+    Attributes:
+        step: The step at which it goes on or off.
+        on: Whether it goes on.
+        user: The index of the user that it noticed; -1: none.
+    """
 
     step: int
     on: bool
-    user: int  # index of whom it noticed, -1: nobody in particular
+    user: int
 
 
 @dataclass(frozen=True)
@@ -33,10 +39,10 @@ class SensorView:
 
     Attributes:
         first: First step of the span.
-        x: int64 (bodies, steps + 1) [lattice]; column 0 is the step before the span (at the first
-            step of a run, that step itself), column j + 1 is step first + j.
-        y: As x.
-        present: bool (bodies, steps + 1), whether the body is at home.
+        x: Positions [lattice], int64 (bodies, steps + 1). Column 0 is the step before the span (at
+            the first step of a run, that step itself), column j + 1 is step first + j.
+        y: Likewise.
+        present: Whether the body is at home, bool (bodies, steps + 1).
         users: How many of the rows are users.
     """
 
@@ -53,10 +59,10 @@ class SensorView:
 
 
 class Sensor(HomeObject):
-    """Base of sensors: a subclass writes `sense`, which says in which steps it is excited.
+    """Base of sensors: a subclass implements `sense`, which returns the steps that excite it.
 
-    What a sensor says follows from that: it goes on with the first step, and off when it has been
-    quiet for its `hold`.
+    The readings follow from that: the sensor goes on with the first of those steps, and off after
+    its `hold` without any.
     """
 
     room: str | None = Field(
@@ -65,34 +71,34 @@ class Sensor(HomeObject):
         description="the room that its readings name; left out: where it is",
     )
 
-    # What its two states are called in the table of readings.
+    # Names of its two states in the table of readings.
     words: ClassVar[tuple[str, str]] = ("ON", "OFF")
 
     def start(self, home: Home, step_us: int) -> None:
-        """Prepare for a run; check here that what it watches exists."""
+        """Prepare for a run; check here that the object that it watches exists."""
 
     def place(self, home: Home) -> str:
         """Return the name of the room that its readings name."""
         raise NotImplementedError
 
     def hold_us(self) -> int:
-        """Return how long it stays on after it was excited last [us]."""
+        """Return how long it stays on after the last step that excites it [us]."""
         return 0
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return the steps in which it is excited, ascending, and by whom: int64 (n,) each."""
+        """Return the steps that excite it, ascending, and the user of each; int64 (n,) each."""
         raise NotImplementedError
 
 
-def seen_by(excited: Mask, first: int) -> tuple[I64, I64]:
-    """Return the steps in which anybody excites a sensor, and the first who does.
+def first_cause(excited: Mask, first: int) -> tuple[I64, I64]:
+    """Return the steps in which a body excites a sensor, and the lowest row of those that do.
 
     Args:
-        excited: bool (bodies, steps).
+        excited: Whether each body excites it at each step, bool (bodies, steps).
         first: The step of the first column.
 
     Example:
-        >>> steps, bodies = seen_by(np.array([[0, 0, 1], [0, 1, 1]], bool), 100)
+        >>> steps, bodies = first_cause(np.array([[0, 0, 1], [0, 1, 1]], bool), 100)
         >>> steps.tolist(), bodies.tolist()
         ([101, 102], [1, 0])
     """
@@ -100,19 +106,32 @@ def seen_by(excited: Mask, first: int) -> tuple[I64, I64]:
     return columns + first, np.argmax(excited[:, columns], axis=0).astype(np.int64)
 
 
-class Memory:
-    """What a sensor carries from span to span."""
+class SensorState:
+    """The state of a sensor between spans.
+
+    Attributes:
+        hold: How many steps it stays on after the last one that excites it.
+        on: Whether it is on.
+        last: The last step that excited it.
+        user: The index of the user that switched it on; -1: none.
+    """
 
     def __init__(self, hold_steps: int) -> None:
         self.hold = hold_steps
         self.on = False
-        self.last = 0  # the last step in which it was excited
+        self.last = 0
         self.user = -1
 
-    def read(self, steps: I64, users: I64, end: int) -> list[Reading]:
-        """Return what it says up to step `end` - 1, excited in these steps."""
-        readings: list[Reading] = []
-        # Between excited steps no farther apart than it holds, nothing is said.
+    def read(self, steps: I64, users: I64, end: int) -> list[SensorReading]:
+        """Return the readings before step `end`, given the steps that excite it, and their users.
+
+        Args:
+            steps: Ascending, int64 (n,).
+            users: Index of the user of each step, int64 (n,).
+            end: The step after the span.
+        """
+        readings: list[SensorReading] = []
+        # It stays on between steps no farther apart than its hold.
         quiet = np.flatnonzero(np.diff(steps) > self.hold + 1)
         begins = [0, *(quiet + 1).tolist()] if len(steps) else []
         ends = [*quiet.tolist(), len(steps) - 1]
@@ -121,17 +140,17 @@ class Memory:
                 readings.append(self._off())
             if not self.on:
                 self.on, self.user = True, int(users[i])
-                readings.append(Reading(int(steps[i]), True, self.user))
+                readings.append(SensorReading(int(steps[i]), True, self.user))
             self.last = int(steps[j])
         if self.on and self.last + self.hold + 1 < end:
             readings.append(self._off())
         return readings
 
-    def _off(self) -> Reading:
+    def _off(self) -> SensorReading:
         self.on = False
-        return Reading(self.last + self.hold + 1, False, self.user)
+        return SensorReading(self.last + self.hold + 1, False, self.user)
 
 
-def in_order(readings: Sequence[tuple[int, Reading]]) -> list[tuple[int, Reading]]:
-    """Return the readings of several sensors by step, then sensor."""
+def in_order(readings: Sequence[tuple[int, SensorReading]]) -> list[tuple[int, SensorReading]]:
+    """Return (sensor number, reading) pairs ordered by step, then by sensor."""
     return sorted(readings, key=lambda item: (item[1].step, item[0]))

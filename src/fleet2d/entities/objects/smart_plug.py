@@ -7,7 +7,7 @@ from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.objects.occupancy_sensor import room_of
-from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, seen_by
+from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.units import Duration, Length, micros
@@ -15,9 +15,9 @@ from fleet2d.units import Duration, Length, micros
 
 @register("object", "smart_plug")
 class SmartPlug(Sensor):
-    """On while somebody stays at a place from which a device is used: a stove, a desk, a TV.
+    """On while a person stays at a place from which a device is used: a stove, a desk, a TV.
 
-    Who only passes by doesn't switch it on: it takes two steps on the spot.
+    Passing by doesn't switch it on: the person has to stay on the spot for two steps.
     """
 
     of: str = Field(description="the object of the floor plan that it feeds, by name")
@@ -44,13 +44,13 @@ class SmartPlug(Sensor):
         return micros(self.hold)
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return the steps in which somebody stays at one of its places."""
+        """Return the steps in which a person stays at one of the object's places."""
         lattice = home.plan.lattice
         x, y = view.x[: view.users], view.y[: view.users]
         still = (np.diff(x) == 0) & (np.diff(y) == 0)
-        there = np.zeros(still.shape, np.bool_)
+        at_device = np.zeros(still.shape, np.bool_)
         reach = round(self.reach * lattice.units_per_m)
         for use in home.object(self.of).uses:
             at_x, at_y = lattice.point_at((use.x, use.y))
-            there |= (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2 <= reach * reach
-        return seen_by(there & still & view.present[: view.users, 1:], view.first)
+            at_device |= (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2 <= reach * reach
+        return first_cause(at_device & still & view.present[: view.users, 1:], view.first)

@@ -1,4 +1,4 @@
-"""Ways of a robot: how long they take, and where one to a person ends."""
+"""Approaching people: how long a robot drives, where it stops, and how it keeps a distance."""
 
 import math
 from datetime import timedelta
@@ -15,41 +15,41 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
 
-# Where a shut door is in the way, it tries again after so long.
+# Time after which a robot tries again to pass a shut door.
 AT_A_DOOR = timedelta(seconds=10)
-# Places about a person that are tried to keep a distance.
+# Number of directions from a person in which points at a distance are tried.
 DIRECTIONS = 32
 
-Spot = tuple[int, int]
+LatticePoint = tuple[int, int]
 
 
-def way_seconds(actor: "Actor", start: Spot, goal: Spot) -> float | None:
-    """Return how long a robot drives from a lattice point to another, turns apart; None: no way."""
+def way_seconds(actor: "Actor", start: LatticePoint, goal: LatticePoint) -> float | None:
+    """Return how long a robot drives between two lattice points, without turns; None: no way."""
     route = actor.space.route(start, goal)
     return None if route is None else sum(_legs(route)) / actor.speed
 
 
-def spot_near(now: Situation, x: float, y: float, distance: float) -> Spot:
+def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoint:
     """Return the lattice point on the way to a person at which the robot is near enough.
 
     Args:
         now: The situation.
         x: Where the person is [m].
-        y: Where the person is [m].
-        distance: How near it comes [m], as the crow flies.
+        y: Likewise.
+        distance: How near it comes, in a straight line [m].
 
     Returns:
-        A point on the shortest way to the free place nearest to the person; where the robot is, if
-        it is near enough already or there is no way.
+        A point on the shortest way to the free place nearest to the person; the robot's position,
+        if it is near enough already or there is no way.
     """
     actor, lattice = now.actor, now.home.plan.lattice
-    here = (actor.state.x, actor.state.y)
+    position = (actor.state.x, actor.state.y)
     person = lattice.to_lattice((x, y))
     goal = lattice.point_at(now.nearest_free(x, y))
-    route = actor.space.route(here, (goal[0], goal[1]))
+    route = actor.space.route(position, (goal[0], goal[1]))
     reach = distance * lattice.units_per_m
-    if route is None or _distance(person, here) <= reach:
-        return here
+    if route is None or _distance(person, position) <= reach:
+        return position
     for start, end, length in zip(route[:-1], route[1:], _legs(route), strict=True):
         steps = max(1, int(length / (lattice.units_per_m / 20)))
         for k in range(1, steps + 1):
@@ -59,25 +59,25 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> Spot:
     return int(goal[0]), int(goal[1])
 
 
-def spot_back(now: Situation, x: float, y: float, distance: float) -> Spot:
-    """Return the nearest lattice point from which a robot keeps a distance to a person.
+def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoint:
+    """Return the nearest lattice point at a distance from a person.
 
     Args:
         now: The situation.
         x: Where the person is [m].
-        y: Where the person is [m].
-        distance: How far to keep [m], as the crow flies.
+        y: Likewise.
+        distance: The distance, in a straight line [m].
 
     Returns:
-        A free point of the person's room at that distance; where the robot is, if it is no nearer
-        or there is no such point.
+        A free point of the person's room at that distance; the robot's position, if it is at least
+        as far away already or there is no such point.
     """
     actor, home = now.actor, now.home
-    lattice, here = home.plan.lattice, (actor.state.x, actor.state.y)
+    lattice, position = home.plan.lattice, (actor.state.x, actor.state.y)
     person = lattice.point_at((x, y))
     reach = math.ceil(distance * lattice.units_per_m)
-    if _distance(person, here) >= reach:
-        return here
+    if _distance(person, position) >= reach:
+        return position
     room, spots = home.plan.room_at(x, y), []
     for i in range(DIRECTIONS):
         heading = i * TURN // DIRECTIONS
@@ -88,13 +88,13 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> Spot:
         in_room = home.plan.room_at(*lattice.to_metres(spot).tolist()) == room
         if in_room and _is_free(actor, np.array(spot)):
             spots.append(spot)
-    return min(spots, key=lambda spot: _distance(spot, here), default=here)
+    return min(spots, key=lambda spot: _distance(spot, position), default=position)
 
 
 def approach(now: Situation, plan: "Plan", x: float, y: float, distance: float) -> "Plan":
-    """Drive to near a person at (x, y) [m], as `spot_near` says, if it isn't there already."""
+    """Drive to `spot_near` a person at (x, y) [m], unless the robot is already there."""
     spot = spot_near(now, x, y, distance)
-    if spot != (plan.x, plan.y):  # where it was broken off it may touch the border of its space
+    if spot != (plan.x, plan.y):
         plan.go_to_point(*spot)
     return plan
 
@@ -106,15 +106,15 @@ def face(plan: "Plan", x: int, y: int) -> "Plan":
 
 
 def check_has_camera(actor: "Actor", behavior: str) -> None:
-    """Refuse a behavior that goes by what is seen, for a body that sees nothing.
+    """Refuse a behavior that needs a camera, for a body without one.
 
     Raises:
         ScenarioError: The body has no camera.
     """
     if not actor.entity.eyes:
         raise ScenarioError(
-            f"{actor.path}: {behavior} goes by what the robot sees, but it has no camera: give it"
-            " one, like camera: {range: [0.3, 4.5], angle_deg: 108}, or leave the behavior out"
+            f"{actor.path}: {behavior} depends on what the robot sees, but it has no camera: give"
+            " it one, like camera: {range: [0.3, 4.5], angle_deg: 108}, or leave the behavior out"
         )
 
 
@@ -123,6 +123,7 @@ def _is_free(actor: "Actor", point: NDArray[np.int64]) -> bool:
 
 
 def _legs(route: NDArray[np.int64]) -> list[float]:
+    """Return the lengths of the legs of a route [lattice]."""
     legs = np.diff(route, axis=0)
     lengths: list[float] = np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).tolist()
     return lengths

@@ -1,4 +1,4 @@
-"""What a robot takes for true of where somebody is: the output of an algorithm, or nothing yet."""
+"""Beliefs of robots about where a person is, from the output of an algorithm."""
 
 from typing import Any, NamedTuple
 
@@ -11,12 +11,12 @@ from fleet2d.errors import ComponentError
 ANYONE = "anyone"
 
 
-class Belief(NamedTuple):
-    """Where somebody is.
+class RoomBelief(NamedTuple):
+    """Probabilities of where a person is.
 
     Attributes:
-        share: float64 (rooms,), probability of each room, given that somebody is at home.
-        away: Probability of being out of the home.
+        share: Probability of each room, given that the person is at home, float64 (rooms,).
+        away: Probability that the person is out of the home.
     """
 
     share: NDArray[np.float64]
@@ -24,30 +24,30 @@ class Belief(NamedTuple):
 
     @property
     def joint(self) -> NDArray[np.float64]:
-        """Probability of each room: float64 (rooms,), sums to 1 - away."""
+        """Probability of each room, float64 (rooms,); sums to 1 - away."""
         joint: NDArray[np.float64] = self.share * (1 - self.away)
         return joint
 
 
-def room_belief(now: Situation, source: str | None, user: str) -> Belief:
-    """Return where somebody is likely now.
+def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:
+    """Return the probabilities of where a person is now.
 
-    What a presence algorithm puts out is asked for the present time and the user; any other
-    output with a `share` per room counts for everybody. Without a source, and before its first
-    output, all rooms are as likely as they are large.
+    The output of a presence algorithm is evaluated at the present time, for the user; any other
+    output with a `share` per room holds for everybody. Without a source, and before its first
+    output, the probability of a room is proportional to its area.
 
     Args:
         now: The situation.
         source: The algorithm, by its name in the scenario.
-        user: Whom it is about, or ANYONE.
+        user: The person, or ANYONE.
 
     Raises:
-        ComponentError: The output doesn't say in which rooms people are.
+        ComponentError: The output has no probabilities of rooms.
     """
     output = now.outputs.get(source) if source else None
     if output is None:
         cells = np.array([room.cells for room in now.home.rooms], np.float64)
-        return Belief(cells / cells.sum(), 0.0)
+        return RoomBelief(cells / cells.sum(), 0.0)
     if callable(getattr(output, "at", None)):
         output = output.at(now.time)
     share: Any = getattr(output, "share", None)
@@ -61,4 +61,4 @@ def room_belief(now: Situation, source: str | None, user: str) -> Belief:
             f"the output of {source!r} says nothing of where people are: a presence algorithm, or a"
             f" RoomDistribution over the {rooms} rooms, is wanted"
         )
-    return Belief(np.asarray(share, np.float64), float(away))
+    return RoomBelief(np.asarray(share, np.float64), float(away))

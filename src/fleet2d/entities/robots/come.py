@@ -19,21 +19,19 @@ if TYPE_CHECKING:
 class Come(Behavior):
     """Go where the robot is called to, and wait there for a while.
 
-    It does nothing on its own: an intervention `call` with a place wakes it. In a room it stops at
-    the point farthest from the walls. Where a shut door is in the way, it waits and tries again.
-    Event: `visits`, with the place.
+    It only acts on an intervention `call` with a place. In a room it stops at the point farthest
+    from the walls. If a shut door is in the way, it waits and tries again. Event: `visits`, with
+    the place.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"visits"})
     answers: ClassVar[frozenset[str]] = frozenset({"come"})
     resumes: ClassVar[bool] = True
 
-    stay: Duration = Field(
-        default=timedelta(minutes=10), description="how long it waits there for what comes next"
-    )
+    stay: Duration = Field(default=timedelta(minutes=10), description="how long it waits there")
 
     def start(self, actor: "Actor") -> None:
-        """Begin with nowhere to go."""
+        """Start without a command."""
         self.command: Command | None = None
 
     def busy(self) -> bool:

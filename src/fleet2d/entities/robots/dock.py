@@ -14,18 +14,18 @@ from fleet2d.units import Share, problem
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
-# With nothing else to do, it stays at the charger so long before all are asked again.
+# How long it rests at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)
 
 
 @register("behavior", "dock")
 class Dock(Behavior):
-    """Go to the charger when the charge is down to a threshold, and stay until it is full enough.
+    """Go to the charger when the charge falls to a threshold, and stay until it is full enough.
 
-    It breaks in on the behaviors behind it at the moment at which the charge reaches the threshold.
-    Behind all others, with `rest`, it also takes a robot that has nothing else to do to the
-    charger. Called to dock, it goes to the charger at once, whatever the charge is. Events: `docks`
-    and `charged`, with the charge.
+    It interrupts the behaviors after it when the charge reaches the threshold. With `rest`, as the
+    last behavior, it also sends a robot that has nothing else to do to the charger. On a command to
+    dock, it goes to the charger at once, whatever the charge. Events: `docks` and `charged`, with
+    the charge.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"charged", "docks"})
@@ -71,25 +71,25 @@ class Dock(Behavior):
         return None if falls is None else now.actor.clock.start + timedelta(microseconds=falls)
 
     def decide(self, now: Situation) -> Plan | None:
-        """Charge, if it is time; rest at the charger, if that is wanted."""
+        """Charge, if the charge is low; rest at the charger, if `rest` says so."""
         charge = now.actor.charge
         assert charge is not None
-        plan, there = now.plan(), charge.charger
-        called = now.take_command("dock") is not None
-        low = charge.level <= self.threshold
-        if called or low or (self.charging and charge.level < self.until):
-            if not self.charging or (plan.x, plan.y) != there:
-                plan.go_to_point(*there).note("docks", charge.percent)
+        plan, charger = now.plan(), charge.charger
+        has_command = now.take_command("dock") is not None
+        is_low = charge.level <= self.threshold
+        if has_command or is_low or (self.charging and charge.level < self.until):
+            if not self.charging or (plan.x, plan.y) != charger:
+                plan.go_to_point(*charger).note("docks", charge.percent)
             self.charging = True
             return plan.stay(timedelta(microseconds=charge.full_in_us(self.until)))
         if self.charging:
             self.charging = False
             plan.note("charged", charge.percent)
             if not self.rest:
-                # The row belongs to a plan, and the behaviors behind have one of their own.
+                # The row needs a plan; the shortest one, so that later behaviors are asked next.
                 return plan.stay(timedelta(microseconds=1))
         if self.rest:
-            if (plan.x, plan.y) != there:
-                plan.go_to_point(*there)
+            if (plan.x, plan.y) != charger:
+                plan.go_to_point(*charger)
             return plan.stay(REST)
         return None

@@ -1,4 +1,4 @@
-"""Find: look for a person, room by room, by what is believed and how far it is."""
+"""Find: look for a person, room by room, by probabilities and distances."""
 
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
@@ -24,38 +24,46 @@ if TYPE_CHECKING:
 DAY = timedelta(days=1)
 
 
-class Missed(NamedTuple):
-    """A look that found nobody."""
+class EmptyLook(NamedTuple):
+    """A look at a site, by number, that did not find the person, and when it ended."""
 
     site: int
     at: datetime
 
 
-class Search(NamedTuple):
-    """A search under way."""
+class SearchState(NamedTuple):
+    """A search in progress.
+
+    Attributes:
+        since: When it began.
+        user: The person to find, or ANYONE.
+        empty_looks: The looks so far, in order.
+        route: The sites to go to next, by number.
+        goal: The site that it is going to; None: none.
+        blocked: Sites that a person in the way kept it from.
+    """
 
     since: datetime
     user: str
-    missed: tuple[Missed, ...] = ()
-    route: tuple[int, ...] = ()  # sites to go to yet, of a policy that decides beforehand
-    going_to: int | None = None
-    left_out: frozenset[int] = frozenset()  # sites that somebody didn't let it get to
+    empty_looks: tuple[EmptyLook, ...] = ()
+    route: tuple[int, ...] = ()
+    goal: int | None = None
+    blocked: frozenset[int] = frozenset()
 
 
 @register("behavior", "find")
 class Find(Behavior):
-    """Look for a person at given times, or when called, until found, given up or believed out.
+    """Look for a person at given times or on command, until found, given up or believed out.
 
-    A site is a room, looked round in from so many places that little of it stays out of view. In
-    which order the sites are looked at is for the `policy` to say, from what `source` says of where
-    the person is now, and the ways: see :mod:`fleet2d.search.policies`. `receding` decides anew
-    after every empty look, by the belief that is left; the others decide once, when the search
-    begins.
+    A site is a room, with enough viewpoints that little of it stays out of view. The `policy`
+    chooses the order of the sites by the probabilities of `source` for the present time, and by
+    travel times: see :mod:`fleet2d.search.policies`. `receding` decides again after every empty
+    look, by the remaining probabilities; the others decide once, when the search begins.
 
-    The person is found when the cameras perceive somebody as that person; it may be somebody else
-    whom they mistake. Called to find somebody, the robot begins at once, or as soon as the
-    behaviors before this one let it, and drops the search that it was on. Events, with the person's
-    name: `find_begins`, and one of `found`, `not_at_home` and `gave_up`.
+    The person is found when the cameras perceive somebody as that person, who may be somebody else
+    whom they mistake for the person. On a command to find somebody, the robot begins at once, or as
+    soon as the behaviors before this one allow, and drops a search in progress. Events, with the
+    person's name: `find_begins`, and one of `found`, `not_at_home` and `gave_up`.
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
@@ -63,7 +71,7 @@ class Find(Behavior):
     )
     answers: ClassVar[frozenset[str]] = frozenset({"find"})
 
-    user: str = Field(default=ANYONE, min_length=1, description="whom it looks for, or anyone")
+    user: str = Field(default=ANYONE, min_length=1, description="the person to find, or anyone")
     source: str | None = Field(
         default=None,
         description="the algorithm that says where people are; left out: rooms count by their size",
@@ -85,29 +93,28 @@ class Find(Behavior):
     )
     out_at: Share = Field(
         default=0.9,
-        description="it says that the person isn't at home once that is believed to be so probable,"
-        " and every room that it can get to has been looked at",
+        description="probability of being out at which it says that the person isn't at home, once"
+        " it has looked at every room that it can get to",
     )
     doubt: Share = Field(
-        default=0.1, description="share of belief that counts rooms by their size, whatever is said"
+        default=0.1, description="share of the probabilities that counts rooms by their size only"
     )
     out: Share = Field(
         default=0.5,
-        description="probability that the person is out, for as long as nothing says where people"
-        " are",
+        description="probability that the person is out, as long as the source has no output",
     )
     memory: Duration = Field(
         default=timedelta(minutes=20),
-        description="an empty look counts half when it is so long ago: people move",
+        description="age at which an empty look counts half, because people move",
     )
     views: int = Field(
-        default=2, ge=1, le=8, description="in a room it looks round from so many places at most"
+        default=2, ge=1, le=8, description="the most places in a room from which it looks round"
     )
     distance: Length = Field(
-        default=1.5, ge=0.3, le=10, description="how far it stays from who is found [m]"
+        default=1.5, ge=0.3, le=10, description="how far it stays from the person it found [m]"
     )
     stay: Duration = Field(
-        default=timedelta(minutes=1), description="how long it stays with who is found"
+        default=timedelta(minutes=1), description="how long it stays with the person it found"
     )
 
     @model_validator(mode="after")
@@ -117,15 +124,15 @@ class Find(Behavior):
         return self
 
     def about(self) -> tuple[str, ...]:
-        """Return whom it looks for."""
+        """Return the person that it looks for."""
         return () if self.user == ANYONE else (self.user,)
 
     def takes(self, command: Command) -> bool:
-        """Tell whether it would look for who is wanted."""
+        """Tell whether it looks for the person of a command."""
         return super().takes(command) and self.user in (ANYONE, command.target)
 
     def start(self, actor: "Actor") -> None:
-        """Find where to look round in each room."""
+        """Choose the viewpoints of each room."""
         check_has_camera(actor, "find")
         self.sites = Sites(actor, self.views)
         if self.policy == "exact" and len(self.sites) > MOST_EXACT:
@@ -133,15 +140,15 @@ class Find(Behavior):
                 f"{actor.path}: the exact policy works for up to {MOST_EXACT} rooms, and there are"
                 f" {len(self.sites)}: choose policy: receding"
             )
-        self.search: Search | None = None
-        self.plan: Plan | None = None  # the last one it made
+        self.search: SearchState | None = None
+        self.plan: Plan | None = None  # the last one that it returned
         start = actor.clock.start
         self.due: datetime | None = self._next(
             start if self.every else start - timedelta(microseconds=1), start
         )
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithm that it goes by."""
+        """Return the algorithm that it reads."""
         return () if self.source is None else (self.source,)
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
@@ -155,39 +162,39 @@ class Find(Behavior):
     def give_up(self, now: Situation) -> None:
         """Leave out the site that it was going to, for this search."""
         search = self.search
-        if search is not None and search.going_to is not None:
-            left_out = search.left_out | {search.going_to}
-            self.search = search._replace(left_out=left_out, route=search.route[1:], going_to=None)
+        if search is not None and search.goal is not None:
+            blocked = search.blocked | {search.goal}
+            self.search = search._replace(blocked=blocked, route=search.route[1:], goal=None)
 
     def decide(self, now: Situation) -> Plan | None:
-        """Begin a search that is due, go on with one, or leave the robot to others."""
+        """Begin a search that is due, continue one, or leave the robot to other behaviors."""
         plan = now.plan()
-        user = self._called(now)
+        user = self._commanded_user(now)
         if user is None and self.search is None and self._is_due(now):
             user = self.user
         if user is not None:
-            self.search = Search(now.time, user)
+            self.search = SearchState(now.time, user)
             plan.note("find_begins", user)
         elif self.search is None:
             return None
         else:
-            self._take_in(now)
+            self._note_empty_look(now)
             user = self.search.user
-        seen = now.in_view
-        name = user if user != ANYONE else next(iter(sorted(seen)), ANYONE)
-        if name in seen:
-            return self._found(now, plan, *seen[name])
-        return self._go_on(now) or self._look_on(now, plan)
+        in_view = now.in_view
+        name = user if user != ANYONE else next(iter(sorted(in_view)), ANYONE)
+        if name in in_view:
+            return self._approach(now, plan, *in_view[name])
+        return self._resume(now) or self._look_further(now, plan)
 
-    def _called(self, now: Situation) -> str | None:
-        """Return whom it is called to find, once; None: nobody."""
+    def _commanded_user(self, now: Situation) -> str | None:
+        """Take a command to find somebody, and return the person; None: there is no command."""
         if now.command is None or not self.takes(now.command):
             return None
         command = now.take_command("find")
         return None if command is None else command.target
 
-    def _go_on(self, now: Situation) -> Plan | None:
-        """Return what is left of a look in which somebody else came into view."""
+    def _resume(self, now: Situation) -> Plan | None:
+        """Return the rest of a look that was interrupted because somebody else came into view."""
         last = now.actor.plan
         if not now.events or last.root is not self.plan or last.is_over(now.step):
             return None
@@ -195,23 +202,24 @@ class Find(Behavior):
         return None if plan is None else plan.interrupt_on("user_seen")
 
     def _is_due(self, now: Situation) -> bool:
-        """Tell whether a search is due, and not too late; in either case it isn't due any more."""
+        """Tell whether a search is due and not too late; afterwards the next one is due."""
         due, start = self.due, now.actor.clock.start
         while self.due is not None and self.due <= now.time:
             due, self.due = self.due, self._next(self.due, start)
         return due is not None and due <= now.time <= due + self.late
 
-    def _take_in(self, now: Situation) -> None:
-        """Note that the look that the last plan made found nobody, if it came to its end."""
+    def _note_empty_look(self, now: Situation) -> None:
+        """Note that the look of the last plan did not find the person, if it is complete."""
         search = self.search
         assert search is not None
         plan = now.actor.plan
-        whole = plan.root is self.plan and plan.is_over(now.step)
-        if search.going_to is not None and whole and not now.events:
-            missed = (*search.missed, Missed(search.going_to, now.time))
-            self.search = search._replace(missed=missed, route=search.route[1:], going_to=None)
+        is_complete = plan.root is self.plan and plan.is_over(now.step)
+        if search.goal is not None and is_complete and not now.events:
+            looks = (*search.empty_looks, EmptyLook(search.goal, now.time))
+            self.search = search._replace(empty_looks=looks, route=search.route[1:], goal=None)
 
-    def _found(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
+    def _approach(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
+        """End the search: approach the person, at (x, y) [m], and stay."""
         assert self.search is not None
         user, self.search = self.search.user, None
         approach(now, plan.note("found", user), x, y, self.distance)
@@ -221,8 +229,8 @@ class Find(Behavior):
         face(plan, *now.home.plan.lattice.point_at((x, y)))
         return plan.stay(self.stay)
 
-    def _look_on(self, now: Situation, plan: Plan) -> Plan | None:
-        """Go to the site that is next and look round there, or end the search."""
+    def _look_further(self, now: Situation, plan: Plan) -> Plan | None:
+        """Go to the next site and look round there, or end the search."""
         search = self.search
         assert search is not None
         ends = search.since + self.deadline
@@ -230,53 +238,54 @@ class Find(Behavior):
             return self._end(plan, "gave_up")
         prior, away = self._prior(now)
         age, memory = self._ages(search, now), self.memory.total_seconds()
-        left = after_empty_looks(prior, age, memory, self.sites.share)
-        out = away >= self.out_at * (away + sum(left.tolist()))
+        remaining = after_empty_looks(prior, age, memory, self.sites.share)
+        is_out = away >= self.out_at * (away + sum(remaining.tolist()))
         unseen = np.flatnonzero(np.isinf(age)).tolist()
-        if out and not any(self.sites.can_go(plan, site) for site in unseen):
+        if is_out and not any(self.sites.can_go(plan, site) for site in unseen):
             return self._end(plan, "not_at_home")
         route = search.route
         if self.policy == "receding" or not route:
             problem = self.sites.problem(now, after_empty_looks(prior, age, memory))
             route = tuple(order_by(self.policy, problem, now.random("order")))
-        while route and (route[0] in search.left_out or not self.sites.can_go(plan, route[0])):
+        while route and (route[0] in search.blocked or not self.sites.can_go(plan, route[0])):
             route = route[1:]
-        self.search = search._replace(route=route, going_to=route[0] if route else None)
+        self.search = search._replace(route=route, goal=route[0] if route else None)
         if route:
             self.sites.look_round(plan, route[0]).interrupt_on("user_seen")
-        else:  # shut doors all round
+        else:  # shut doors block all sites
             plan.stay(AT_A_DOOR)
         self.plan = plan.ask_by(ends)
         return plan
 
     def _prior(self, now: Situation) -> tuple[NDArray[np.float64], float]:
-        """Return the probability of each site, and that of being out, before any look."""
+        """Return the probability of each site, and that of being out, disregarding all looks."""
         assert self.search is not None
         belief = room_belief(now, self.source, self.search.user)
         sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
         shares = belief.share[self.sites.rooms]
-        known = sum(shares.tolist())
-        shares = shares / known if known > 0 else np.zeros(len(sizes))
-        doubt = self.doubt if known > 0 else 1.0
+        total = sum(shares.tolist())
+        shares = shares / total if total > 0 else np.zeros(len(sizes))
+        doubt = self.doubt if total > 0 else 1.0
         mixed = (1 - doubt) * shares + doubt * sizes / int(sizes.sum())
-        said = self.source is not None and now.outputs.get(self.source) is not None
-        away = belief.away if said else self.out
+        has_output = self.source is not None and now.outputs.get(self.source) is not None
+        away = belief.away if has_output else self.out
         return mixed * (1 - away), away
 
-    def _ages(self, search: Search, now: Situation) -> NDArray[np.float64]:
-        """Return how long ago each site was looked at in vain [s], infinite for never."""
+    def _ages(self, search: SearchState, now: Situation) -> NDArray[np.float64]:
+        """Return the time since the last empty look at each site [s], infinite without one."""
         ages = np.full(len(self.sites), np.inf)
-        for missed in search.missed:  # the last one counts
-            ages[missed.site] = (now.time - missed.at).total_seconds()
+        for look in search.empty_looks:
+            ages[look.site] = (now.time - look.at).total_seconds()
         return ages
 
     def _end(self, plan: Plan, event: str) -> Plan:
+        """End the search with an event."""
         assert self.search is not None
         user, self.search = self.search.user, None
         return plan.note(event, user)
 
     def _next(self, after: datetime, start: datetime) -> datetime | None:
-        """Return when the next search is due after a moment; None: only when called."""
+        """Return when the next search is due after a moment; None: only on command."""
         if self.every is not None:
             return start + ((after - start) // self.every + 1) * self.every
         if not self.at:

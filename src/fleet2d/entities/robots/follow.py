@@ -1,4 +1,4 @@
-"""Follow: stay behind somebody who is in view, and look for who was lost."""
+"""Follow: stay behind a person in view, and look for a person who was lost."""
 
 from datetime import timedelta
 from typing import TYPE_CHECKING, ClassVar
@@ -14,29 +14,29 @@ from fleet2d.units import Duration, Length, PositiveDuration
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
-# Who was lost is looked for from as near as this to where that was [m].
+# Distance from where a person was lost at which it looks for the person [m].
 SOUGHT_FROM = 0.3
-# Of who was perceived no farther than this from the last time [m] it looks ever more seldom.
+# A person who moves no farther than this between two looks rests: the interval doubles [m].
 STILL = 0.3
-SELDOM = timedelta(seconds=32)
+LONGEST_INTERVAL = timedelta(seconds=32)
 
 
 @register("behavior", "follow")
 class Follow(Behavior):
     """Follow a person at a distance for as long as the cameras have the person in view.
 
-    It looks up where the person is every `update`, and drives there by the shortest path; while
-    the person rests, at twice the interval each time, up to 32 s. Who is lost is looked for where
-    the person was perceived last: it drives there and turns round once; then the robot is left to
-    the behaviors behind, until the person comes into view again. Events: `follows`, `lost`, with
-    the person's name.
+    Every `update` it looks where the person is, and drives there by the shortest path; while the
+    person rests, the interval doubles each time, up to 32 s. It looks for a person whom it lost
+    where the person was perceived last: it drives there and turns once. After that, later behaviors
+    decide until the person comes into view again. Events: `follows`, `lost`, with the person's
+    name.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"follows", "lost"})
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
     user: str = Field(
-        default="", min_length=0, description="whom it follows; left out: who is seen first"
+        default="", min_length=0, description="user that it follows; left out: the first in view"
     )
     distance: Length = Field(default=1.5, ge=0.3, le=10, description="how far behind it stays [m]")
     update: PositiveDuration = Field(
@@ -47,60 +47,61 @@ class Follow(Behavior):
     )
 
     def about(self) -> tuple[str, ...]:
-        """Return whom it follows."""
+        """Return the user that it follows, if it is one by name."""
         return (self.user,) if self.user else ()
 
     def start(self, actor: "Actor") -> None:
-        """Check that it sees anybody."""
+        """Check that it has a camera."""
         check_has_camera(actor, "follow")
-        self.whom: str | None = None
+        self.person: str | None = None  # the one that it follows now
         self.last = (0.0, 0.0)  # where the person was perceived last [m]
         self.pause = self.update
         self.since = actor.clock.start
-        self.searching = False
+        self.is_searching = False
 
     def busy(self) -> bool:
-        """Tell whether it is after somebody."""
-        return self.whom is not None
+        """Tell whether it follows or looks for a person."""
+        return self.person is not None
 
     def decide(self, now: Situation) -> Plan | None:
-        """Go on after the person, look where the person was lost, or leave it to others."""
+        """Follow the person, look where the person was lost, or leave it to later behaviors."""
         in_view = now.in_view
-        if self.whom is None:
-            self.whom = self._somebody(now)
-            if self.whom is None:
+        if self.person is None:
+            self.person = self._person_in_view(now)
+            if self.person is None:
                 return None
             self.since = now.time
-            return self._follow(now, now.plan().note("follows", self.whom))
+            return self._follow(now, now.plan().note("follows", self.person))
         if self.longest and now.time - self.since >= self.longest:
-            self.whom = None
+            self.person = None
             return None
-        if self.whom in in_view:
+        if self.person in in_view:
             return self._follow(now, now.plan())
-        if self.searching:  # it has turned round where the person was last, in vain
-            self.whom, self.searching = None, False
+        if self.is_searching:  # it has looked round where the person was last, without success
+            self.person, self.is_searching = None, False
             return None
-        self.searching = True
-        plan = now.plan().note("lost", self.whom).interrupt_on("user_seen")
+        self.is_searching = True
+        plan = now.plan().note("lost", self.person).interrupt_on("user_seen")
         approach(now, plan, *self.last, SOUGHT_FROM)
         return plan.turn_by(1.0)
 
-    def _somebody(self, now: Situation) -> str | None:
+    def _person_in_view(self, now: Situation) -> str | None:
         names = sorted(now.in_view)
         if self.user:
             return self.user if self.user in names else None
         return names[0] if names else None
 
     def _follow(self, now: Situation, plan: Plan) -> Plan:
-        self.searching = False
-        (x, y), (old_x, old_y) = now.in_view[self.whom or ""], self.last
-        rests = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL**2
-        self.pause = min(2 * self.pause, max(SELDOM, self.update)) if rests else self.update
+        self.is_searching = False
+        (x, y), (old_x, old_y) = now.in_view[self.person or ""], self.last
+        is_resting = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL**2
+        longest = max(LONGEST_INTERVAL, self.update)
+        self.pause = min(2 * self.pause, longest) if is_resting else self.update
         self.last = x, y
         approach(now, plan, x, y, self.distance)
         face(plan, *now.home.plan.lattice.point_at((x, y)))
         until = now.time + self.pause
         if self.longest:
             until = min(until, self.since + self.longest)
-        # A long way is looked at again before its end: the person goes on.
+        # It looks again before the end of a long way, as the person may walk on.
         return plan.interrupt_on("user_lost").stay(until=until).ask_by(until)

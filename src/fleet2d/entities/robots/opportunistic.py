@@ -1,4 +1,4 @@
-"""Opportunistic: when somebody comes into view, go there and interact for a while."""
+"""Opportunistic: approach people who come into view, and interact for a while."""
 
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, ClassVar
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 @register("behavior", "opportunistic")
 class Opportunistic(Behavior):
-    """Approach who comes into view, interact for a while, and leave the robot to others again.
+    """Approach a person who comes into view, and interact for a while.
 
-    What is broken off for it goes on afterwards. It approaches where the person was perceived; a
+    The behavior that it interrupts goes on afterwards. It goes to where the person was perceived; a
     person who walks on in the meantime isn't followed. Events: `approaches`, `interacts`, with the
     name of the person as perceived, and `interaction_over`.
     """
@@ -28,42 +28,42 @@ class Opportunistic(Behavior):
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
     users: tuple[str, ...] = Field(
-        default=(), description="whom it approaches; left out: everybody, recognized or not"
+        default=(), description="users that it approaches; left out: everybody, recognized or not"
     )
     distance: Length = Field(
         default=1.2, ge=0.3, le=10, description="how near it comes: 1.2 m ends personal space [m]"
     )
     interaction: Duration = Field(default=timedelta(minutes=1), description="how long it interacts")
-    chance: Share = Field(
-        default=1.0, description="probability that it takes an opportunity; else that one is missed"
-    )
+    chance: Share = Field(default=1.0, description="probability that it takes an opportunity")
     again: Duration = Field(
         default=timedelta(minutes=15), description="how long it leaves the same person alone"
     )
 
     def about(self) -> tuple[str, ...]:
-        """Return whom it approaches."""
+        """Return the users that it approaches, if only some."""
         return self.users
 
     def start(self, actor: "Actor") -> None:
-        """Check that it sees anybody."""
+        """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
-        self.met: dict[str, datetime] = {}  # when it had an opportunity with each person last
+        self.last_opportunity: dict[str, datetime] = {}  # by person
 
     def decide(self, now: Situation) -> Plan | None:
-        """Approach somebody in view, or leave the robot to the behaviors behind."""
+        """Approach somebody in view, or leave the decision to later behaviors."""
         for name, (x, y) in sorted(now.in_view.items()):
-            if not self._wants(name, now):
+            if not self._is_opportunity(name, now):
                 continue
-            self.met[name] = now.time
+            self.last_opportunity[name] = now.time
             if now.random(f"chance {name}").uniform() < self.chance:
                 return self._approach(now, name, x, y)
         return None
 
-    def _wants(self, name: str, now: Situation) -> bool:
+    def _is_opportunity(self, name: str, now: Situation) -> bool:
+        """Tell whether it may approach a person: one of its users, left alone for long enough."""
         if self.users and name not in self.users:
             return False
-        return name not in self.met or now.time - self.met[name] >= self.again
+        last = self.last_opportunity.get(name)
+        return last is None or now.time - last >= self.again
 
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note("approaches", name)

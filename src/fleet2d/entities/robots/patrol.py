@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.furniture import stops_at
-from fleet2d.entities.kinds import kept_places
+from fleet2d.entities.kinds import available_places
 from fleet2d.entities.place import Place, Point
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration, problem
@@ -59,8 +59,8 @@ class Patrol(Behavior):
         if self.rooms == "all":
             stops = [actor.middle(room) for room in actor.reachable_rooms()]
         else:
-            kept = kept_places(actor, "patrol.rooms", self.rooms)
-            stops = [stop for place in kept for stop in stops_at(actor, place)]
+            places = available_places(actor, "patrol.rooms", self.rooms)
+            stops = [stop for place in places for stop in stops_at(actor, place)]
         self.stops = list(dict.fromkeys(stops))
 
     def decide(self, now: Situation) -> Plan:
@@ -68,13 +68,13 @@ class Patrol(Behavior):
         stops = self.stops
         if self.order == "random":
             stops = now.random("order").shuffled(stops)
-        plan, begun = now.plan(), False
+        plan, has_stop = now.plan(), False
         for stop in stops:
             if now.home.hinders and not plan.reaches(*stop):
-                continue  # another round may find its door open, or its costs lower
+                continue  # in a later round its door may be open, or its costs lower
             plan.go_to_point(*stop)
             if self.look_around:
                 plan.turn_by(1.0)
             plan.stay(self.dwell)
-            begun = True
-        return plan if begun else plan.stay(self.dwell)
+            has_stop = True
+        return plan if has_stop else plan.stay(self.dwell)

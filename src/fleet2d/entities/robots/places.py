@@ -1,4 +1,4 @@
-"""Places to hang out at: what is good and bad about standing there, whoever is where."""
+"""Places to hang out at, rated by all that doesn't depend on where people are at present."""
 
 from itertools import combinations
 from typing import TYPE_CHECKING, Literal
@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from fleet2d.entities.robots.looking import sight_range
+from fleet2d.entities.robots.viewpoints import sight_range
 from fleet2d.floorplan.kept import read_only
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.floorplan.plan import Room
 
-# What people's ways are taken for: of bodies of this radius [m].
+# Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2
-# Personal space ends at 1.2 m (Hall): nearer to a seat a place is the worse, the nearer it is.
+# Personal space ends at 1.2 m (Hall): within it, a place is the worse the nearer to a seat [m].
 PERSONAL = 1.2
-# Of each room so many cells are looked at as seats, where it has no furniture to sit or lie on.
+# The most cells of a room that count as seats, if it has no furniture to sit or lie on.
 SEATS_TRIED = 60
 # Places to stand are tried on a grid of this pitch [m].
 PITCH = 0.5
@@ -31,13 +31,15 @@ Seats = tuple[I64, ...]
 Nearness = Literal["room", "view", "path"]
 
 
-class Places:
-    """Candidate places of a robot, all lattice points that its body can get to.
+class HangoutPlaces:
+    """Candidate places of a robot: lattice points that its body can get to.
 
     Attributes:
-        points: int64 (n, 2). room: Index of each place's room, int64 (n,). block: float64 (n,),
-        share of the ways between any two rooms that lead through the body there. prox: float64
-        (n,), 0 outside of the personal space of all seats, 1 on a seat.
+        points: The places [lattice], int64 (n, 2).
+        room: Index of each place's room, int64 (n,).
+        block: Share of the ways between any two rooms that lead through the robot's body there,
+            float64 (n,).
+        prox: How deep it is in personal space, from 1 on a seat to 0 outside, float64 (n,).
     """
 
     def __init__(self, actor: "Actor", avoid: frozenset[int], off_doors: float) -> None:
@@ -45,12 +47,12 @@ class Places:
 
         Args:
             actor: The robot.
-            avoid: Indices of the rooms that it stays out of.
-            off_doors: How far from every doorway a place is [m].
+            avoid: Indices of the rooms without places.
+            off_doors: The least distance of a place from every doorway [m].
         """
         self._actor = actor
         home, people = actor.home, actor.home.space(PERSON, opens_doors=True)
-        # What it depends on; robots of other runs in the same home share it.
+        # The key has all that the places depend on: robots of other runs in this home share them.
         body = actor.space, actor.part, actor.entity.radius
         self._key = (*body, people, home.objects, avoid, off_doors)
         self.points, self.room, seats, self.block, self.prox = home.kept(
@@ -66,19 +68,19 @@ class Places:
         return read_only(self.points), read_only(self.room), seats, block, prox
 
     def nearness(self, by: Nearness, tau: float) -> F64:
-        """Return how near each place is to who is in each room: float64 (n, rooms), 0 to 1.
+        """Return how near each place is to people in each room, float64 (n, rooms), 0 to 1.
 
-        `room`: 1 in the same room. `view`: the share of the room's seats in range and in sight.
-        `path`: exp(-t / tau), with t the seconds on foot to the nearest point of the room.
+        `room`: 1 in the same room, else 0. `view`: the share of the room's seats in range and in
+        sight. `path`: exp(-t / tau), with t the travel time to the nearest point of the room [s].
         """
         actor = self._actor
         key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), actor.speed)
-        # It is read by room.
+        # In column order: it is read room by room.
         return actor.home.kept(
-            key, lambda: read_only(np.asfortranarray(self._find_nearness(by, tau)))
+            key, lambda: read_only(np.asfortranarray(self._compute_nearness(by, tau)))
         )
 
-    def _find_nearness(self, by: Nearness, tau: float) -> F64:
+    def _compute_nearness(self, by: Nearness, tau: float) -> F64:
         rooms = self._actor.home.rooms
         if by == "path":
             return np.stack([self._path(room, tau) for room in rooms], axis=1)
@@ -91,8 +93,8 @@ class Places:
         pitch = max(1, round(PITCH / plan.lattice.cell))
         on_grid = (cells[:, 0] % pitch == 0) & (cells[:, 1] % pitch == 0)
         rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
-        kept = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
-        cells, rooms = cells[kept], rooms[kept]
+        is_candidate = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
+        cells, rooms = cells[is_candidate], rooms[is_candidate]
         points = cells[:, ::-1] * SUB + CELL_CENTRE
         if plan.doorways and off_doors > 0:
             lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
@@ -105,7 +107,7 @@ class Places:
         return np.ascontiguousarray(points), rooms
 
     def _seats_of(self, room: "Room") -> I64:
-        """Return where people usually are in a room: where its furniture is used, else all over."""
+        """Return where people usually are in a room [lattice]: at its furniture, else all over."""
         plan = self._actor.home.plan
         uses = [
             (use.x, use.y)
@@ -126,12 +128,12 @@ class Places:
     def _view(self, room: "Room") -> F64:
         walls, reach = self._actor.home.walls, sight_range(self._actor)
         seats = self._seats[room.index]
-        shown = np.zeros(len(self.points))
+        share = np.zeros(len(self.points))
         for i, (x, y) in enumerate(self.points.tolist()):
             near = ((seats - (x, y)) ** 2).sum(axis=1) <= reach * reach
             if near.any():
-                shown[i] = np.count_nonzero(points_in_sight(walls, x, y, seats[near])) / len(seats)
-        return shown
+                share[i] = np.count_nonzero(points_in_sight(walls, x, y, seats[near])) / len(seats)
+        return share
 
     def _path(self, room: "Room", tau: float) -> F64:
         actor, lattice = self._actor, self._actor.home.plan.lattice
@@ -141,10 +143,10 @@ class Places:
         field = actor.space.distance_field(cells[:, ::-1] * SUB + CELL_CENTRE)
         metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
         seconds = metres * lattice.units_per_m / actor.speed
-        return fading(seconds / tau)
+        return decay(seconds / tau)
 
     def _blocking(self) -> F64:
-        """Return the share of the ways of people from room to room that a robot stands in."""
+        """Return the share of people's ways from room to room that a robot at each place blocks."""
         actor, home = self._actor, self._actor.home
         space = home.space(PERSON, opens_doors=True)
         anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
@@ -160,7 +162,7 @@ class Places:
         return blocked / max(ways, 1)
 
     def _proximity(self) -> F64:
-        """Return how deep in the personal space of the nearest seat of furniture a place is."""
+        """Return how deep each place is in the personal space of the nearest seat, 0 to 1."""
         plan = self._actor.home.plan
         uses = [(use.x, use.y) for thing in self._actor.home.objects for use in thing.uses]
         if not uses or not len(self.points):
@@ -172,19 +174,19 @@ class Places:
         return inside
 
 
-def fading(x: F64) -> F64:
-    """Return exp(-x) for x >= 0, the same on every machine: by nothing but sums and products.
+def decay(x: F64) -> F64:
+    """Return exp(-x) for x >= 0 by sums and products only, the same on every machine.
 
-    It is (1 + y + y**2/2 + y**3/6 + y**4/24)**-1024 with y = x / 1024: right to a part in 10**5 up
-    to x = 60, beyond which it is nought for all that it is for.
+    Computed as (1 + y + y**2/2 + y**3/6 + y**4/24)**-1024 with y = x / 1024: the relative error is
+    below 1e-5 up to x = 60, beyond which the value is negligible.
 
     Example:
-        >>> fading(np.array([0.0, 1.0, np.inf])).round(6).tolist()
+        >>> decay(np.array([0.0, 1.0, np.inf])).round(6).tolist()
         [1.0, 0.367879, 0.0]
     """
     y = np.minimum(x, 600.0) / 1024
-    grown = 1 + y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4)))
+    growth = 1 + y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4)))
     for _ in range(10):
-        grown = grown * grown
-    faded: F64 = np.where(np.isfinite(x), 1 / grown, 0.0)
-    return faded
+        growth = growth * growth
+    values: F64 = np.where(np.isfinite(x), 1 / growth, 0.0)
+    return values

@@ -27,10 +27,10 @@ I64 = NDArray[np.int64]
 class Retrace(Behavior):
     """Drive the path in the map of a Valetudo robot, in the home of that map, at the robot's speed.
 
-    The map tells no times; a log that does is for the behavior `replay`. Points nearer to each
-    other than `spacing` are thinned out, and one that the body can't get to becomes the nearest
-    that it can, if that is within `reach`. When it is through it begins anew: `cooldown` says after
-    how long. Events: `retraces`, with the number of points, and `retraced`.
+    The map has no times; for a log with times use the behavior `replay`. Points nearer to each
+    other than `spacing` are thinned out. A point that the body can't get to is replaced by the
+    nearest one that it can, if that is within `reach`. At the end of the path it starts again,
+    after `cooldown`. Events: `retraces`, with the number of points, and `retraced`.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"retraced", "retraces"})
@@ -49,7 +49,7 @@ class Retrace(Behavior):
         return (self.path,)
 
     def start(self, actor: "Actor") -> None:
-        """Read the path and put it on free places.
+        """Read the path and move its points to free places.
 
         Raises:
             PlacementError: The map has no path, or none that the robot can drive here.
@@ -66,9 +66,9 @@ class Retrace(Behavior):
         lattice = actor.home.plan.lattice
         points: I64 = lattice.to_lattice(np.concatenate(pieces))
         near: I64 = Nearest(actor).of(points)
-        moved = ((near - points) ** 2).sum(axis=1)
-        kept = near[moved <= (self.reach * lattice.units_per_m) ** 2]
-        self.points = _thinned(kept, self.spacing * lattice.units_per_m)
+        squared_moves = ((near - points) ** 2).sum(axis=1)
+        reachable = near[squared_moves <= (self.reach * lattice.units_per_m) ** 2]
+        self.points = _thin_out(reachable, self.spacing * lattice.units_per_m)
         if len(self.points) < 2:
             raise PlacementError(
                 f"{actor.path}: of the path in {self.path}, {len(self.points)} points are within"
@@ -84,10 +84,10 @@ class Retrace(Behavior):
         return plan.note("retraced")
 
 
-def _thinned(points: I64, spacing: float) -> list[tuple[int, int]]:
-    """Return points in order, without those nearer than `spacing` to the last one kept."""
-    kept: list[tuple[int, int]] = []
+def _thin_out(points: I64, spacing: float) -> list[tuple[int, int]]:
+    """Return points in order, each farther than `spacing` from the one before [lattice]."""
+    path: list[tuple[int, int]] = []
     for x, y in points.tolist():
-        if not kept or (x - kept[-1][0]) ** 2 + (y - kept[-1][1]) ** 2 > spacing * spacing:
-            kept.append((x, y))
-    return kept
+        if not path or (x - path[-1][0]) ** 2 + (y - path[-1][1]) ** 2 > spacing * spacing:
+            path.append((x, y))
+    return path

@@ -1,4 +1,4 @@
-"""The rooms of a home as sites of a search: where to look round, and how long all of it takes."""
+"""The rooms of a home as sites of a search: where to look round, and how long that takes."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.robots.approach import way_seconds
-from fleet2d.entities.robots.looking import views_of
+from fleet2d.entities.robots.viewpoints import viewpoints_of
 from fleet2d.kernels.headings import TURN
 from fleet2d.search.problem import SearchProblem, search_problem
 
@@ -16,47 +16,47 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
 
-# Of a room so much is enough to be shown.
+# The part of a room to be shown by its viewpoints, if there are few enough of them.
 ENOUGH = 0.9
-# A way that there isn't at present, as behind a shut door, takes so long [s].
+# Counted for a route that is blocked at present, as by a shut door [s].
 NO_WAY = 86_400.0
 
 F64 = NDArray[np.float64]
 
 
 class Sites:
-    """The rooms that a robot can enter, and from where it looks round in them.
+    """The rooms that a robot can enter, and its viewpoints in them.
 
     Attributes:
         rooms: Index of each site's room, int64 (n,).
-        share: What part of each room is shown, float64 (n,).
+        share: The part of each room that its viewpoints show, float64 (n,).
     """
 
     def __init__(self, actor: "Actor", views: int) -> None:
-        """Find the places, by walls and furniture as they are at present.
+        """Choose the viewpoints, by walls and furniture as they are at present.
 
         Args:
             actor: The robot.
-            views: In a room it looks round from so many places at most.
+            views: The most viewpoints in a room.
         """
         rooms = actor.reachable_rooms()
-        found = [views_of(actor, room, ENOUGH, views) for room in rooms]
+        viewpoints = [viewpoints_of(actor, room, ENOUGH, views) for room in rooms]
         self.rooms = np.array([room.index for room in rooms], np.int64)
-        self.share = np.array([view.share for view in found], np.float64)
-        self._points = [view.points for view in found]
+        self.share = np.array([of_room.share for of_room in viewpoints], np.float64)
+        self._points = [of_room.points for of_room in viewpoints]
         self._actor = actor
-        self._ways: tuple[int, F64, F64] | None = None
+        self._times: tuple[int, F64, F64] | None = None  # version of the home, travel, look
 
     def __len__(self) -> int:
         """Return the number of sites."""
         return len(self.rooms)
 
     def can_go(self, plan: "Plan", site: int) -> bool:
-        """Tell whether all places of a site can be reached from where a plan ends at present."""
+        """Tell whether all viewpoints of a site can be reached from where a plan ends so far."""
         return all(plan.reaches(*point) for point in self._points[site])
 
     def look_round(self, plan: "Plan", site: int) -> "Plan":
-        """Go to a site and look round from all of its places."""
+        """Go to a site and turn once at each of its viewpoints."""
         for point in self._points[site]:
             plan.go_to_point(*point).turn_by(1.0)
         return plan
@@ -66,17 +66,20 @@ class Sites:
 
         Args:
             now: The situation.
-            prior: float64 (n,), probability that the person is in each room.
+            prior: Probability that the person is in each room, float64 (n,).
         """
         travel, look = self._travel()
-        here = (now.actor.state.x, now.actor.state.y)
-        reach = [self._seconds(here, points[0]) for points in self._points]
+        position = (now.actor.state.x, now.actor.state.y)
+        reach = [self._seconds(position, points[0]) for points in self._points]
         return search_problem(prior, reach, travel, look, self.share)
 
     def _travel(self) -> tuple[F64, F64]:
-        """Return seconds from each site's last place to each other's first, and for a look."""
+        """Return the times of travel from site to site, (n, n), and of the looks, (n,) [s].
+
+        A look begins at the first viewpoint of a site and ends at its last.
+        """
         version = self._actor.home.version
-        if self._ways is None or self._ways[0] != version:
+        if self._times is None or self._times[0] != version:
             last, first = [p[-1] for p in self._points], [p[0] for p in self._points]
             travel = np.array([[self._seconds(a, b) for b in first] for a in last], np.float64)
             turn = TURN / self._actor.turn_rate
@@ -84,8 +87,8 @@ class Sites:
                 len(points) * turn + sum(self._seconds(a, b) for a, b in pairwise(points))
                 for points in self._points
             ]
-            self._ways = version, travel, np.array(look, np.float64)
-        return self._ways[1:]
+            self._times = version, travel, np.array(look, np.float64)
+        return self._times[1:]
 
     def _seconds(self, start: tuple[int, int], goal: tuple[int, int]) -> float:
         seconds = way_seconds(self._actor, start, goal)

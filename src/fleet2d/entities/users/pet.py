@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.kinds import kept_rooms
+from fleet2d.entities.kinds import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spots
 from fleet2d.problems import problem
@@ -56,7 +56,7 @@ class Pet(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the rooms that it may enter."""
-        named = kept_rooms(actor, "pet.rooms", self.rooms)
+        named = available_rooms(actor, "pet.rooms", self.rooms)
         self.entered = named or actor.reachable_rooms()
         self.places = Spots(actor)
         self.laws = self.nap.table(), self.stop.table()

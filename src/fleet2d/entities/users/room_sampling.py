@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.kinds import kept_places
+from fleet2d.entities.kinds import available_places
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
@@ -76,7 +76,9 @@ class RoomSampling(Behavior):
     def start(self, actor: "Actor") -> None:
         """Find the rooms; those of a kind have equal parts of its share."""
         names = [(name,) for name in self.shares if name != AWAY]
-        there = {name for (name,) in kept_places(actor, "room_sampling.shares", names)} | {AWAY}
+        there = {name for (name,) in available_places(actor, "room_sampling.shares", names)} | {
+            AWAY
+        }
         kept = {name: share for name, share in self.shares.items() if name in there}
         total = sum(kept.values())
         if total <= 0:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.furniture import seat_at
-from fleet2d.entities.kinds import kept_places
+from fleet2d.entities.kinds import available_places
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.problems import problem, problem_at
@@ -95,7 +95,7 @@ class Schedule(Behavior):
         for place in places:
             if is_point(place):
                 actor.point(place)  # type: ignore[arg-type]
-        there = {(), *kept_places(actor, "schedule.days", places)}
+        there = {(), *available_places(actor, "schedule.days", places)}
         self.week = [[entry for entry in day if entry.place in there] for day in self.week]
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:

@@ -1,0 +1,42 @@
+"""Bodies as a scenario declares them: size, speed, and where they are at first."""
+
+from typing import ClassVar
+
+from pydantic import Field
+
+from fleet2d.component import Settings
+from fleet2d.entities.place import Place
+from fleet2d.sight.camera import Camera
+from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
+
+
+class BodySettings(Settings):
+    """A body in the home: its size, how fast it moves, and where it is at first."""
+
+    radius: Length = Field(default=0.2, gt=0, le=2, description="radius of the body [m]")
+    speed: Speed = Field(default=1.0, ge=0.01, le=20, description="walking speed [m/s]")
+    turn_rate_deg: TurnRateDeg = Field(
+        default=180.0, ge=0.01, le=36000, description="how fast it turns on the spot [deg/s]"
+    )
+    start: Place | None = Field(
+        default=None,
+        description="where it is at first; left out: where its behavior would be, else drawn",
+    )
+    start_heading_deg: AngleDeg | None = Field(
+        default=None, description="heading at first, counter-clockwise from +x; left out: drawn"
+    )
+    color: str | None = Field(default=None, min_length=1, description="color in pictures")
+    opens_doors: bool = Field(
+        default=False, description="opens doors in its way; else a shut door is a wall to it"
+    )
+    # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
+    minds_costs: ClassVar[bool] = False
+    # Whether it sits or lies on furniture that a place names, instead of stopping before it.
+    uses_furniture: ClassVar[bool] = False
+    # What happens when its cameras lose somebody, and when they see somebody.
+    sight_events: ClassVar[tuple[str, str]]
+
+    @property
+    def eyes(self) -> dict[str, Camera]:
+        """Its cameras by name; none, unless a subclass has some."""
+        return {}
