@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.arrangement import described, moved, number_objects
+from fleet2d.floorplan.arrangement import describe_object, move_object, number_objects
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 
@@ -34,7 +34,7 @@ def test_two_objects_of_one_name_are_refused() -> None:
 
 
 def test_quarter_turn_is_exact() -> None:
-    there = moved(SOFA, LATTICE, (5, 5), 90)
+    there = move_object(SOFA, LATTICE, (5, 5), 90)
     assert (4.5, 4, 5.5, 6) == there.footprint.bounds
     (use,) = there.uses
     assert (5, 5) == (use.x, use.y)
@@ -43,23 +43,23 @@ def test_quarter_turn_is_exact() -> None:
 
 @given(st.floats(-360, 360), st.floats(1, 9), st.floats(1, 9))
 def test_moved_object_keeps_its_size_to_the_lattice(turn: float, x: float, y: float) -> None:
-    there = moved(SOFA, LATTICE, (x, y), turn)
+    there = move_object(SOFA, LATTICE, (x, y), turn)
     assert there.footprint.area == pytest.approx(2, abs=0.01)
     assert there.footprint.centroid.x == pytest.approx(x, abs=0.002)
 
 
 def test_object_moved_back_is_where_it_was() -> None:
-    back = moved(moved(SOFA, LATTICE, (5, 5), 180), LATTICE, (3, 2.5), 180)
+    back = move_object(move_object(SOFA, LATTICE, (5, 5), 180), LATTICE, (3, 2.5), 180)
     assert SOFA.footprint.equals(back.footprint)
 
 
 def test_description_tells_objects_apart() -> None:
     (use,) = SOFA.uses
     others = [
-        moved(SOFA, LATTICE, (5, 5)),
+        move_object(SOFA, LATTICE, (5, 5)),
         replace(SOFA, heading=1.5),
         replace(SOFA, blocks="sight"),
         replace(SOFA, uses=()),
         replace(SOFA, uses=(replace(use, approach=(3.0, 1.5)),)),
     ]
-    assert all(described(SOFA) != described(other) for other in others)
+    assert all(describe_object(SOFA) != describe_object(other) for other in others)

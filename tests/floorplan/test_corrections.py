@@ -3,7 +3,7 @@ import shapely
 from pydantic import ValidationError
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.corrections import RoomCorrection, corrected
+from fleet2d.floorplan.corrections import RoomCorrection, correct_rooms
 from fleet2d.floorplan.formats.bundled import Bundled
 from fleet2d.floorplan.plan import FloorPlan
 
@@ -23,7 +23,7 @@ def names(plan: FloorPlan) -> list[tuple[str, str]]:
 
 
 def test_place_names_and_retypes_its_room_and_its_doorway(plan: FloorPlan) -> None:
-    given = corrected(plan, [RoomCorrection(at=(2, 2), name="den", type="Home Office")])
+    given = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="den", type="Home Office")])
 
     assert [("room_0", "room"), ("den", "office")] == names(given)
     assert ("office",) == given.room("den").labels
@@ -32,7 +32,7 @@ def test_place_names_and_retypes_its_room_and_its_doorway(plan: FloorPlan) -> No
 
 
 def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> None:
-    given = corrected(
+    given = correct_rooms(
         plan, [RoomCorrection(at=(2, 2), type="Küche"), RoomCorrection(at=(5, 2), type="kitchen")]
     )
 
@@ -40,7 +40,7 @@ def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> N
 
 
 def test_room_that_is_only_named_keeps_its_type(plan: FloorPlan) -> None:
-    given = corrected(plan, [RoomCorrection(at=(2, 2), name="Anna's")])
+    given = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="Anna's")])
 
     assert [("room_0", "room"), ("Anna's", "room")] == names(given)
 
@@ -48,7 +48,7 @@ def test_room_that_is_only_named_keeps_its_type(plan: FloorPlan) -> None:
 def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
     corners = ((5.6, 0.0), (9.0, 0.0), (9.0, 9.0), (5.6, 9.0))
 
-    given = corrected(plan, [RoomCorrection(polygon=corners, type="bedroom")])
+    given = correct_rooms(plan, [RoomCorrection(polygon=corners, type="bedroom")])
 
     assert [("room_0", "room"), ("room_1", "room"), ("bedroom_0", "bedroom")] == names(given)
     assert 6.0 == pytest.approx(given.room("bedroom_0").area_m2)
@@ -61,13 +61,13 @@ def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
 def test_polygon_over_a_whole_room_replaces_it(plan: FloorPlan) -> None:
     corners = ((0.0, 0.0), (4.05, 0.0), (4.05, 9.0), (0.0, 9.0))
 
-    given = corrected(plan, [RoomCorrection(polygon=corners, name="studio")])
+    given = correct_rooms(plan, [RoomCorrection(polygon=corners, name="studio")])
 
     assert [("room_0", "room"), ("studio", "room")] == names(given)
 
 
 def test_nothing_to_correct_is_the_same_plan(plan: FloorPlan) -> None:
-    assert plan is corrected(plan, [])
+    assert plan is correct_rooms(plan, [])
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_correction_that_fits_nowhere_is_an_error(
     plan: FloorPlan, correction: RoomCorrection, message: str
 ) -> None:
     with pytest.raises(FloorPlanError, match=message):
-        corrected(plan, [correction])
+        correct_rooms(plan, [correction])
 
 
 @pytest.mark.parametrize(

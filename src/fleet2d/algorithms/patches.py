@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
-from fleet2d.floorplan.kept import read_only
+from fleet2d.floorplan.cache import read_only
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan

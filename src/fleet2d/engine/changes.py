@@ -22,10 +22,10 @@ from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.events import HOME, Event, EventKind
-from fleet2d.floorplan.arrangement import moved
+from fleet2d.floorplan.arrangement import move_object
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home, lattice_footprint
-from fleet2d.floorplan.home.space import grown_shape
+from fleet2d.floorplan.home.space import grow_shape
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros
@@ -220,7 +220,7 @@ class Changes:
         plan = self.home.plan
         thing = next(o for o in self.home.objects if o.name == change.target)
         assert change.to is not None
-        there = moved(thing, plan.lattice, change.to, change.turn_deg)
+        there = move_object(thing, plan.lattice, change.to, change.turn_deg)
         shape = _corners(lattice_footprint(plan, there))
         solid = there.blocks != "nothing"
         if solid and self._in_the_way(shape, actors):
@@ -241,7 +241,7 @@ class Changes:
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
             if not actor.state.away:
-                zone = grown_shape(shape, actor.entity.radius * units)
+                zone = grow_shape(shape, actor.entity.radius * units)
                 if shapely.intersects_xy(zone, actor.state.x, actor.state.y):
                     return True
         return False
@@ -253,7 +253,7 @@ class Changes:
             if not isinstance(actor.motion, Track):
                 actor.ask(step)
             elif shape is not None and not self._passes(actor, shape):
-                zone = grown_shape(shape, actor.entity.radius * units)
+                zone = grow_shape(shape, actor.entity.radius * units)
                 way = way_ahead(actor, step * self.clock.step_us)
                 if way is not None and way.intersects(zone):
                     actor.ask(step)
@@ -347,7 +347,7 @@ class Changes:
         thing = next(o for o in self.home.objects if o.name == change.target)
         assert change.to is not None
         try:
-            there = moved(thing, plan.lattice, change.to, change.turn_deg)
+            there = move_object(thing, plan.lattice, change.to, change.turn_deg)
         except (PlacementError, OverflowError) as error:
             raise ScenarioError(str(error)) from None
         inside = shapely.intersection(

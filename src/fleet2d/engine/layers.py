@@ -195,7 +195,7 @@ class LayerBook:
 def _patches(home: Home, cut_by: Literal["patches", "rooms"]) -> Patches:
     """Return the parts of rooms that are told apart, the same for all runs in the home."""
     of = patches_of if cut_by == "patches" else whole_rooms
-    return home.kept((cut_by,), lambda: of(home.plan))
+    return home.cached((cut_by,), lambda: of(home.plan))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pydantic import Field
 from fleet2d.component import Settings
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed, without_next_stop
-from fleet2d.floorplan.home.costmap import NO_WAY, route_by_cost
+from fleet2d.floorplan.home.costmap import CLOSED, route_by_cost
 from fleet2d.units import Length, PositiveDuration, micros
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ class _Detour:
         self._cost = np.zeros(body.space.part_of_cell.shape, np.int32)
         for x, y, reach in people.tolist():
             near = (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach
-            self._cost[near] = NO_WAY
+            self._cost[near] = CLOSED
 
     def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""

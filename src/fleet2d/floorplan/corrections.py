@@ -1,4 +1,4 @@
-"""Names and types of rooms that a scenario gives, or puts right."""
+"""Corrections of rooms in a scenario: their names, types and outlines."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,14 +16,15 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.adjacency import doorway_segments
 from fleet2d.floorplan.rooms.doorways import DoorLine, name_doorways
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
-from fleet2d.floorplan.rooms.room import Room, beside_rooms, make_rooms
+from fleet2d.floorplan.rooms.room import Room, make_rooms
 from fleet2d.floorplan.rooms.vocabulary import usual_type
+from fleet2d.kernels.chambers import fill_beside
 from fleet2d.problems import problem
 from fleet2d.units import Length
 
 
 class RoomCorrection(Settings):
-    """A room that is named or retyped, by a place in it, or drawn anew, by its corners.
+    """A room to name or retype, given by a place in it, or to draw anew, given by its corners.
 
     Example:
         >>> RoomCorrection(at=(2, 1), type="Kitchen").type
@@ -56,10 +57,11 @@ class RoomCorrection(Settings):
         return self
 
 
-def corrected(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
-    """Return a plan with rooms named, retyped and drawn anew.
+def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
+    """Return a plan with rooms renamed, retyped and drawn anew.
 
-    Later corrections see what earlier ones made. A room without a cell left is none any more.
+    Each correction applies to the rooms that those before it left. A room that loses all its cells
+    is dropped.
 
     Args:
         plan: The plan.
@@ -76,12 +78,12 @@ def corrected(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPl
     for number, correction in enumerate(corrections):
         where = f"floorplan.rooms[{number}]"
         if correction.polygon is not None:
-            painted = _drawn(plan, painted, correction, len(regions), where)
+            painted = _draw(plan, painted, correction, len(regions), where)
             types = (usual_type(correction.type),) if correction.type else ()
             regions.append(Region(types, Polygon(), correction.name, None if types else "room"))
         else:
-            index = _found(plan, painted, correction, where)
-            regions[index] = _retyped(regions[index], correction)
+            index = _region_at(plan, painted, correction, where)
+            regions[index] = _rename(regions[index], correction)
     room_of_cell, rooms = make_rooms(plan.lattice, painted, regions)
     room_of_cell.setflags(write=False)
     segments = doorway_segments(plan.lattice, plan.doorways)
@@ -91,9 +93,9 @@ def corrected(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPl
         rooms=rooms,
         doorways=name_doorways(
             plan.lattice,
-            beside_rooms(room_of_cell),
+            fill_beside(room_of_cell),
             [room.name for room in rooms],
-            [(line, segments[k]) for k, line in enumerate(_lines(plan))],
+            [(line, segments[k]) for k, line in enumerate(_door_lines(plan))],
         ),
     )
 
@@ -102,8 +104,8 @@ def _shape(corners: Sequence[tuple[float, float]]) -> Polygon:
     return Polygon(corners) if len(corners) >= 3 else Polygon([(0, 0), (1, 1), (0, 0)])
 
 
-def _sound(shape: Polygon | MultiPolygon) -> MultiPolygon:
-    """Return a shape that may cross itself since it was rounded, as polygons that don't."""
+def _make_valid(shape: Polygon | MultiPolygon) -> MultiPolygon:
+    """Return the polygons of a shape, which may cross itself since it was rounded."""
     parts = shapely.get_parts(shapely.make_valid(shape))
     return MultiPolygon([part for part in parts if part.geom_type == "Polygon"])
 
@@ -112,24 +114,24 @@ def _as_region(room: Room) -> Region:
     return Region(room.labels, Polygon(), room.name, room.type)
 
 
-def _retyped(region: Region, correction: RoomCorrection) -> Region:
-    """Return a region with another name or type; one that is named by its type is renamed."""
+def _rename(region: Region, correction: RoomCorrection) -> Region:
+    """Return a region with another name or type; a name of type and number follows the type."""
     if correction.type is None:
         return replace(region, name=correction.name)
     kind = usual_type(correction.type)
-    numbered = region.name is not None and region.name.rpartition("_")[0] == region.type
-    name = correction.name or (None if numbered and kind != region.type else region.name)
+    is_numbered = region.name is not None and region.name.rpartition("_")[0] == region.type
+    name = correction.name or (None if is_numbered and kind != region.type else region.name)
     return Region((kind,), region.shape, name, kind)
 
 
-def _found(
+def _region_at(
     plan: FloorPlan, painted: NDArray[np.int64], correction: RoomCorrection, where: str
 ) -> int:
-    """Return the number of the region that holds a place."""
+    """Return the index of the region that holds the place of a correction."""
     x, y = correction.at or (0.0, 0.0)
     row, column = plan.lattice.cell_of(*plan.lattice.point_at((x, y)))
     if 0 <= row < plan.lattice.rows and 0 <= column < plan.lattice.columns:
-        index = int(beside_rooms(painted.astype(np.int16))[row, column])
+        index = int(fill_beside(painted.astype(np.int16))[row, column])
         if index >= 0:
             return index
     near_x, near_y = plan.nearest_free(x, y)
@@ -139,26 +141,26 @@ def _found(
     )
 
 
-def _drawn(
+def _draw(
     plan: FloorPlan, painted: NDArray[np.int64], correction: RoomCorrection, index: int, where: str
 ) -> NDArray[np.int64]:
-    """Return the regions of the cells, those inside the polygon with a new number."""
+    """Return the regions of the cells, with those inside the polygon set to `index`."""
     shape = _shape(correction.polygon or ())
     (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
-    patch = cells_in(plan.free, _sound(region.shape))
+    patch = cells_in(plan.free, _make_valid(region.shape))
     if patch.cells == 0:
         x0, y0, x1, y1 = shape.bounds
         raise FloorPlanError(
             f"{where}: no free cell of {plan.name} is inside the polygon from ({x0:g}, {y0:g}) to"
             f" ({x1:g}, {y1:g}) m"
         )
-    out = painted.copy()
-    out[patch.window][patch.mask] = index
-    return out
+    changed = painted.copy()
+    changed[patch.window][patch.mask] = index
+    return changed
 
 
-def _lines(plan: FloorPlan) -> list[DoorLine]:
-    """Return the doorways as lines; those that are named after rooms are to be named again."""
+def _door_lines(plan: FloorPlan) -> list[DoorLine]:
+    """Return the doorways as lines; those named after their rooms get new names later."""
     lines = []
     for doorway in plan.doorways:
         joined = "-".join(plan.rooms[room].name for room in doorway.rooms)

@@ -1,7 +1,7 @@
-"""Read a floor plan from whatever names one: a file of a known format, or a home of this project.
+"""Read a floor plan by its name: a file of a known format, a bundled home, or a synthetic one.
 
-A home of this project is a bundled one, or a synthetic one by its seed, `synthetic:7`. Readers of
-other formats load when a file needs them.
+A synthetic home is named by its seed, such as `synthetic:7`. The readers of foreign formats are
+imported when a file needs them.
 """
 
 import re
@@ -28,10 +28,10 @@ def load_floorplan(
     """Read a floor plan.
 
     Args:
-        plan: A file, whose content tells its format, the name of a bundled home, or `synthetic:`
-            and the seed of a synthetic one.
-        cell: Side of a grid cell [m]; None for 0.05, or for what is made of pixels their side.
-        resolution: Side of a pixel [m], of a picture that no YAML file goes with.
+        plan: A file, whose content determines its format; or the name of a bundled home; or
+            `synthetic:` and the seed of a synthetic one.
+        cell: Side of a grid cell [m]; None for 0.05, or for the side of the pixels of a map.
+        resolution: Side of a pixel [m] of a picture without a YAML file.
 
     Raises:
         FloorPlanError: There is no such plan, or it can't be read.
@@ -65,7 +65,7 @@ def load_floorplan(
 
 
 def _load_document(path: Path, cell: float | None) -> FloorPlan:
-    """Read a file of which its content tells the format."""
+    """Read a file whose content determines its format."""
     usual = USUAL_CELL_M if cell is None else cell
     content = read_document(path)
     kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
@@ -77,7 +77,7 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
 
 
 def _load_foreign(kind: str, path: Path, cell: float | None) -> FloorPlan:
-    """Read a file in a format of others."""
+    """Read a file in a foreign format."""
     usual = USUAL_CELL_M if cell is None else cell
     if kind == "houseexpo":
         from fleet2d.floorplan.formats.houseexpo import read_houseexpo
@@ -97,15 +97,15 @@ def _load_foreign(kind: str, path: Path, cell: float | None) -> FloorPlan:
 
 
 def is_floorplan(plan: str | Path) -> bool:
-    """Whether a name or a file is meant for a floor plan, readable or not; a scenario is not.
+    """Return whether a name or file denotes a floor plan, readable or not, and not a scenario.
 
     >>> [is_floorplan(name) for name in ("family_home", "synthetic:7", "plan.json", "run.yaml")]
     [True, True, True, False]
     """
     path = Path(plan)
     if path.suffix.lower() not in YAML:
-        own = str(plan) in bundled_names() or SYNTHETIC.fullmatch(str(plan)) is not None
-        return own or path.suffix.lower() in (*JSON, *IMAGES)
+        is_home = str(plan) in bundled_names() or SYNTHETIC.fullmatch(str(plan)) is not None
+        return is_home or path.suffix.lower() in (*JSON, *IMAGES)
     try:
         content = read_yaml(path)
     except FloorPlanError:

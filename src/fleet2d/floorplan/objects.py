@@ -13,15 +13,15 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class UsePlace:
-    """Where a person is while using an object.
+    """A place where a person is while using an object.
 
     Attributes:
-        x: Where the middle of the body is [m]; it may lie on the object (a bed, a sofa).
-        y: [m]
-        heading: Where the person faces [rad], counter-clockwise from +x.
-        posture: Whether one stands, sits or lies there.
-        approach: Where one walks to before the last step onto it (x, y) [m], off every object;
-            the place itself where one can stand there. None where nobody has worked it out yet.
+        x: x of the middle of the body [m]; it may be on the object (a bed, a sofa).
+        y: y of the middle of the body [m].
+        heading: Direction that the person faces [rad], counter-clockwise from +x.
+        posture: Whether the person stands, sits or lies.
+        approach: Place off all objects from which the person steps there (x, y) [m]; the same
+            place if it is off all objects. None if it is not computed yet.
     """
 
     x: float
@@ -33,17 +33,17 @@ class UsePlace:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A thing that stands somewhere in the home.
+    """An object at a place in the home.
 
     Attributes:
         name: Unique in the plan, such as `bed_0`; empty to be numbered by type.
         type: What it is, such as `bed`.
         footprint: The floor that it covers [m].
-        blocks: Whom it stops: nobody (a rug), bodies (a table), or bodies and sight (a
-            wardrobe).
+        blocks: What can't pass it: nothing (a rug), bodies (`path`, a table), or bodies and sight
+            (`sight`, a wardrobe).
         uses: Places to use it from.
-        heading: Where its front faces [rad], counter-clockwise from +x: a sofa's towards the room,
-            a bed's from the pillows to the feet.
+        heading: Direction of its front [rad], counter-clockwise from +x: of a sofa into the room,
+            of a bed from the pillows to the feet.
     """
 
     name: str

@@ -14,19 +14,27 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.arrangement import described, number_objects
-from fleet2d.floorplan.geometry.free_space import free_on_lattice, in_order, part_notes
+from fleet2d.floorplan.arrangement import describe_object, number_objects
+from fleet2d.floorplan.geometry.free_space import canonical_order, free_on_lattice, part_notes
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
+from fleet2d.floorplan.names import find_named
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.rooms.adjacency import RoomLink, room_links
-from fleet2d.floorplan.rooms.division import Regions, Survey, divide, found_doorways, survey
+from fleet2d.floorplan.rooms.division import (
+    Passages,
+    RegionKind,
+    divide,
+    search_passages,
+    select_doorways,
+)
 from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway, fit_lines, name_doorways
-from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, beside_rooms
+from fleet2d.floorplan.rooms.regions import LabelledRegion
+from fleet2d.floorplan.rooms.room import NO_ROOM, Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.kernels.chambers import fill_beside
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.leaves import views
-from fleet2d.problems import did_you_mean
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
 
@@ -36,7 +44,7 @@ class FloorPlan:
     """The inside of a home, immutable; plans of equal content are equal.
 
     Attributes:
-        name: What it is called.
+        name: Its name.
         source: Where it comes from, for people to read; not part of the content.
         lattice: The cells that cover it.
         polygons: Free space [lattice], even integer coordinates, counter-clockwise outside.
@@ -45,10 +53,10 @@ class FloorPlan:
         room_of_cell: Index of each cell's room, -1 where not free, int16 (rows, columns).
         rooms: The rooms by index: disjoint, and together all free cells.
         entrance: A place just inside the front door (x, y) [m], where the file gives one.
-        doorways: The passages between rooms by index, as given or found.
-        objects: Furniture and devices, in the order given.
+        doorways: The passages between rooms by index, from the source or found in the walls.
+        objects: Furniture and devices, in the order of the source.
         no_go: Areas that robots keep out of [m].
-        notes: What was odd in the file and what was made of it; not part of the content.
+        notes: Sentences on what was odd in the file and how it was read; not part of the content.
         regions: The labels as the file gives them; not part of the content.
         lost_doorways: Doorways of the file that stand in no passage; not part of the content.
 
@@ -78,7 +86,7 @@ class FloorPlan:
     lost_doorways: tuple[DoorLine, ...] = ()
 
     @classmethod
-    def build(  # noqa: PLR0913 - what a file says of a home, by name
+    def build(  # noqa: PLR0913 - the parts of a home, by name
         cls,
         name: str,
         free: Polygon | MultiPolygon,
@@ -88,7 +96,7 @@ class FloorPlan:
         source: str = "",
         entrance: tuple[float, float] | None = None,
         doorways: Sequence[DoorLine] | None = (),
-        regions_are: Regions = "exact",
+        regions_are: RegionKind = "exact",
         objects: Sequence[PlacedObject] = (),
         no_go: Sequence[Polygon] = (),
         notes: Sequence[str] = (),
@@ -96,23 +104,23 @@ class FloorPlan:
         """Make a floor plan of free space and labels, both in metres.
 
         Args:
-            name: What to call it.
+            name: Its name.
             free: The free space between the walls [m].
-            regions: What the rooms are, in the order that numbers them.
+            regions: The labels of rooms; their order numbers the rooms.
             cell: Side of a cell [m].
             source: Where the plan comes from.
             entrance: A place just inside the front door [m].
             doorways: Lines across passages [m]; one that stands in no passage is noted and left
-                out. None to look for them.
-            regions_are: `exact`: the rooms themselves. `boxes`: rough, they label what walls bound.
-                `none`: rooms are found from the walls alone.
+                out. None to search the walls for doorways.
+            regions_are: `exact`: the rooms themselves. `boxes`: rough boxes that label what walls
+                bound. `none`: there are none, and rooms are segmented from the walls alone.
             objects: Furniture and devices [m].
             no_go: Areas that robots keep out of [m].
-            notes: What the caller found odd.
+            notes: Sentences on what was odd in the source.
 
         Raises:
-            FloorPlanError: There is no free space at this cell size, it would lose more of its area
-                than rounding explains, it is too large, or the entrance is not in it.
+            FloorPlanError: There is no free space at this cell size, it would lose more area than
+                rounding explains, it is too large, or the entrance is not in it.
         """
         lines = list(doorways or ())
         POLYGONS.check(len(regions) + len(objects) + len(lines), "it", FloorPlanError)
@@ -120,10 +128,10 @@ class FloorPlan:
         CORNERS.check(int(shapely.get_num_coordinates(shapes).sum()), "it", FloorPlanError)
         lattice, polygons = free_on_lattice(name, free, cell)
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
-        passages: Survey | None = None
+        passages: Passages | None = None
         if doorways is None or regions_are != "exact":
-            polygons, passages = survey(lattice, polygons, regions_are)
-        polygons = in_order(polygons)
+            polygons, passages = search_passages(lattice, polygons, regions_are)
+        polygons = canonical_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         cells: NDArray[np.bool_] = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0
         if not cells.any():
@@ -138,7 +146,7 @@ class FloorPlan:
         room_of_cell.setflags(write=False)
         fitted = [(line, at) for line, at in zip(lines, segments, strict=True) if at is not None]
         if doorways is None and passages is not None:
-            fitted = found_doorways(lattice, polygons, room_of_cell, passages)
+            fitted = select_doorways(lattice, polygons, room_of_cell, passages)
         names = [room.name for room in rooms]
         plan = cls(
             name=name,
@@ -150,7 +158,7 @@ class FloorPlan:
             room_of_cell=room_of_cell,
             rooms=rooms,
             entrance=entrance,
-            doorways=name_doorways(lattice, beside_rooms(room_of_cell), names, fitted),
+            doorways=name_doorways(lattice, fill_beside(room_of_cell), names, fitted),
             objects=number_objects(objects),
             no_go=tuple(no_go),
             notes=(*notes, *part_notes(lattice, polygons), *room_notes, *door_notes),
@@ -171,23 +179,23 @@ class FloorPlan:
         return hash(self.digest)
 
     def __repr__(self) -> str:
-        """Say which plan it is in a line."""
+        """Return a line with name, area, rooms and cells."""
         return (
             f"<FloorPlan {self.name}: {self.area_m2:.1f} m2, {len(self.rooms)} rooms,"
             f" {self.lattice.columns} x {self.lattice.rows} cells of {self.lattice.cell:g} m>"
         )
 
     def __copy__(self) -> Self:
-        """Return itself: nothing in it changes."""
+        """Return itself, as nothing in it changes."""
         return self
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        """Return itself: nothing in it changes, so that branches of a run share it."""
+        """Return itself, as nothing in it changes: branches of a run share it."""
         return self
 
     @cached_property
     def area_m2(self) -> float:
-        """Area of the free space as snapped [m²], exact, cells not involved."""
+        """Area of the free space on the lattice [m²], exact and independent of cells."""
         units2 = sum(polygon.area for polygon in self.polygons)
         return float(units2) / self.lattice.units_per_m**2
 
@@ -195,10 +203,10 @@ class FloorPlan:
     def room_of_place(self) -> NDArray[np.int16]:
         """Index of the room of a place in each cell, int16 (rows, columns), -1 inside walls.
 
-        As `room_of_cell`, but a cell that a wall cuts, so that its centre isn't free, has the room
-        of a free cell beside it: somebody may stand in the part that is.
+        Like `room_of_cell`, but a cell that a wall cuts, so that its centre isn't free, has the
+        room of a free cell beside it, since part of it may be free.
         """
-        rooms = beside_rooms(self.room_of_cell)
+        rooms = fill_beside(self.room_of_cell)
         rooms.setflags(write=False)
         return rooms
 
@@ -211,7 +219,7 @@ class FloorPlan:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all but source and notes; the same on any machine."""
+        """SHA-256 of the content, which is all but source and notes; the same on any machine."""
         lattice = self.lattice
         head: dict[str, Any] = {
             "name": self.name,
@@ -220,11 +228,11 @@ class FloorPlan:
             "entrance": self.entrance,
             "rings": [[len(ring.coords) for ring in rings(p)] for p in self.polygons],
         }
-        # What a plan doesn't have is not in its digest.
+        # Parts that a plan doesn't have are left out, so that older digests stay valid.
         if self.doorways:
             head["doorways"] = [[d.name, *d.start, *d.end, d.leaf] for d in self.doorways]
         if self.objects:
-            head["objects"] = [described(thing) for thing in self.objects]
+            head["objects"] = [describe_object(thing) for thing in self.objects]
         if self.no_go:
             head["no_go"] = [shapely.get_coordinates(area).tolist() for area in self.no_go]
         content = hashlib.sha256(json.dumps(head).encode())
@@ -252,13 +260,7 @@ class FloorPlan:
             raise FloorPlanError(
                 f"{self.name} has no room {name}: its rooms are 0 to {len(self.rooms) - 1}"
             )
-        names = [room.name for room in self.rooms]
-        if name in names:
-            return self.rooms[names.index(name)]
-        raise FloorPlanError(
-            f"{self.name} has no room {name!r}{did_you_mean(name, names)}"
-            f" Its rooms are: {', '.join(names)}"
-        )
+        return find_named(self.rooms, name, self.name, "room")
 
     def doorway(self, name: str | int) -> Doorway:
         """Return a doorway by its name or index.
@@ -268,30 +270,24 @@ class FloorPlan:
         """
         if isinstance(name, int) and 0 <= name < len(self.doorways):
             return self.doorways[name]
-        names = [doorway.name for doorway in self.doorways]
-        if name in names:
-            return self.doorways[names.index(str(name))]
-        raise FloorPlanError(
-            f"{self.name} has no doorway {name!r}{did_you_mean(str(name), names)}"
-            f" Its doorways are: {', '.join(names) or 'none'}"
-        )
+        return find_named(self.doorways, name, self.name, "doorway")
 
     @cached_property
     def room_graph(self) -> tuple[RoomLink, ...]:
-        """The ways between rooms: doorways by index, then open borders."""
+        """The links between rooms: doorways by index, then open borders."""
         return room_links(self.lattice, self.room_of_cell, self.doorways)
 
     def neighbors(self, room: str | int) -> tuple[Room, ...]:
-        """Return the rooms that one gets to from a room, without crossing others, by index."""
+        """Return the rooms that are linked to a room directly, by index."""
         index = self.room(room).index
-        joined = {b for link in self.room_graph for b in link.rooms if index in link.rooms}
-        return tuple(self.rooms[other] for other in sorted(joined - {index}))
+        linked = {b for link in self.room_graph for b in link.rooms if index in link.rooms}
+        return tuple(self.rooms[other] for other in sorted(linked - {index}))
 
     def rooms_of_type(self, kind: str) -> tuple[Room, ...]:
-        """Return the rooms of a type, then those that only have it as a further label."""
-        wanted = room_type(kind)
-        first = [room for room in self.rooms if room.type == wanted]
-        return (*first, *(r for r in self.rooms if wanted in r.labels and r.type != wanted))
+        """Return the rooms of a type, then those that have it as a further label."""
+        normal = room_type(kind)
+        first = [room for room in self.rooms if room.type == normal]
+        return (*first, *(r for r in self.rooms if normal in r.labels and r.type != normal))
 
     def object(self, name: str) -> PlacedObject:
         """Return an object by its name.
@@ -299,13 +295,7 @@ class FloorPlan:
         Raises:
             FloorPlanError: The plan has no such object.
         """
-        names = [thing.name for thing in self.objects]
-        if name in names:
-            return self.objects[names.index(name)]
-        raise FloorPlanError(
-            f"{self.name} has no object {name!r}{did_you_mean(name, names)}"
-            f" Its objects are: {', '.join(names) or 'none'}"
-        )
+        return find_named(self.objects, name, self.name, "object")
 
     def objects_of_type(self, kind: str) -> tuple[PlacedObject, ...]:
         """Return the objects of a type, such as `bed`."""

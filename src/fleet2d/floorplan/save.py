@@ -23,13 +23,13 @@ _POINT = re.compile(rf"\[\s+({_NUMBER}),\s+({_NUMBER})\s+\]")
 
 
 def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
-    """Write a plan to a new file; its name says how.
+    """Write a plan to a new file, in the format of its suffix.
 
-    `.json`, `.yaml` and `.yml` are Fleet2D's own format, and reading that at the same cell size
-    gives an equal plan. `.geojson` is for other programs.
+    `.json`, `.yaml` and `.yml` are Fleet2D's own format; reading it at the same cell size gives an
+    equal plan. `.geojson` is for other programs.
 
     Raises:
-        FloorPlanError: The file exists, can't be written, or has another name.
+        FloorPlanError: The file exists, can't be written, or has another suffix.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -52,15 +52,15 @@ def geojson_document(plan: FloorPlan) -> dict[str, Any]:
     features = [_feature(shapely.transform(p, to_metres), "free") for p in plan.polygons]
     for room in plan.rooms:
         cells = MultiPolygon(cell_polygons(plan.room_of_cell == room.index))
-        said = {"name": room.name, "type": room.type, "labels": list(room.labels)}
-        features.append(_feature(shapely.transform(cells, to_metres), "room", **said))
+        properties = {"name": room.name, "type": room.type, "labels": list(room.labels)}
+        features.append(_feature(shapely.transform(cells, to_metres), "room", **properties))
     for door in plan.doorways:
         kind = "door" if door.leaf else "opening"
         features.append(_feature(LineString([door.start, door.end]), kind, name=door.name))
     for thing in plan.objects:
-        said = written_object(thing)
-        del said["footprint"]
-        features.append(_feature(thing.footprint, "object", **said))
+        properties = written_object(thing)
+        del properties["footprint"]
+        features.append(_feature(thing.footprint, "object", **properties))
     features += [_feature(area, "no_go") for area in plan.no_go]
     if plan.entrance is not None:
         features.append(_feature(Point(plan.entrance), "entrance"))
@@ -70,17 +70,17 @@ def geojson_document(plan: FloorPlan) -> dict[str, Any]:
 def _feature(shape: BaseGeometry, kind: str, **properties: Any) -> dict[str, Any]:
     if isinstance(shape, MultiPolygon) and len(shape.geoms) == 1:
         shape = shape.geoms[0]
-    said = {"kind": kind, **properties}
-    return {"type": "Feature", "properties": said, "geometry": mapping(shape)}
+    all_properties = {"kind": kind, **properties}
+    return {"type": "Feature", "properties": all_properties, "geometry": mapping(shape)}
 
 
 def _json(document: dict[str, Any]) -> str:
-    """Write a point to the line."""
+    """Return JSON with one point to a line."""
     return _POINT.sub(r"[\1, \2]", json.dumps(document, indent=1)) + "\n"
 
 
 def _yaml(document: dict[str, Any], path: Path) -> str:
-    """Write a point to the line."""
+    """Return YAML with one point to a line."""
     dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     style: dict[str, Any] = {"default_flow_style": None, "sort_keys": False, "width": 100}
     try:

@@ -1,10 +1,10 @@
-"""Where floor plans come from: the base of their components, and what every file reader needs."""
+"""Sources of floor plans: the base of their components, and helpers that readers of files share."""
 
 import hashlib
 import json
 import math
 from abc import abstractmethod
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -15,30 +15,30 @@ from fleet2d import yaml_tree
 from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
 from fleet2d.component import Component
 from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.floorplan.corrections import RoomCorrection, corrected
-from fleet2d.floorplan.furniture.furnishing import Furnishing, FurniturePiece, furnished
+from fleet2d.floorplan.cache import Cache
+from fleet2d.floorplan.corrections import RoomCorrection, correct_rooms
+from fleet2d.floorplan.furniture.furnishing import Furnishing, FurniturePiece, place_furniture
 from fleet2d.floorplan.home.costmap import CostmapSettings
 from fleet2d.floorplan.home.layers import LayerSettings, check_layers
-from fleet2d.floorplan.kept import Kept
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 from fleet2d.yaml_tree import NodeError
 
-# No home is as large; what is beyond was not written in metres.
+# No home is as large: a coordinate beyond this is not in metres.
 MAX_COORDINATE_M = 100_000.0
 TINY = 1e-12
 
 YAML = (".yaml", ".yml")
-# Homes that a process keeps, read and furnished.
-PLANS_KEPT = 8
+# Homes that a process caches, read and furnished.
+CACHED_PLANS = 8
 
-_PLANS = Kept(PLANS_KEPT)
+_PLANS = Cache(CACHED_PLANS)
 
 
 def keep_plans(count: int) -> None:
-    """Keep so many homes, read and furnished, for later runs."""
-    _PLANS.keep(count)
+    """Cache at least `count` homes, read and furnished, for later runs."""
+    _PLANS.grow(count)
 
 
 Point = tuple[float, float]
@@ -49,9 +49,9 @@ class FloorPlanSource(Component):
 
     Attributes:
         cell: Side of a grid cell, 0.01 m to 1 m.
-        rooms: What rooms are called and used for, where the source is silent or wrong.
+        rooms: Names and types of rooms, where the source has none or a wrong one.
         furniture: Pieces that the scenario places in the home.
-        furnish: Whether rooms without furniture are furnished by rule, or how.
+        furnish: Whether rooms without furniture are furnished by rule, or by which settings.
     """
 
     kind: ClassVar[str] = "floorplan"
@@ -68,7 +68,7 @@ class FloorPlanSource(Component):
         examples=[[{"type": "bed", "at": [2.0, 3.5]}]],
     )
     furnish: bool | Furnishing = Field(
-        default=False, description="furnish the rooms that hold nothing by rule, by their types"
+        default=False, description="furnish rooms without furniture by rule, by their types"
     )
     layers: Annotated[dict[str, LayerSettings], AfterValidator(check_layers)] = Field(
         default={},
@@ -77,7 +77,7 @@ class FloorPlanSource(Component):
         examples=[{"explored": {"every": "1 d"}, "dust": {"unit": "g"}}],
     )
     costmap: CostmapSettings | None = Field(
-        default=None, description="what makes ways of robots dear; null: they take the shortest"
+        default=None, description="costs that routes of robots pay; null: they take the shortest"
     )
 
     @abstractmethod
@@ -89,40 +89,40 @@ class FloorPlanSource(Component):
         """
 
     def plan(self) -> FloorPlan:
-        """Return the floor plan with all that the scenario adds to it.
+        """Return the floor plan with the rooms and furniture that the scenario adds.
 
-        A process reads a home once, as long as its files and what is configured stay the same.
+        A process reads a home only once, as long as its files and settings stay the same.
 
         Raises:
-            FloorPlanError: The file can't be read, is no home, or something doesn't fit into it.
+            FloorPlanError: The file can't be read, is no home, or a piece doesn't fit into it.
         """
-        key = self._content()
+        key = self._cache_key()
         return self._read() if key is None else _PLANS.get(key, self._read)
 
-    def _content(self) -> Hashable:
-        """Return what the plan depends on; None if that isn't known, as of a user's own source."""
+    def _cache_key(self) -> Hashable:
+        """Return all that the plan depends on, or None if that is unknown, as for a plugin."""
         cls = type(self)
         if cls.__module__.partition(".")[0] != "fleet2d":
             return None
         try:
             files = [(path, hashlib.sha256(path.read_bytes()).digest()) for path in self.files()]
         except (OSError, FloorPlanError):
-            return None  # reading it says what is wrong
+            return None  # the reader raises it with its reason
         return cls, self.model_dump_json(exclude={"layers", "costmap"}), tuple(files)
 
     def _read(self) -> FloorPlan:
         rules = Furnishing() if self.furnish is True else self.furnish or None
-        plan = corrected(self.load(), self.rooms)
-        return furnished(plan, self.furniture, rules)
+        plan = correct_rooms(self.load(), self.rooms)
+        return place_furniture(plan, self.furniture, rules)
 
     def files(self) -> list[Path]:
-        """Return the files that it reads: a run notes their content, to be reproducible."""
+        """Return the files that it reads; a run records their content, to be reproducible."""
         path = getattr(self, "path", None)
         return [] if path is None else [Path(path)]
 
 
 class PixelSource(FloorPlanSource):
-    """A source of a floor plan that is made of pixels: their side is the cell, unless one is given.
+    """A source of a floor plan made of pixels; their side is the default of `cell`.
 
     Attributes:
         cell: Side of a grid cell, 0.01 m to 1 m; None for the side of the pixels.
@@ -139,7 +139,7 @@ class PixelSource(FloorPlanSource):
         """Return the side of a cell [m] that suits the pixels.
 
         Args:
-            settings: What the scenario says; `path` is checked, the rest is not.
+            settings: The settings in the scenario; only `path` is validated already.
 
         Raises:
             FloorPlanError: The file can't be read.
@@ -149,7 +149,7 @@ class PixelSource(FloorPlanSource):
     @model_validator(mode="before")
     @classmethod
     def _fill_cell(cls, data: Any) -> Any:
-        """Fill in the cell, so that a stored scenario has it; `load` says what is wrong."""
+        """Fill in the cell, so that a stored scenario has it; errors are left to `load`."""
         if not isinstance(data, Mapping) or data.get("cell") is not None or "path" not in data:
             return data
         try:
@@ -166,7 +166,7 @@ def read_document(path: Path) -> dict[str, Any]:
     """Return the mapping in a YAML file (.yaml, .yml), else the object in a JSON file.
 
     Raises:
-        FloorPlanError: There is no such file, or it doesn't hold that.
+        FloorPlanError: There is no such file, or it holds neither.
     """
     return read_yaml(path) if path.suffix.lower() in YAML else read_json(path)
 
@@ -214,9 +214,9 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return _mapping(content, path, "a YAML mapping of keys and values")
 
 
-def _read_text(path: Path, what: str) -> str:
+def _read_text(path: Path, language: str) -> str:
     if path.is_dir():
-        raise FloorPlanError(f"{path} is a folder: name the floor plan's {what} file in it")
+        raise FloorPlanError(f"{path} is a folder: name the floor plan's {language} file in it")
     try:
         return read_bytes(path, FILE_BYTES, FloorPlanError).decode("utf-8-sig")
     except FileNotFoundError:
@@ -224,15 +224,17 @@ def _read_text(path: Path, what: str) -> str:
     except OSError as error:
         raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise FloorPlanError(f"{path} is not a {what} text file: check floorplan.path") from None
+        raise FloorPlanError(
+            f"{path} is not a {language} text file: check floorplan.path"
+        ) from None
 
 
-def _mapping(content: object, path: Path, wanted: str) -> dict[str, Any]:
+def _mapping(content: object, path: Path, expected: str) -> dict[str, Any]:
     if isinstance(content, dict):
         return content
     kinds = {list: "a list", str: "a text", type(None): "nothing"}
-    found = kinds.get(type(content), "a single value")
-    raise FloorPlanError(f"{path} holds {found}: a floor plan is {wanted}")
+    kind = kinds.get(type(content), "a single value")
+    raise FloorPlanError(f"{path} holds {kind}: a floor plan is {expected}")
 
 
 # --- Values ------------------------------------------------------------------------------------
@@ -242,12 +244,12 @@ def read_numbers(value: object, count: int, where: str) -> tuple[float, ...]:
     """Return `count` coordinates [m] of a JSON list.
 
     Args:
-        value: What the file has.
-        count: How many there must be.
-        where: How an error names the place in the file.
+        value: The value in the file.
+        count: Number of coordinates.
+        where: The place in the file, for messages.
 
     Raises:
-        FloorPlanError: It is not a list of so many finite numbers in a sensible range.
+        FloorPlanError: It is not a list of `count` finite numbers in a sensible range.
     """
     if not isinstance(value, list) or len(value) != count:
         raise FloorPlanError(
@@ -255,8 +257,8 @@ def read_numbers(value: object, count: int, where: str) -> tuple[float, ...]:
         )
     for number in value:
         if isinstance(number, bool) or not isinstance(number, int | float):
-            found = shown_value(number)
-            raise FloorPlanError(f"{where} is {shown_value(value)}: {found} is not a number")
+            wrong = shown_value(number)
+            raise FloorPlanError(f"{where} is {shown_value(value)}: {wrong} is not a number")
         if isinstance(number, float) and not math.isfinite(number):
             raise FloorPlanError(
                 f"{where} is {shown_value(value)}: coordinates must be finite numbers"
@@ -265,16 +267,16 @@ def read_numbers(value: object, count: int, where: str) -> tuple[float, ...]:
             raise FloorPlanError(
                 f"{where} is {shown_value(value)}: too far out for coordinates in metres"
             )
-    return tuple(settled(number) for number in value)
+    return tuple(clean_coordinate(number) for number in value)
 
 
-def settled(number: float) -> float:
-    """Return a coordinate as a float; what is next to nothing is 0, for GEOS divides by it."""
+def clean_coordinate(number: float) -> float:
+    """Return a coordinate as a float, with tiny ones set to 0, since GEOS divides by them."""
     return 0.0 if abs(number) < TINY else float(number)
 
 
 def read_ring(value: object, where: str) -> list[Point]:
-    """Return the corners of a closed outline, none repeated, the first not again at the end.
+    """Return the corners of a closed outline, without repetitions, also of the first at the end.
 
     Raises:
         FloorPlanError: It is not a list of at least three different points.
@@ -297,51 +299,25 @@ def read_ring(value: object, where: str) -> list[Point]:
     return points
 
 
-def distinct_names(names: Sequence[str | None], what: str, notes: list[str]) -> list[str | None]:
-    """Return names with a number after those that came before; what has none keeps none.
-
-    >>> distinct_names(["Bath", "Bath", None, "Bath 2"], "rooms", [])
-    ['Bath', 'Bath 3', None, 'Bath 2']
-    """
-    found: list[str | None] = []
-    wanted, used = set(names), set[str]()
-    number: dict[str, int] = {}
-    for name in names:
-        own = name
-        while (
-            name is not None
-            and own is not None
-            and (own in used or (own != name and own in wanted))
-        ):
-            number[name] = number.get(name, 1) + 1
-            own = f"{name} {number[name]}"
-        if own != name:
-            notes.append(f"several {what} are called {name}: one of them is {own} here")
-        if own is not None:
-            used.add(own)
-        found.append(own)
-    return found
-
-
 def shown_value(value: object) -> str:
-    """Return what a file has, for a message: as in JSON, and cut where it is long.
+    """Return a value of a file for a message: as JSON, cut if it is long.
 
     >>> shown_value([True, None, "x" * 100])
     '[true, null, "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx...'
     """
-    text = _json(value, 3)
+    text = _json_head(value, 3)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _json(value: object, depth: int) -> str:
-    """Write the beginning of a value; however large and deep it is, that is quick."""
+def _json_head(value: object, depth: int) -> str:
+    """Return the beginning of a value as JSON, quickly however large or deep the value is."""
     if isinstance(value, list | dict) and value and depth == 0:
         return "[…]" if isinstance(value, list) else "{…}"
     if isinstance(value, list):
-        return f"[{', '.join(_json(item, depth - 1) for item in value[:30])}]"
+        return f"[{', '.join(_json_head(item, depth - 1) for item in value[:30])}]"
     if isinstance(value, dict):
         first = list(value.items())[:30]
-        pairs = (f"{_json(key, 0)}: {_json(item, depth - 1)}" for key, item in first)
+        pairs = (f"{_json_head(key, 0)}: {_json_head(item, depth - 1)}" for key, item in first)
         return f"{{{', '.join(pairs)}}}"
     if isinstance(value, int) and abs(value) >= 10**60:
         return f"a whole number of {value.bit_length()} bits"

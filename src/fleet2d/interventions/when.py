@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from fleet2d.clock import Clock
 from fleet2d.component import Settings
 from fleet2d.events import Event
-from fleet2d.floorplan.home.change import parse_moment, written_moment
+from fleet2d.floorplan.home.change import format_moment, parse_moment
 from fleet2d.problems import problem, shown
 from fleet2d.units import format_time_of_day, parse_time_of_day
 from fleet2d.weekdays import weekdays_of
@@ -67,7 +67,7 @@ def parse_when(value: object) -> datetime | timedelta | ClockTime:
 
 
 def _written(when: datetime | timedelta | ClockTime) -> str:
-    return when.text if isinstance(when, ClockTime) else written_moment(when)
+    return when.text if isinstance(when, ClockTime) else format_moment(when)
 
 
 When = Annotated[

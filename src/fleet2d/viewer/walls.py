@@ -6,7 +6,7 @@ from typing import Any
 
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
-from fleet2d.floorplan.arrangement import moved
+from fleet2d.floorplan.arrangement import move_object
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels.mesh import Mesh
@@ -91,7 +91,7 @@ class WallsHistory:
             thing = self._home.object(place[1])
             to = (float(place[2]), float(place[3]))
             try:
-                self._home.put(moved(thing, self._home.plan.lattice, to, 0.0))
+                self._home.put(move_object(thing, self._home.plan.lattice, to, 0.0))
             except Fleet2DError:
                 return
         else:

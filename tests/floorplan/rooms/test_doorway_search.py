@@ -1,5 +1,7 @@
 """Passages: where free space narrows, and opens out again."""
 
+import math
+
 import numpy as np
 import pytest
 import shapely
@@ -9,12 +11,13 @@ from shapely import Polygon
 
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.rooms.doorway_search import Passage, find_passages
+from fleet2d.floorplan.rooms.doorway_search import MAX_DOOR_M, MIN_DOOR_M, find_passages
+from fleet2d.floorplan.rooms.doorways import Segment
 
 UNITS = 1280.0
 
 
-def passages(free: Polygon, *, gaps_only: bool = True) -> list[Passage]:
+def passages(free: Polygon, *, gaps_only: bool = True) -> list[Segment]:
     """Search free space in metres, with corners on multiples of 5 cm and all above zero."""
     polygon = shapely.orient_polygons(shapely.transform(free, lambda xy: np.rint(xy * 20) * 64))
     assert isinstance(polygon, Polygon)
@@ -22,8 +25,14 @@ def passages(free: Polygon, *, gaps_only: bool = True) -> list[Passage]:
     return find_passages(mesh, [polygon], UNITS, gaps_only=gaps_only)
 
 
-def ends(passage: Passage) -> set[tuple[float, float]]:
-    return {(x / UNITS, y / UNITS) for x, y in passage.segment}
+def ends(passage: Segment) -> set[tuple[float, float]]:
+    return {(x / UNITS, y / UNITS) for x, y in passage}
+
+
+def width(passage: Segment) -> float:
+    """The distance between the ends in metres."""
+    (x0, y0), (x1, y1) = passage
+    return math.hypot(x1 - x0, y1 - y0) / UNITS
 
 
 def rooms(*boxes: tuple[float, float, float, float]) -> Polygon:
@@ -36,29 +45,28 @@ LEFT, RIGHT = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.0, 4.0)
 
 
 def test_gap_between_two_rooms_is_a_doorway_between_its_jambs() -> None:
-    (found,) = passages(rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.9)))
+    (passage,) = passages(rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.9)))
 
-    assert found.is_doorway
-    assert 0.9 == pytest.approx(found.width_m)
-    assert ends(found) in ({(4.0, 2.0), (4.0, 2.9)}, {(4.1, 2.0), (4.1, 2.9)})
+    assert 0.9 == pytest.approx(width(passage))
+    assert ends(passage) in ({(4.0, 2.0), (4.0, 2.9)}, {(4.1, 2.0), (4.1, 2.9)})
 
 
 def test_gap_beside_a_wall_ends_at_the_foot_on_that_wall() -> None:
     """The outer wall runs on: there is no corner for the second jamb."""
     stub = shapely.box(4.0, 1.9, 4.1, 4.0)
 
-    (found,) = passages(shapely.difference(shapely.box(1, 1, 7, 4), stub))
+    (passage,) = passages(shapely.difference(shapely.box(1, 1, 7, 4), stub))
 
-    assert ends(found) in ({(4.0, 1.9), (4.0, 1.0)}, {(4.1, 1.9), (4.1, 1.0)})
+    assert ends(passage) in ({(4.0, 1.9), (4.0, 1.0)}, {(4.1, 1.9), (4.1, 1.0)})
 
 
 def test_jambs_on_a_slanted_wall_are_within_a_unit_of_it() -> None:
     slanted = Polygon([(1, 1), (7, 1.3), (7, 4), (1, 4)])
     stub = shapely.box(4.0, 2.0, 4.1, 5.0)
 
-    (found,) = passages(shapely.difference(slanted, stub))
+    (passage,) = passages(shapely.difference(slanted, stub))
 
-    (x, y) = min(ends(found), key=lambda end: end[1])
+    (x, y) = min(ends(passage), key=lambda end: end[1])
     assert 1 + 0.3 * (x - 1) / 6 == pytest.approx(y, abs=2 / UNITS)
 
 
@@ -77,26 +85,28 @@ def test_space_that_narrows_nowhere_has_no_passage(free: Polygon) -> None:
     assert [] == passages(free)
 
 
-@pytest.mark.parametrize(
-    ("width", "doorway"), [(0.4, None), (0.5, True), (1.4, True), (1.5, False)]
-)
-def test_width_tells_doorways_from_openings_and_cracks(width: float, doorway: bool | None) -> None:
-    found = passages(rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.0 + width)))
+@pytest.mark.parametrize("gap", [0.4, 0.5, 1.4, 1.5])
+def test_width_tells_doorways_from_openings_and_cracks(gap: float) -> None:
+    free = rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.0 + gap))
 
-    assert ([] if doorway is None else [doorway]) == [p.is_doorway for p in found]
+    lines = passages(free)
+    plan = FloorPlan.build("two rooms", free, doorways=None, regions_are="none")
+
+    assert ([] if gap < MIN_DOOR_M else [pytest.approx(gap)]) == [width(line) for line in lines]
+    assert (MIN_DOOR_M <= gap <= MAX_DOOR_M) == bool(plan.doorways)
 
 
 def test_thick_wall_has_one_doorway() -> None:
     assert 1 == len(passages(rooms((1, 1, 4, 4), (4.4, 1, 7, 4), (4.0, 2.0, 4.4, 2.9))))
 
 
-def test_opening_that_is_no_gap_in_a_wall_counts_only_where_asked_for() -> None:
+def test_opening_that_is_no_gap_in_a_wall_counts_only_on_request() -> None:
     """The way from the end of one wall to that of another is in line with neither."""
     walls = shapely.union_all([shapely.box(0, 4, 4, 4.1), shapely.box(5.5, 0, 5.6, 3)])
     free = shapely.difference(shapely.box(1, 1, 10, 7), walls)
 
     assert [] == passages(free)
-    assert [False] == [p.is_doorway for p in passages(free, gaps_only=False)][:1]
+    assert MAX_DOOR_M < width(passages(free, gaps_only=False)[0])
 
 
 def test_moved_and_mirrored_plan_has_the_same_passages() -> None:
@@ -105,7 +115,7 @@ def test_moved_and_mirrored_plan_has_the_same_passages() -> None:
 
     (one,), (other,) = passages(free), passages(mirrored)
 
-    assert one.width_m == other.width_m
+    assert width(one) == width(other)
 
 
 @st.composite

@@ -13,8 +13,8 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.synthetic.generator import House, Style, generate
-from fleet2d.floorplan.synthetic.geometry import Box, inner_walls, overlap
-from fleet2d.floorplan.synthetic.judge import MOST_CORRIDOR, outline_corners, outline_kind
+from fleet2d.floorplan.synthetic.geometry import Box, boxes_overlap, inner_walls
+from fleet2d.floorplan.synthetic.judge import MAX_CORRIDOR_SHARE, outline_corners, outline_kind
 from fleet2d.floorplan.synthetic.program import SIZES, Wishes
 from fleet2d.floorplan.synthetic.source import Synthetic
 
@@ -90,11 +90,11 @@ def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed: i
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rooms_are_of_sensible_shapes_and_the_kitchen_is_by_where_people_eat(seed: int) -> None:
     house = house_of(seed)
-    assert not overlap(house.boxes)
+    assert not boxes_overlap(house.boxes)
     for box in house.boxes:
         assert min(box.clear) >= 20 * SIZES[house.briefs[box.room].kind].side
     halls = sum(b.clear_area for b in house.boxes if house.briefs[b.room].kind == "hallway")
-    assert halls <= MOST_CORRIDOR * sum(box.clear_area for box in house.boxes)
+    assert halls <= MAX_CORRIDOR_SHARE * sum(box.clear_area for box in house.boxes)
     plan = home(seed)
     kinds = [{plan.rooms[i].type for i in door.rooms} for door in plan.doorways]
     assert {"kitchen", "living_room"} in kinds or {"kitchen", "dining_room"} in kinds
@@ -200,9 +200,9 @@ def test_walls_between_boxes_are_where_they_touch() -> None:
 
 def test_areas_spread_as_those_of_real_homes_do() -> None:
     from fleet2d.floorplan.synthetic.draws import Choices
-    from fleet2d.floorplan.synthetic.program import settle
+    from fleet2d.floorplan.synthetic.program import settle_wishes
 
-    areas = sorted(settle(Wishes(), Choices(seed, "wishes")).area_m2 for seed in range(800))
+    areas = sorted(settle_wishes(Wishes(), Choices(seed, "wishes")).area_m2 for seed in range(800))
     quartiles = np.percentile(areas, [25, 50, 75]).tolist()
     assert [89, 141, 206] == pytest.approx(quartiles, rel=0.08)
     assert all(low <= high for low, high in pairwise(areas))

@@ -8,7 +8,7 @@ import shapely
 from numpy.typing import NDArray
 
 from fleet2d.entities.robots.viewpoints import sight_range
-from fleet2d.floorplan.kept import read_only
+from fleet2d.floorplan.cache import read_only
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
 
@@ -55,7 +55,7 @@ class HangoutPlaces:
         # The key has all that the places depend on: robots of other runs in this home share them.
         body = actor.space, actor.part, actor.entity.radius
         self._key = (*body, people, home.objects, avoid, off_doors)
-        self.points, self.room, seats, self.block, self.prox = home.kept(
+        self.points, self.room, seats, self.block, self.prox = home.cached(
             ("places", *self._key), lambda: self._lay_out(avoid, off_doors)
         )
         self._seats = dict(enumerate(seats))
@@ -76,7 +76,7 @@ class HangoutPlaces:
         actor = self._actor
         key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), actor.speed)
         # In column order: it is read room by room.
-        return actor.home.kept(
+        return actor.home.cached(
             key, lambda: read_only(np.asfortranarray(self._compute_nearness(by, tau)))
         )
 

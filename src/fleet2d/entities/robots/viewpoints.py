@@ -50,7 +50,7 @@ def viewpoints_of(actor: "Actor", room: "Room", enough: float, most: int) -> Vie
     """
     home, space = actor.home, actor.space
     key = "views", home.walls, space, actor.part, sight_range(actor), room.index, enough, most
-    return home.kept(key, lambda: _choose_viewpoints(actor, room, enough, most))
+    return home.cached(key, lambda: _choose_viewpoints(actor, room, enough, most))
 
 
 def _choose_viewpoints(actor: "Actor", room: "Room", enough: float, most: int) -> Viewpoints:

@@ -86,7 +86,7 @@ class Spots:
             self._of_room.clear()
         if room.index not in self._of_room:
             space, part = self._actor.space, self._actor.part
-            grid = self._actor.home.kept(
+            grid = self._actor.home.cached(
                 ("spots", space, part, room.index, self.members), lambda: self._grid(room)
             )
             own = _shared(grid, self.rank, self.members)

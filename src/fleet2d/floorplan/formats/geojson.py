@@ -14,6 +14,7 @@ from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.geojson_file import Feature, Move, Units, in_metres, read_features
 from fleet2d.floorplan.formats.native import read_blocks, read_uses
+from fleet2d.floorplan.names import distinct_names
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
@@ -25,7 +26,7 @@ from fleet2d.floorplan.rooms.passage import (
     shared_borders,
 )
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, UNKNOWN, room_type, usual_type
-from fleet2d.floorplan.source import FloorPlanSource, distinct_names, read_json, read_numbers
+from fleet2d.floorplan.source import FloorPlanSource, read_json, read_numbers
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
@@ -259,11 +260,11 @@ class _Draft:
 
     def _entrance(self) -> tuple[float, float] | None:
         """Return the place just inside the front door, if the file tells."""
-        given = [feature.shape for feature in self._of("entrance")]
-        if given:
-            if len(given) > 1:
-                self.notes.append(f"it has {len(given)} entrances: the first was taken")
-            at = given[0].centroid
+        shapes = [feature.shape for feature in self._of("entrance")]
+        if shapes:
+            if len(shapes) > 1:
+                self.notes.append(f"it has {len(shapes)} entrances: the first was taken")
+            at = shapes[0].centroid
         elif len(self.ways_out) == 1:
             at = shapely.Point(self.ways_out[0].inside(INSIDE_M))
         else:

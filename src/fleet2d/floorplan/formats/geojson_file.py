@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.bounds import POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.rooms.vocabulary import room_type
-from fleet2d.floorplan.source import MAX_COORDINATE_M, settled, shown_value
+from fleet2d.floorplan.source import MAX_COORDINATE_M, clean_coordinate, shown_value
 from fleet2d.problems import did_you_mean
 
 COLLECTION = "FeatureCollection"
@@ -274,7 +274,7 @@ def _place(value: object, where: str) -> tuple[float, float]:
         if not sensible or not abs(number) <= FARTHEST:
             found = shown_value(number)
             raise FloorPlanError(f"{where} is {shown_value(value)}: {found} is no coordinate")
-    return settled(value[0]), settled(value[1])
+    return clean_coordinate(value[0]), clean_coordinate(value[1])
 
 
 def _listed(value: object, where: str) -> list[tuple[object, str]]:

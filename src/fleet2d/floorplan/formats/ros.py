@@ -269,8 +269,8 @@ def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -
 
 def _chosen(shades: NDArray[np.bool_], picture: GreyPicture) -> NDArray[np.bool_]:
     """Return the opaque pixels of some shades."""
-    chosen: NDArray[np.bool_] = shades[picture.values]
-    return chosen if picture.clear is None else chosen & ~picture.clear
+    opaque: NDArray[np.bool_] = shades[picture.values]
+    return opaque if picture.clear is None else opaque & ~picture.clear
 
 
 def _simplified(free: Polygon, tolerance: float, notes: list[str]) -> Polygon:

@@ -35,10 +35,11 @@ from fleet2d.floorplan.formats.valetudo_file import (
     read_layers,
     read_points,
 )
+from fleet2d.floorplan.names import distinct_names
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, usual_type
-from fleet2d.floorplan.source import PixelSource, distinct_names, read_json
+from fleet2d.floorplan.source import PixelSource, read_json
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
 from fleet2d.paths import InputPath
@@ -330,5 +331,5 @@ def _note_entities(content: dict[str, Any], notes: list[str]) -> None:
     for kind in ("path", "charger_location", "robot_position", "no_go_area", "virtual_wall"):
         counts.pop(kind, None)
     if counts:
-        found = ", ".join(f"{kind} ({count})" for kind, count in counts.items())
-        notes.append(f"also in the map, without effect on the plan: {found}")
+        listed = ", ".join(f"{kind} ({count})" for kind, count in counts.items())
+        notes.append(f"also in the map, without effect on the plan: {listed}")

@@ -1,4 +1,4 @@
-"""The furniture catalogue: how large each type is, what it blocks, and where to use it from."""
+"""The furniture catalogue: the sizes of each type, what it blocks, and where to use it from."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,12 +23,12 @@ class Use:
     A piece faces `ahead`; `left` is a quarter turn counter-clockwise from there.
 
     Attributes:
-        posture: Whether one stands, sits or lies there.
+        posture: Whether a person stands, sits or lies there.
         ahead: Share of the depth in front of the middle: -0.5 is the back, 0.5 the front.
         left: Share of the width to the left of the middle: 0.5 is the left side.
-        ahead_m: And so many metres further ahead.
-        left_m: And so many metres further to the left.
-        facing: Where the person faces, headings (4096 to a turn) from where the piece faces.
+        ahead_m: Further distance ahead [m].
+        left_m: Further distance to the left [m].
+        facing: Direction of the person relative to the piece, headings (4096 to a turn).
     """
 
     posture: Posture
@@ -45,11 +45,11 @@ class Furniture:
 
     Attributes:
         type: Its name, as scenarios and files spell it.
-        width: How wide it is from left to right, least and most [m].
-        depth: How deep it is from back to front, least and most [m].
+        width: Least and largest extent from left to right [m].
+        depth: Least and largest extent from back to front [m].
         blocks: What can't pass: nothing, bodies (`path`), or bodies and sight (`sight`).
         wall: Whether its back stands against a wall.
-        front_m: How much floor is kept free before it [m].
+        front_m: Depth of the floor before it that stays empty [m].
         uses: Where to use it from.
     """
 
@@ -119,7 +119,7 @@ _CATALOGUE = (
 # fmt: on
 
 FURNITURE = MappingProxyType({furniture.type: furniture for furniture in _CATALOGUE})
-"""Every type of furniture by name."""
+"""The types of furniture by name."""
 
 
 def furniture_type(name: str) -> Furniture:
@@ -155,9 +155,9 @@ def stand_furniture(
         kind: Its type in the catalogue.
         at: The middle of its footprint (x, y) [m].
         heading: Where its front faces, headings (4096 to a turn) counter-clockwise from +x.
-        size: Its width and depth [m]; None for the middle of what is usual.
+        size: Its width and depth [m]; None for the middle of its type's ranges.
         name: Its name; empty to be numbered by type.
-        blocks: What can't pass; None for what is usual.
+        blocks: What can't pass; None for its type's usual.
 
     Raises:
         FloorPlanError: There is no such type.
@@ -169,20 +169,20 @@ def stand_furniture(
     """
     model = furniture_type(kind)
     width, depth = size if size is not None else (sum(model.width) / 2, sum(model.depth) / 2)
-    # The unit vectors are from a table: the same place on every machine.
+    # The unit vectors come from a table, so that places are the same on every machine.
     forward = (cosine(heading) / UNIT, sine(heading) / UNIT)
 
-    def moved(ahead: float, left: float) -> Point:
+    def place(ahead: float, left: float) -> Point:
         return (
             at[0] + ahead * forward[0] - left * forward[1],
             at[1] + ahead * forward[1] + left * forward[0],
         )
 
     ahead, left = depth / 2, width / 2
-    corners = [moved(-ahead, left), moved(-ahead, -left), moved(ahead, -left), moved(ahead, left)]
+    corners = [place(-ahead, left), place(-ahead, -left), place(ahead, -left), place(ahead, left)]
     uses = []
     for use in model.uses:
-        x, y = moved(use.ahead * depth + use.ahead_m, use.left * width + use.left_m)
+        x, y = place(use.ahead * depth + use.ahead_m, use.left * width + use.left_m)
         facing = float(in_radians((heading + use.facing) % TURN))
         uses.append(UsePlace(x, y, facing, use.posture))
     return PlacedObject(

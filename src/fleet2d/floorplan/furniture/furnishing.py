@@ -1,4 +1,4 @@
-"""Furniture that a scenario asks for: pieces that it places itself, and the rest by rule."""
+"""Furniture in a scenario: pieces at places of its choice, and more by rule."""
 
 from dataclasses import replace
 from typing import Self
@@ -27,7 +27,7 @@ class Furnishing(Settings):
 
     seed: int = Field(default=0, ge=0, description="which of the many ways to furnish the home")
     density: float = Field(
-        default=1.0, ge=0, le=10, description="how likely is what one can do without; 0: none of it"
+        default=1.0, ge=0, le=10, description="how likely optional pieces are; 0: none of them"
     )
 
 
@@ -52,7 +52,7 @@ class FurniturePiece(Settings):
     )
 
     @model_validator(mode="after")
-    def _is_known(self) -> Self:
+    def _check_type(self) -> Self:
         if self.type not in FURNITURE:
             raise problem_at(
                 ("type",),
@@ -63,7 +63,7 @@ class FurniturePiece(Settings):
         return self
 
     def stand(self) -> PlacedObject:
-        """Return the piece, with places to use it from that nobody has checked yet."""
+        """Return the piece as an object, with unchecked places to use it from."""
         heading = round(self.heading_deg / 360 * TURN) % TURN
         size, blocks = self.size, self.blocks
         return stand_furniture(
@@ -71,10 +71,10 @@ class FurniturePiece(Settings):
         )
 
 
-def furnished(
+def place_furniture(
     plan: FloorPlan, pieces: tuple[FurniturePiece, ...], rules: Furnishing | None
 ) -> FloorPlan:
-    """Return a plan with the pieces that a scenario places, and the rest by rule if asked for.
+    """Return a plan with the pieces of a scenario, and more by `rules`, if any.
 
     Raises:
         FloorPlanError: A piece stands outside the home or in a wall, or two have the same name.
@@ -91,7 +91,7 @@ def furnished(
 
 
 def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
-    """Raise FloorPlanError unless a thing stands in free space."""
+    """Raise FloorPlanError unless an object stands in free space."""
     middle = thing.footprint.centroid
     at = f"the {thing.type} at ({middle.x:g}, {middle.y:g}) m"
     x0, y0, x1, y1 = plan.bounds
@@ -103,13 +103,8 @@ def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
         )
     lost = shapely.difference(thing.footprint.buffer(-INTO_WALL), free).area
     if lost > 0:
-        wide, deep = (b - a for a, b in zip(*_corners(thing), strict=True))
+        x0, y0, x1, y1 = thing.footprint.bounds
         raise FloorPlanError(
-            f"{where}: {at} overlaps a wall of {plan.name}: its box is {wide:.2f} m x {deep:.2f} m;"
-            " move it, turn it (heading_deg), or give it another size"
+            f"{where}: {at} overlaps a wall of {plan.name}: its box is {x1 - x0:.2f} m x"
+            f" {y1 - y0:.2f} m; move it, turn it (heading_deg), or give it another size"
         )
-
-
-def _corners(thing: PlacedObject) -> tuple[tuple[float, float], tuple[float, float]]:
-    x0, y0, x1, y1 = thing.footprint.bounds
-    return (x0, y0), (x1, y1)

@@ -1,4 +1,4 @@
-"""A home while furniture is put into it, on its cells: what is free, and which ways stay open."""
+"""A home while furniture is put into it: its free cells, and the routes that must stay open."""
 
 from functools import cached_property
 
@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.furniture.room_view import (
-    Group,
+    FurnitureGroup,
     RoomView,
     Score,
     count_cells,
@@ -23,7 +23,7 @@ from fleet2d.kernels.masks import label_parts
 from fleet2d.streams import Draws
 
 DOOR_CLEARANCE = 0.9
-"""Floor that is kept free before a doorway, to either side [m]."""
+"""Depth of the floor before a doorway that stays empty, on either side [m]."""
 
 Bool = NDArray[np.bool_]
 
@@ -33,8 +33,8 @@ class Interior:
 
     Attributes:
         plan: The home.
-        objects: What stands in it, what the plan brings first.
-        standing: Where the middle of a body can be among them, bool (rows, columns).
+        objects: The objects in it, those of the plan first.
+        standing: Cells where the middle of a body can be, bool (rows, columns).
     """
 
     def __init__(self, plan: FloorPlan) -> None:
@@ -43,45 +43,47 @@ class Interior:
         self.standing: Bool = Space(plan, BODY_RADIUS).part_of_cell >= 0
         self.whole = whole_cells(plan)
         self.doors = door_cells(plan, self.standing)
-        self.taken = np.zeros_like(self.whole)
+        self.occupied = np.zeros_like(self.whole)
         self._views: dict[int, RoomView] = {}
         self._main: dict[int, Bool] = {}
         self._approached = np.zeros_like(self.whole)
         for thing in plan.objects:
             window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
-            self.taken[window] |= covered
+            self.occupied[window] |= covered
             if thing.blocks != "nothing":
                 window, covered = grown_cells(plan.lattice, thing.footprint, BODY_RADIUS)
                 self.standing[window] &= ~covered
         for thing in plan.objects:
-            self._keep(thing)
+            self._record(thing)
 
-    def place(self, room: Room, group: Group, draws: Draws, score: Score | None = None) -> bool:
-        """Put a group into a room if there is a place for it.
+    def place(
+        self, room: Room, group: FurnitureGroup, draws: Draws, score: Score | None = None
+    ) -> bool:
+        """Put a group into a room; return whether there was a place for it.
 
         Args:
             room: The room.
-            group: What to put there.
-            draws: What decides among good places.
-            score: More points for some places, see `RoomView.places`.
+            group: The group.
+            draws: The stream that chooses among good places.
+            score: Further points for places, see `RoomView.places`.
         """
         view = self.view(room)
-        for turn, row, column in view.places(group, self.taken, draws, score):
+        for turn, row, column in view.places(group, self.occupied, draws, score):
             things = view.pieces(group, turn, row, column)
-            if things and self._fits(view, things):
+            if things and self._add(view, things):
                 window = view.rectangle(group, turn, row, column)
-                self.taken[window] = True
+                self.occupied[window] = True
                 return True
         return False
 
     def view(self, room: Room) -> RoomView:
-        """Return a room as its walls see it."""
+        """Return the view of a room."""
         if room.index not in self._views:
             self._views[room.index] = RoomView(self.plan, room, self.whole, self.doors)
         return self._views[room.index]
 
-    def _fits(self, view: RoomView, things: list[PlacedObject]) -> bool:
-        """Add things if they stand free, can be used, and cut nobody's way."""
+    def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
+        """Add objects if they stand in free space, are usable and cut no route; return whether."""
         for thing in things:
             if not shapely.covers(self._inside, thing.footprint):
                 return False
@@ -99,16 +101,16 @@ class Interior:
             self.standing[view.window] = before
             return False
         for thing in usable:
-            self._keep(thing)
+            self._record(thing)
         return True
 
     def _ways_stay_open(self, view: RoomView, before: Bool, grown: list[Window]) -> bool:
-        """Tell whether what was joined still is, and the room can still be entered.
+        """Return whether connected cells still are, and the room can still be entered.
 
         Args:
             view: The room.
-            before: Where a body could stand in its window.
-            grown: Where that has changed.
+            before: Cells of its window where a body could stand, before the objects were added.
+            grown: The windows in which that has changed.
         """
         after = self.standing[view.window]
         if bool((self._approached[view.window] & ~after).any()):
@@ -117,12 +119,12 @@ class Interior:
             return False
         if not grown:
             return True
-        # What stays joined close by stays joined; else there may be a way farther off.
-        near = tuple(_round([w[k] for w in grown], view.window[k].start) for k in (0, 1))
+        # Cells that stay connected near by stay so; otherwise a route may lead farther around.
+        near = tuple(_hull([w[k] for w in grown], view.window[k].start) for k in (0, 1))
         return not _split(before[near], after[near], 0) or not _split(before, after, view.pocket)
 
     def _usable(self, view: RoomView, things: list[PlacedObject]) -> list[PlacedObject] | None:
-        """Return the things with ways to use them, or None if one can't be used."""
+        """Return the objects with reachable places to use them, or None if one has none."""
         usable, everything = [], [*self.objects, *things]
         for thing in things:
             reachable = with_approaches(self.plan, thing, self._reached(view), everything)
@@ -132,17 +134,17 @@ class Interior:
         return usable
 
     def _reached(self, view: RoomView) -> Bool:
-        """Return the standing room of a room and round it that hangs together."""
+        """Return the largest connected part of the standing cells in and around a room."""
         index = view.room.index
         if index not in self._main:
             self._main[index] = np.zeros_like(self.standing)
             main = largest_part(self.standing[view.window], view.inside)
             self._main[index][view.window] = main
-        # It is never split, so what is left of it still hangs together.
+        # It is never split, so the rest of it is still connected.
         return self._main[index] & self.standing
 
-    def _keep(self, thing: PlacedObject) -> None:
-        """Note a thing, and the ways to it as what nothing may be put on."""
+    def _record(self, thing: PlacedObject) -> None:
+        """Record an object, and the cells from which it is used, which must stay free."""
         lattice = self.plan.lattice
         self.objects.append(thing)
         for use in thing.uses:
@@ -159,20 +161,20 @@ class Interior:
         return inside
 
 
-def _round(slices: list[slice], start: int) -> slice:
-    """Return the slice that holds others and one cell more to either side, counted from a start."""
+def _hull(slices: list[slice], start: int) -> slice:
+    """Return the slice, relative to a start, that holds others and one more cell on either side."""
     first, last = min(s.start for s in slices) - 1, max(s.stop for s in slices) + 1
     return slice(max(first - start, 0), last - start)
 
 
 def _split(before: Bool, after: Bool, pocket: int) -> bool:
-    """Tell whether a part of a mask was cut in two, or lost although larger than a pocket."""
+    """Return whether a part of a mask was split, or one larger than a pocket was lost."""
     old, new = (label_parts(np.ascontiguousarray(mask), False) for mask in (before, after))
     parts = int(old.max()) + 1
-    whose, now = old[after], new[after]
+    old_part, new_part = old[after], new[after]
     becomes = np.full(parts, -1, np.int64)
-    becomes[whose] = now
-    if bool((becomes[whose] != now).any()):
+    becomes[old_part] = new_part
+    if bool((becomes[old_part] != new_part).any()):
         return True
     sizes = np.bincount(old[before], minlength=parts)
     return bool(((becomes < 0) & (sizes > pocket)).any())
@@ -181,8 +183,8 @@ def _split(before: Bool, after: Bool, pocket: int) -> bool:
 def whole_cells(plan: FloorPlan) -> Bool:
     """Return the free cells that no wall cuts, bool (rows, columns).
 
-    Walls are followed in steps of a quarter of a cell, so a wall that only nicks the corner of a
-    cell may be missed.
+    Walls are sampled in steps of a quarter of a cell, so a wall that only cuts the corner of a cell
+    may be missed.
     """
     cells: Bool = plan.free.copy()
     for polygon in plan.polygons:
@@ -204,19 +206,19 @@ def whole_cells(plan: FloorPlan) -> Bool:
 def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
     """Return the cells before doorways and before borders that rooms share, bool (rows, columns).
 
-    A border counts where a body can walk across it (`standing` on either side, and an arm's length
-    beside): it is the doorway of a plan that names none.
+    A border counts where a body can walk across it (`standing` on either side, and two radii
+    beside): it is the doorway of a plan without doorways.
     """
     cell = plan.lattice.cell
     reach, beside = count_cells(cell, DOOR_CLEARANCE), count_cells(cell, 2 * BODY_RADIUS)
-    out = np.zeros_like(plan.free)
+    cells = np.zeros_like(plan.free)
     for turn in range(4):
-        rooms, stood = np.rot90(plan.room_of_cell, turn), np.rot90(standing, turn)
-        free, zone = np.rot90(plan.free, turn), np.rot90(out, turn)
+        rooms, can_stand = np.rot90(plan.room_of_cell, turn), np.rot90(standing, turn)
+        free, zone = np.rot90(plan.free, turn), np.rot90(cells, turn)
         border = np.zeros_like(free)
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
-        crossed[1:] &= stood[1:] & stood[:-1]
+        crossed[1:] &= can_stand[1:] & can_stand[:-1]
         seeds = border & (crossed | near(crossed, beside, 1) | near(crossed, -beside, 1))
         seeds |= np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn)
         for _ in range(reach):
@@ -227,13 +229,13 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
         xs, ys = plan.lattice.centre_axes()
         x, y = plan.lattice.point_at(plan.entrance)
         units = int(DOOR_CLEARANCE * plan.lattice.units_per_m)
-        out |= (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 < units * units
-    return out
+        cells |= (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 < units * units
+    return cells
 
 
 def _doorway_cells(plan: FloorPlan, *, upright: bool) -> Bool:
-    """Return the free cells along the doorways that one passes along x (upright) or along y."""
-    out = np.zeros_like(plan.free)
+    """Return the free cells along the doorways that are passed along x (upright) or along y."""
+    cells = np.zeros_like(plan.free)
     for door in plan.doorways:
         start, end = plan.lattice.to_lattice([door.start, door.end])
         along = np.abs(end - start)
@@ -242,5 +244,5 @@ def _doorway_cells(plan: FloorPlan, *, upright: bool) -> Bool:
         steps = int(along.max()) // (UNITS_PER_CELL // 4) + 1
         share = np.arange(steps + 1)[:, None]
         at = (start * (steps - share) + end * share) // steps // UNITS_PER_CELL
-        out[at[:, 1], at[:, 0]] = True
-    return out & plan.free
+        cells[at[:, 1], at[:, 0]] = True
+    return cells & plan.free

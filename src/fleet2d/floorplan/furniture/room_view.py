@@ -1,4 +1,4 @@
-"""Where groups of furniture could stand in a room, seen with each of its walls at the bottom."""
+"""Places for groups of furniture in a room, searched with each of its walls as the base."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -16,17 +16,17 @@ from fleet2d.kernels.headings import QUARTER, TURN
 from fleet2d.kernels.masks import label_parts
 from fleet2d.streams import Draws
 
-# A wall counts as behind a piece if it is no farther than this [m]: steps of jagged walls.
+# Largest distance of a wall behind a piece, to allow for the steps of jagged walls [m].
 WALL_REACH = 0.15
-# Part of its back, in tenths, that a piece against a wall has there.
-BACKED = 8
-# How many places are tried for a group before it is left out.
+# Least part of its back that a piece against a wall has there, in tenths.
+MIN_BACKED = 8
+# Number of places that are tried for a group before it is left out.
 ATTEMPTS = 10
-# Points by which a place may fall short of the best and be taken for variety.
+# A place may have this many points less than the best, for variety.
 VARIETY = 8
-# A part of the standing room that is smaller is nobody's way.
+# A smaller part of the floor may be cut off from the rest.
 POCKET_M2 = 0.06
-# Beyond this it doesn't matter how far from a door a bed stands [m].
+# Distance from a door beyond which more distance earns no points [m].
 FAR_M = 3.0
 
 Bool = NDArray[np.bool_]
@@ -40,11 +40,11 @@ class Piece:
 
     Attributes:
         type: Its type in the catalogue.
-        left: Where its footprint begins, from the group's left corner [m].
-        ahead: And from the group's back [m].
+        left: Distance of its footprint from the group's left corner [m].
+        ahead: Distance of its footprint from the group's back [m].
         width: Extent of the footprint along the back [m].
-        depth: And away from it [m].
-        turn: Where it faces, quarter turns counter-clockwise from away from the group's back.
+        depth: Extent of the footprint away from the back [m].
+        turn: Direction of its front, quarter turns counter-clockwise from that of the group.
     """
 
     type: str
@@ -56,17 +56,17 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Group:
-    """Pieces that are placed together, in a rectangle of floor that nothing else is put on.
+class FurnitureGroup:
+    """Pieces that are placed together, in a rectangle of floor that they have for themselves.
 
     Attributes:
         width: Extent along the back [m].
-        depth: And away from it [m].
-        pieces: What is in it.
-        wall: Whether its back is to be against a wall.
-        front: Floor before it that nothing is put on [m].
-        corner: How much it likes a corner, in points.
-        away: How much it likes to be far from doors, in points.
+        depth: Extent away from the back [m].
+        pieces: Its pieces.
+        wall: Whether its back must be against a wall.
+        front: Depth of the floor before it that stays empty [m].
+        corner: Points for a place in a corner.
+        away: Points for a place far from doors.
     """
 
     width: float
@@ -79,7 +79,7 @@ class Group:
 
 
 class RoomView:
-    """A room and its surroundings in a window of cells, seen with each wall at the bottom.
+    """A room and its surroundings in a window of cells, which is turned to have each wall as base.
 
     Turned by `turn` quarters, rows count away from the wall and columns along it. Sizes are in
     cells.
@@ -106,49 +106,52 @@ class RoomView:
         self._left = [_sums(near(mask, -reach, 1)) for mask in solid]
 
     def places(
-        self, group: Group, taken: Bool, draws: Draws, score: Score | None = None
+        self, group: FurnitureGroup, occupied: Bool, draws: Draws, score: Score | None = None
     ) -> Iterator[tuple[int, int, int]]:
         """Yield places for a group, good ones first: turn, first row, first column.
 
-        `score` is called with a turn, the shape of the turned window and the size of the group,
-        and returns points for each cell as first one, or None where the group is not to be turned
-        so.
+        Args:
+            group: The group.
+            occupied: Cells that other things occupy, bool (rows, columns) of the plan.
+            draws: The stream that chooses among good places.
+            score: Called with a turn, the shape of the turned window and the size of the group;
+                returns points for each first cell, or None where no place has that turn.
         """
-        untaken = ~taken[self.window]
+        empty = ~occupied[self.window]
         turns, rows, columns, points = [], [], [], []
         for turn in range(4):
-            scored = self._scored(group, turn, untaken, score)
-            if scored is not None:
-                turns.append(np.full(len(scored[0]), turn))
-                rows.append(scored[0])
-                columns.append(scored[1])
-                points.append(scored[2])
+            options = self._options(group, turn, empty, score)
+            if options is not None:
+                turns.append(np.full(len(options[0]), turn))
+                rows.append(options[0])
+                columns.append(options[1])
+                points.append(options[2])
         if not turns:
             return
-        where = np.stack([np.concatenate(turns), np.concatenate(rows), np.concatenate(columns)], 1)
+        places = np.stack([np.concatenate(turns), np.concatenate(rows), np.concatenate(columns)], 1)
         value = np.concatenate(points)
         for _ in range(ATTEMPTS):
             if not len(value):
                 return
             good = np.flatnonzero(value >= value.max() - VARIETY)
-            turn, row, column = where[good[draws.below(len(good))]].tolist()
+            turn, row, column = places[good[draws.below(len(good))]].tolist()
             yield turn, row, column
-            # What failed here fails close by.
-            near = np.abs(where[:, 1:] - (row, column)).max(axis=1) <= self._step
-            rest = ~(near & (where[:, 0] == turn))
-            where, value = where[rest], value[rest]
+            # A group that doesn't fit at a place doesn't fit close by either.
+            near = np.abs(places[:, 1:] - (row, column)).max(axis=1) <= self._step
+            rest = ~(near & (places[:, 0] == turn))
+            places, value = places[rest], value[rest]
 
     @property
     def _step(self) -> int:
         return count_cells(self.lattice.cell, 0.2)
 
-    def _scored(
-        self, group: Group, turn: int, untaken: Bool, score: Score | None
+    def _options(
+        self, group: FurnitureGroup, turn: int, empty: Bool, score: Score | None
     ) -> tuple[Int, Int, Int] | None:
         """Return the rows and columns of first cells where the group can be, and their points."""
         width, depth = self._size(group)
         front = count_cells(self.lattice.cell, group.front)
-        free = np.rot90(self._may_hold & untaken, turn)
+        free = np.rot90(self._may_hold & empty, turn)
         high, wide = free.shape
         if depth + front > high or width > wide:
             return None
@@ -157,7 +160,7 @@ class RoomView:
             return None
         possible = _count(free, depth, width) == depth * width
         if front:
-            before = _count(np.rot90(self._whole & untaken, turn), front, width) == front * width
+            before = _count(np.rot90(self._whole & empty, turn), front, width) == front * width
             possible[: before.shape[0] - depth] &= before[depth:][: possible.shape[0]]
             possible[max(before.shape[0] - depth, 0) :] = False
         if not possible.any():
@@ -165,16 +168,16 @@ class RoomView:
         rows, columns = np.nonzero(possible)
         if group.wall:
             touching = _in_box(self._behind[turn], rows, columns, 1, width)
-            backed = 10 * touching >= BACKED * width
+            backed = 10 * touching >= MIN_BACKED * width
             rows, columns = rows[backed], columns[backed]
         points = self._points(group, turn, rows, columns)
         if extra is not None:
-            here = extra[rows, columns]
-            rows, columns, points = rows[here >= 0], columns[here >= 0], (points + here)[here >= 0]
+            more = extra[rows, columns]
+            rows, columns, points = rows[more >= 0], columns[more >= 0], (points + more)[more >= 0]
         return rows, columns, points
 
-    def _points(self, group: Group, turn: int, rows: Int, columns: Int) -> Int:
-        """Return the points of first cells for corners and for calm."""
+    def _points(self, group: FurnitureGroup, turn: int, rows: Int, columns: Int) -> Int:
+        """Return the points of first cells for corners and for the distance from doors."""
         width, depth = self._size(group)
         points = np.zeros(len(rows), np.int64)
         if group.corner:
@@ -187,25 +190,27 @@ class RoomView:
             points += np.minimum(distance, far * far) * group.away // (far * far)
         return points
 
-    def _size(self, group: Group) -> tuple[int, int]:
+    def _size(self, group: FurnitureGroup) -> tuple[int, int]:
         cell = self.lattice.cell
         return max(1, count_cells(cell, group.width)), max(1, count_cells(cell, group.depth))
 
-    def rectangle(self, group: Group, turn: int, row: int, column: int) -> tuple[slice, slice]:
-        """Return the rows and columns of the plan that a group and the floor before it take."""
+    def rectangle(
+        self, group: FurnitureGroup, turn: int, row: int, column: int
+    ) -> tuple[slice, slice]:
+        """Return the rows and columns of the plan that a group and the floor before it occupy."""
         width, depth = self._size(group)
         depth += count_cells(self.lattice.cell, group.front)
         (x0, y0), (x1, y1) = self._unturned(turn, [(column, row), (column + width, row + depth)])
         x0, x1, y0, y1 = min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1)
         return slice(int(y0), int(y1)), slice(int(x0), int(x1))
 
-    def pieces(self, group: Group, turn: int, row: int, column: int) -> list[PlacedObject]:
+    def pieces(self, group: FurnitureGroup, turn: int, row: int, column: int) -> list[PlacedObject]:
         """Return the furniture of a group whose first cell is at a row and column.
 
-        Nothing where the cells are too large for it.
+        The list is empty if the cells are too large for it.
         """
         cell = self.lattice.cell
-        things = []
+        objects = []
         for piece in group.pieces:
             # Edges are rounded, not sizes: what is side by side stays so.
             u0, v0 = count_cells(cell, piece.left), count_cells(cell, piece.ahead)
@@ -223,8 +228,8 @@ class RoomView:
             if heading % (2 * QUARTER) == 0:
                 size = size[::-1]
             middle = ((ax + bx) / 2, (ay + by) / 2)
-            things.append(stand_furniture(piece.type, middle, heading, size))
-        return things
+            objects.append(stand_furniture(piece.type, middle, heading, size))
+        return objects
 
     def _unturned(self, turn: int, points: list[tuple[int, int]]) -> list[tuple[int, int]]:
         """Return corners of cells (x, y) of the turned window as those of the plan."""
@@ -236,8 +241,8 @@ class RoomView:
             out.append((x0 + x, y0 + y))
         return out
 
-    def turned(self, turn: int, x: float, y: float) -> tuple[float, float]:
-        """Return a place [m] as columns and rows of the turned window."""
+    def turn_place(self, turn: int, x: float, y: float) -> tuple[float, float]:
+        """Return a place (x, y) [m] as column and row of the turned window."""
         height, width = self.inside.shape
         low = self.lattice.to_lattice((x, y)) / UNITS_PER_CELL
         x, y = float(low[0]) - self.window[1].start, float(low[1]) - self.window[0].start
@@ -261,7 +266,7 @@ def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
 
 def count_cells(cell: float, metres: float) -> int:
     """Return how many cells of a side [m] come nearest to a length [m]."""
-    # A bit more than a half is added, so that sums that should be equal are rounded alike.
+    # Slightly more than a half is added, so that sums of equal value are rounded alike.
     return math.floor(metres / cell + 0.5 + 1e-6)
 
 
@@ -287,7 +292,7 @@ def _count(mask: Bool, high: int, wide: int) -> Int:
 
 
 def near(mask: Bool, reach: int, axis: int) -> Bool:
-    """Return the cells with one of a mask among the `reach` before them, after if negative."""
+    """Return the cells that follow a cell of the mask within `reach`, or precede it if negative."""
     out = np.zeros_like(mask)
     size = mask.shape[axis]
     for step in range(1, abs(reach) + 1):

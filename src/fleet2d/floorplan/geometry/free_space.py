@@ -1,4 +1,4 @@
-"""The free space of a plan, put on the lattice."""
+"""Put the free space of a plan on the lattice."""
 
 from collections.abc import Sequence
 
@@ -10,20 +10,20 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import GRID, Snapped, snap_polygon
 
-# A free space with more parts than this gets no list of their sizes in its notes.
+# Number of parts of which a note lists the areas.
 PARTS_LISTED = 5
 
-# Lattice units within which a coordinate read from decimals counts as on the lattice.
+# Distance at which a coordinate counts as on the lattice, for rounding of decimals [lattice].
 ON_WALL = 1e-6
 
 
 def free_on_lattice(
     name: str, free: Polygon | MultiPolygon, cell: float
 ) -> tuple[Lattice, list[Polygon]]:
-    """Put free space [m] on the lattice; in one order, so that the same walls are the same plan.
+    """Put free space [m] on the lattice, in canonical order, so that equal walls make equal plans.
 
     Args:
-        name: What the plan is called.
+        name: Name of the plan, for messages.
         free: The free space between the walls [m].
         cell: Side of a cell [m].
 
@@ -56,20 +56,20 @@ def free_on_lattice(
     lattice = Lattice.around(tuple(corners.tolist()), cell)
     shift = lattice.to_lattice((0.0, 0.0))
     moved = [shapely.transform(polygon, lambda xy: xy + shift) for polygon in snapped.polygons]
-    return lattice, in_order(moved)
+    return lattice, canonical_order(moved)
 
 
-def in_order(polygons: Sequence[Polygon]) -> list[Polygon]:
-    """Return polygons and their rings in one order, however they came about."""
-    canonical = shapely.orient_polygons(shapely.normalize(polygons))
-    return sorted(canonical.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
+def canonical_order(polygons: Sequence[Polygon]) -> list[Polygon]:
+    """Return polygons and their rings in canonical order."""
+    normal = shapely.orient_polygons(shapely.normalize(polygons))
+    return sorted(normal.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
 
 
 def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:
-    """Move free space [m] to where walls may stand; what stands there already is not touched.
+    """Snap free space [m] to even lattice units; free space that is there already stays as it is.
 
-    Snapping is not idempotent (a wall that moves may come near another corner), and a stored plan
-    must come back as it was.
+    Snapping is not idempotent, as a wall that moves may come near another corner, but a stored plan
+    must be read back unchanged.
     """
     exact = shapely.transform(free, lambda xy: xy * units_per_m)
     even = shapely.transform(exact, lambda xy: 2 * np.rint(xy / 2))
@@ -81,7 +81,7 @@ def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:
 
 
 def part_notes(lattice: Lattice, polygons: Sequence[Polygon]) -> list[str]:
-    """Say that free space is in several parts, and how large they are."""
+    """Return a note with the areas of the parts of free space, if there are several."""
     if len(polygons) == 1:
         return []
     areas = sorted((p.area / lattice.units_per_m**2 for p in polygons), reverse=True)

@@ -1,4 +1,4 @@
-"""Gates in a mesh: segments from wall to wall that can be shut, and opened again."""
+"""Gates in a mesh: segments from wall to wall that can be shut and opened."""
 
 from collections.abc import Collection, Sequence
 
@@ -13,10 +13,10 @@ I64 = NDArray[np.int64]
 
 
 class Gates:
-    """A mesh in which some segments are edges, so that shutting one is writing two numbers.
+    """A mesh in which some segments are edges, so that shutting one changes only two numbers.
 
-    The triangles on the two sides of a shut gate are no neighbors: to every kernel it is a wall
-    without thickness.
+    The triangles on the two sides of a shut gate are no neighbors: every kernel sees a wall without
+    thickness.
 
     Attributes:
         mesh: The mesh with all gates open.
@@ -39,11 +39,11 @@ class Gates:
         """Make the segments edges of a mesh.
 
         Args:
-            mesh: Has their ends as vertices, and nothing but free space between them.
+            mesh: A mesh with their ends as vertices, and only free space between these.
             segments: From wall to wall [lattice]; they don't cross each other.
 
         Raises:
-            FloorPlanError: They are not such segments.
+            FloorPlanError: The mesh has no such vertices, or a wall is between them.
         """
         self.mesh, self._sides = _with_edges(mesh, segments)
 
@@ -90,16 +90,16 @@ def _force_edge(
     if (a, b) in owner and (b, a) in owner:
         return
     crossing = _crossing(vertices, owner, a, b)
-    patience = 16 * (len(crossing) + 1) ** 2
+    attempts = 16 * (len(crossing) + 1) ** 2
     while crossing:
-        patience -= 1
+        attempts -= 1
         p, q = crossing.pop(0)
         left, right = owner[p, q], owner[q, p]
         c, d = (next(v for v in corners[t] if v not in (p, q)) for t in (left, right))
-        if patience == 0:
+        if attempts == 0:
             break
         if _turn(vertices, d, c, q) * _turn(vertices, d, c, p) >= 0:
-            crossing.append((p, q))  # the two triangles make no convex shape yet
+            crossing.append((p, q))  # the quadrilateral is not convex yet
             continue
         corners[left], corners[right] = (p, d, c), (d, q, c)
         del owner[p, q], owner[q, p]
@@ -127,7 +127,7 @@ def _crossing(
 
 
 def _cross(vertices: I64, a: int, b: int, p: int, q: int) -> bool:
-    """Tell whether two segments cross between their ends."""
+    """Return whether two segments cross between their ends."""
     apart = _turn(vertices, a, b, p) * _turn(vertices, a, b, q) < 0
     return apart and _turn(vertices, p, q, a) * _turn(vertices, p, q, b) < 0
 
@@ -141,7 +141,7 @@ def _turn(vertices: I64, a: int, b: int, c: int) -> int:
 
 def _vertex(vertices: I64, point: tuple[int, int]) -> int:
     """Return the id of the vertex at a point."""
-    found = np.flatnonzero((vertices == np.array(point, np.int64)).all(axis=1))
-    if len(found) == 0:
+    matches = np.flatnonzero((vertices == np.array(point, np.int64)).all(axis=1))
+    if len(matches) == 0:
         raise FloorPlanError(f"the door line ends at {point} [lattice], where no wall is")
-    return int(found[0])
+    return int(matches[0])

@@ -1,4 +1,4 @@
-"""The fixed-point grid that every position and wall lives on, and its way to metres and back."""
+"""The fixed-point grid of all positions and walls, and its conversion from and to metres."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ MAX_CELL_M = 1.0
 # Products of three coordinates must stay inside int64: the sight kernels rely on this bound.
 COORDINATE_LIMIT = 2**20
 
-# A floor plan takes 30 bytes a cell while its rooms are found: 2 GB for so many.
+# Most cells of a plan: finding its rooms takes 30 bytes a cell, 2 GB in all.
 MAX_CELLS = 2**26
 
 
@@ -81,7 +81,7 @@ class Lattice:
         check_cell(cell)
         if not all(math.isfinite(value) for value in bounds):
             raise FloorPlanError(f"the floor plan's bounds are not finite numbers: {bounds}")
-        # Of the walls as snapped, so that a plan and its stored copy get the same lattice.
+        # The bounds are snapped as walls are, so that a plan and its stored copy share a lattice.
         units = UNITS_PER_CELL / cell
         low_x, low_y, high_x, high_y = (2 * round(value * units / 2) for value in bounds)
         first = (low_x // UNITS_PER_CELL - MARGIN_CELLS, low_y // UNITS_PER_CELL - MARGIN_CELLS)
@@ -117,7 +117,7 @@ class Lattice:
         return x, y
 
     def point_at(self, xy: Sequence[float]) -> tuple[int, int]:
-        """Return one position (x, y) [m] as the nearest lattice point: quicker than `to_lattice`.
+        """Return one position (x, y) [m] as the nearest lattice point; quicker than `to_lattice`.
 
         Example:
             >>> Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05).point_at((0.1, 0.05))
@@ -127,7 +127,7 @@ class Lattice:
         return round(xy[0] * units) - x0, round(xy[1] * units) - y0
 
     def xy_of(self, x: int, y: int) -> tuple[float, float]:
-        """Return one lattice point in metres: quicker than `to_metres`.
+        """Return one lattice point in metres; quicker than `to_metres`.
 
         Example:
             >>> Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05).xy_of(128, 64)
@@ -151,7 +151,7 @@ class Lattice:
         return int(y) // UNITS_PER_CELL, int(x) // UNITS_PER_CELL
 
     def cell_centre(self, row: int, column: int) -> tuple[int, int]:
-        """Return a cell's centre (x, y) [lattice]: the odd point next to its true middle."""
+        """Return a cell's centre (x, y) [lattice]: the odd point next to its exact middle."""
         half = UNITS_PER_CELL // 2 + 1
         return UNITS_PER_CELL * column + half, UNITS_PER_CELL * row + half
 
@@ -165,7 +165,7 @@ class Lattice:
 
 
 def check_cell(cell: float) -> None:
-    """Raise FloorPlanError unless `cell` is a cell size that we allow."""
+    """Raise FloorPlanError unless `cell` is a valid cell size."""
     if not MIN_CELL_M <= cell <= MAX_CELL_M:
         raise FloorPlanError(
             f"floorplan.cell is {cell:g} m: choose a cell size from {MIN_CELL_M:g} m to"

@@ -1,4 +1,4 @@
-"""From wall outlines on the lattice to the triangle mesh that the kernels work on."""
+"""Triangulate wall outlines on the lattice into the mesh that the kernels use."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Snapped(NamedTuple):
     """A polygon moved onto the wall lattice.
 
     Attributes:
-        polygons: What is left of it, with even integer coordinates; empty when it was too thin.
+        polygons: Its parts, with even integer coordinates; none if it was too thin.
         area_change: New area minus old area, square lattice units.
         tolerance: The most that moving every wall point by the rounding can change the area.
     """
@@ -36,10 +36,10 @@ class Snapped(NamedTuple):
 def snap_polygon(polygon: Polygon | MultiPolygon) -> Snapped:
     """Move a polygon in lattice units onto even coordinates, and drop what collapses to nothing.
 
-    Parts thinner than the lattice vanish, and a part that hangs on by less than that comes off as
-    its own polygon. Where an outline crosses itself, the loops become parts of their own; whether
-    that is a slip of the pen or a wrong outline shows in the area, so check `abs(area_change) <=
-    tolerance`.
+    Parts thinner than the lattice vanish, and a part that is joined by less than that becomes a
+    polygon of its own. So do the loops of an outline that crosses itself; the change of the area
+    shows whether that was a small slip or a wrong outline, so check
+    `abs(area_change) <= tolerance`.
 
     Args:
         polygon: Free space in lattice units; any coordinates.
@@ -69,7 +69,7 @@ def build_mesh(
             other in points.
         columns: Width of the plan, cells.
         rows: Height of the plan, cells.
-        corners: Points on walls that are to be vertices, too, even where the wall is straight.
+        corners: Points on walls that become vertices, even where the wall is straight.
 
     Raises:
         FloorPlanError: If the polygons are not such a free space, or don't fit the plan.
@@ -81,10 +81,10 @@ def build_mesh(
     rings = _rings(polygons, columns * SUB, rows * SUB)
     if corners:
         rings = _split_at(rings, np.array(corners, np.int64).reshape(-1, 2))
-    mesh = _meshed(rings)
+    mesh = _build(rings)
     if mesh is None:
         # A corner that touches the middle of another wall: make it a vertex of that wall, too.
-        mesh = _meshed(_split_at_touching_vertices(rings))
+        mesh = _build(_split_at_touching_vertices(rings))
     if mesh is None:
         raise FloorPlanError(
             "The free space can't be cut into triangles that end at its walls. Send the outlines "
@@ -105,7 +105,7 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
             "The outlines cross, overlap or share a piece of wall: "
             f"{shapely.is_valid_reason(whole)} (lattice units). Merge outlines that overlap."
         )
-    found = []
+    rings = []
     for polygon in polygons:
         exact = shapely.get_coordinates(polygon)
         if not np.array_equal(exact % GRID, np.zeros_like(exact)):
@@ -120,13 +120,13 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
                 "Use larger cells."
             )
         oriented = shapely.orient_polygons(polygon)
-        found.append(
+        rings.append(
             [
                 shapely.get_coordinates(ring)[:-1].astype(np.int64)
                 for ring in (oriented.exterior, *oriented.interiors)
             ]
         )
-    return _without_flat_vertices(found)
+    return _drop_flat_vertices(rings)
 
 
 def _keys(points: Int64) -> Int64:
@@ -135,19 +135,19 @@ def _keys(points: Int64) -> Int64:
     return keys
 
 
-def _without_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
+def _drop_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
     """Drop vertices in the middle of a straight wall, except where rings touch."""
     everywhere = np.concatenate([_keys(ring) for rings in polygons for ring in rings])
     keys, counts = np.unique(everywhere, return_counts=True)
     touching = keys[counts > 1]
 
-    def straightened(ring: Int64) -> Int64:
+    def straighten(ring: Int64) -> Int64:
         before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
         bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
-        kept: Int64 = ring[bends | np.isin(_keys(ring), touching)]
-        return kept
+        corners: Int64 = ring[bends | np.isin(_keys(ring), touching)]
+        return corners
 
-    return [[straightened(ring) for ring in rings] for rings in polygons]
+    return [[straighten(ring) for ring in rings] for rings in polygons]
 
 
 def _split_at_touching_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
@@ -158,7 +158,7 @@ def _split_at_touching_vertices(polygons: list[list[Int64]]) -> list[list[Int64]
 
 
 def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]:
-    """Insert every one of some points that lies in the middle of a wall into that wall."""
+    """Insert each of some points that lies in the middle of a wall into that wall."""
     tree = shapely.STRtree(np.asarray(shapely.points(vertices)))
 
     def split(ring: Int64) -> Int64:
@@ -177,7 +177,7 @@ def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]
     return [[split(ring) for ring in rings] for rings in polygons]
 
 
-def _meshed(polygons: list[list[Int64]]) -> Mesh | None:
+def _build(polygons: list[list[Int64]]) -> Mesh | None:
     """Return the mesh, or None when the triangles don't fill just the space between the rings."""
     rings = [ring for rings in polygons for ring in rings]
     wall_starts = np.concatenate(rings)
@@ -186,10 +186,10 @@ def _meshed(polygons: list[list[Int64]]) -> Mesh | None:
     keys = np.sort(_keys(wall_starts))
     keys = keys[np.diff(keys, prepend=-1) != 0]
     vertices = np.stack([keys // (2 * LIMIT), keys % (2 * LIMIT)], axis=1)
-    corners = _triangulated(polygons)
+    corners = _triangulate(polygons)
     triangles = np.searchsorted(keys, _keys(corners))
     area = int(_doubled_areas(corners).sum())
-    area_between_walls = int(_crossed(wall_starts, wall_ends).sum())
+    area_between_walls = int(_cross_products(wall_starts, wall_ends).sum())
     if area != area_between_walls or not np.array_equal(vertices[triangles], corners):
         return None
     walls = np.searchsorted(keys, _keys(wall_starts)) * len(keys)
@@ -200,7 +200,7 @@ def _meshed(polygons: list[list[Int64]]) -> Mesh | None:
     return Mesh(vertices, triangles.astype(np.int32), neighbors)
 
 
-def _triangulated(polygons: list[list[Int64]]) -> Int64:
+def _triangulate(polygons: list[list[Int64]]) -> Int64:
     """Return triangles that fill the polygons: int64 (t, 3, 2), counter-clockwise corners."""
     shapes = [Polygon(rings[0], rings[1:]) for rings in polygons]
     filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
@@ -212,7 +212,7 @@ def _triangulated(polygons: list[list[Int64]]) -> Int64:
     return solid
 
 
-def _crossed(starts: Int64, ends: Int64) -> Int64:
+def _cross_products(starts: Int64, ends: Int64) -> Int64:
     """Return the cross products of points; over a closed ring they add up to twice its area."""
     products: Int64 = starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
     return products
@@ -220,7 +220,7 @@ def _crossed(starts: Int64, ends: Int64) -> Int64:
 
 def _doubled_areas(corners: Int64) -> Int64:
     """Return twice the signed area of each triangle; `corners` is int64 (t, 3, 2)."""
-    return _crossed(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return _cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _neighbors(triangles: Int64, vertex_count: int, walls: Int64) -> npt.NDArray[np.int32] | None:

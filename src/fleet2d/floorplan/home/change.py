@@ -1,4 +1,4 @@
-"""Changes of a home: what a scenario, an algorithm or a script may do to it during a run."""
+"""Changes of a home during a run, by a scenario, an algorithm or a script."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Point = tuple[float, float]
 
 
 def parse_moment(value: Any) -> datetime | timedelta:
-    """Read a local time, or the time since the start."""
+    """Parse a local time, or the time since the start."""
     moment = _local_time(value)
     if moment is None:
         return parse_duration(value)
@@ -38,15 +38,15 @@ def _local_time(value: Any) -> datetime | None:
         return None
 
 
-def written_moment(moment: datetime | timedelta) -> str:
-    """Write a moment as `parse_moment` reads it."""
+def format_moment(moment: datetime | timedelta) -> str:
+    """Format a moment as `parse_moment` reads it."""
     return moment.isoformat() if isinstance(moment, datetime) else format_duration(moment)
 
 
 Moment = Annotated[
     datetime | timedelta,
     BeforeValidator(parse_moment),
-    PlainSerializer(written_moment),
+    PlainSerializer(format_moment),
     WithJsonSchema(
         {
             "description": "a local time like 2026-01-07T14:00, or the time since the start like"
@@ -69,18 +69,16 @@ class HomeChange(Settings):
     """
 
     at: Moment | None = Field(
-        default=None, description="when; left out in what an algorithm or a script asks for: now"
+        default=None, description="when; left out by an algorithm or a script: now"
     )
     open: str | None = Field(default=None, description="the door that is opened")
     shut: str | None = Field(default=None, description="the door that is shut")
     lock: str | None = Field(default=None, description="the door that is locked")
     unlock: str | None = Field(default=None, description="the door that is unlocked")
     move: str | None = Field(default=None, description="the piece of furniture that is moved")
-    to: Point | None = Field(
-        default=None, description="where its middle comes to stand, [x, y] in metres"
-    )
+    to: Point | None = Field(default=None, description="new place of its middle, [x, y] in metres")
     turn_deg: float = Field(
-        default=0.0, description="how far it is turned, counter-clockwise", ge=-3600, le=3600
+        default=0.0, description="angle by which it is turned, counter-clockwise", ge=-3600, le=3600
     )
     room: str | None = Field(default=None, description="the room whose use changes")
     type: str | None = Field(default=None, description="what the room is used for from then on")
@@ -89,8 +87,8 @@ class HomeChange(Settings):
     def _is_one_change(self) -> Self:
         verbs = [verb for verb in VERBS if getattr(self, verb) is not None]
         if len(verbs) != 1:
-            found = " and ".join(verbs) or "nothing"
-            raise problem(f"{found} is given: one of {', '.join(VERBS)} is wanted")
+            listed = " and ".join(verbs) or "nothing"
+            raise problem(f"{listed} is given: one of {', '.join(VERBS)} is wanted")
         for verb, further in (("move", "to"), ("room", "type")):
             if (verbs[0] == verb) != (getattr(self, further) is not None):
                 raise problem(f"'{verb}' and '{further}' go together")
@@ -98,18 +96,18 @@ class HomeChange(Settings):
 
     @property
     def verb(self) -> str:
-        """Which change it is."""
+        """The verb of the change, such as `shut`."""
         return next(verb for verb in VERBS if getattr(self, verb) is not None)
 
     @property
     def target(self) -> str:
-        """The name of what changes."""
+        """The name of the door, object or room that changes."""
         return str(getattr(self, self.verb))
 
 
 @dataclass(frozen=True)
 class HomeChanges:
-    """What an algorithm puts out to change the home from the next step on.
+    """Changes of the home that an algorithm requests from the next step on.
 
     Example:
         >>> output = HomeChanges([HomeChange(shut="bath_door")])

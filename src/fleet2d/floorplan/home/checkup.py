@@ -1,4 +1,4 @@
-"""A check-up of a home: what is wrong or odd with a floor plan, in plain words, and where."""
+"""The check-up of a floor plan: what is wrong or odd with it, and where."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,18 +15,18 @@ from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.home.standing import grown_cells, with_approaches
 from fleet2d.floorplan.objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
-from fleet2d.floorplan.rooms.room import LabelledRegion
+from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
 
 Severity = Literal["unlivable", "wrong", "odd"]
 
 PERSON_RADIUS = 0.2
-"""The radius of a person who uses the furniture [m], as users have it if nothing is said."""
+"""The radius of a person who uses the furniture [m], which is the default of users."""
 
 HOME_M2 = (8.0, 2000.0)
-"""Area of what people live in."""
+"""Least and largest area of a home."""
 
-# What the units of a file may be if its numbers are not metres.
+# Units that a file may have instead of metres, and their length [m].
 OTHER_UNITS = (
     ("centimetres", 0.01),
     ("millimetres", 0.001),
@@ -35,21 +35,21 @@ OTHER_UNITS = (
     ("pixels of 5 cm", 0.05),
 )
 LIKELY_M2 = (25.0, 400.0)
-ROOM_M2 = (0.8, 200.0)  # the middle one of a home's rooms
+ROOM_M2 = (0.8, 200.0)  # median area of a home's rooms
 TINY_ROOM_M2 = 0.5
-SPECK_M2 = 0.02  # less wall than this is no pillar
-PART_M2 = 0.5  # less floor than this is nobody's loss
-DOOR_M = (0.5, 1.6)  # the middle one of a home's doors
+SPECK_M2 = 0.02  # least area of a pillar
+PART_M2 = 0.5  # least area of floor whose loss matters
+DOOR_M = (0.5, 1.6)  # median width of a home's doors
 WIDEST_DOOR_M = 2.0
-# Boxes of labels are drawn over the walls; how far, and which part of them may be farther out.
+# How far labels may reach over the outer walls, and which share of them may lie farther out.
 OVER_WALLS_M = 0.3
 OUTSIDE = 0.25
-# Labels overlap a little where boxes reach over walls: part of the smaller one that is too much.
+# Share of the smaller of two labels, and area, from which on their overlap is reported.
 OVERLAP = 0.25
 OVERLAP_M2 = 1.0
-# How far from furniture that has no place to use it from somebody must be able to stand [m].
+# Largest distance from which furniture without places of use must be reachable [m].
 BESIDE_M = 0.5
-UNLABELLED = 0.5
+UNLABELLED = 0.5  # share of the floor without a known use from which on it is reported
 
 _ORDER: tuple[Severity, ...] = ("unlivable", "wrong", "odd")
 
@@ -59,12 +59,12 @@ class Finding:
     """Something that is wrong or odd with a home.
 
     Attributes:
-        kind: What it is about, such as `parts` or `room`.
-        severity: `unlivable`: nobody can be there at all; `wrong`: something will not work;
+        kind: Its subject, such as `parts` or `room`.
+        severity: `unlivable`: no body fits into the home; `wrong`: something will not work;
             `odd`: worth a look.
-        text: What is the matter, in a sentence.
-        at: Where to look (x, y) [m], or None for all of the home.
-        shape: What is meant [m], if it has an extent.
+        text: A sentence that describes it.
+        at: The place (x, y) [m], or None for the whole home.
+        shape: The extent [m], if there is one.
     """
 
     kind: str
@@ -79,7 +79,7 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
 
     Args:
         plan: The home.
-        radius: The radius of the robot that is to get around in it [m].
+        radius: The radius of the robot that drives in it [m].
 
     Example:
         >>> import shapely
@@ -99,7 +99,7 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
         *_labels(plan),
         *_doors(plan),
         *_standing_in_walls(plan),
-        *_ways(plan, radius),
+        *_routes(plan, radius),
         *_uses(plan),
     ]
     return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
@@ -126,7 +126,7 @@ def _scale(plan: FloorPlan) -> Iterator[Finding]:
 
 
 def _guess(area: float) -> str:
-    """Say in which unit the numbers would make a usual home."""
+    """Return a hint to the unit in which the numbers would make a usual home."""
     for unit, metres in OTHER_UNITS:
         if LIKELY_M2[0] <= area * metres**2 <= LIKELY_M2[1]:
             return f" It looks like {unit} ({area * metres**2:.0f} m2)"
@@ -185,7 +185,7 @@ def _labels(plan: FloorPlan) -> Iterator[Finding]:
 
 
 def _by_shape(plan: FloorPlan) -> list[LabelledRegion]:
-    """Return the regions that have an extent; those of one shape are one with several labels."""
+    """Return the regions with an extent, those of one shape joined to one with all labels."""
     joined: dict[bytes, LabelledRegion] = {}
     for region in plan.regions:
         key = shapely.to_wkb(shapely.normalize(region.shape))
@@ -269,11 +269,11 @@ def _doors(plan: FloorPlan) -> Iterator[Finding]:
         )
 
 
-# --- Ways ----------------------------------------------------------------------------------------
+# --- Routes ---------------------------------------------------------------------------------------
 
 
-def _ways(plan: FloorPlan, radius: float) -> Iterator[Finding]:
-    """Find where a robot can't get to, be it for the walls or for what stands there."""
+def _routes(plan: FloorPlan, radius: float) -> Iterator[Finding]:
+    """Find the places that a robot can't get to, because of walls or of furniture."""
     body = f"a body of radius {radius:g} m"
     try:
         space = Home(plan).space(radius)
@@ -285,24 +285,21 @@ def _ways(plan: FloorPlan, radius: float) -> Iterator[Finding]:
         x, y = plan.entrance
         text = f"{body} can't stand at the entrance at ({x:.2f}, {y:.2f}) m"
         yield Finding("entrance", "wrong", text, plan.entrance)
-    got_to = space.part_of_cell == (0 if main is None else main)
+    reached = space.part_of_cell == (0 if main is None else main)
     empty = Space(plan, radius) if plan.objects else None
     for room in plan.rooms:
-        here = plan.room_of_cell == room.index
-        if not (here & got_to).any():
-            yield _closed_room(room, body, empty, space, here)
+        in_room = plan.room_of_cell == room.index
+        if not (in_room & reached).any():
+            yield _closed_room(room, body, empty, space, in_room)
             continue
         for part in range(space.parts):
-            lost = here & (space.part_of_cell == part) & ~got_to
+            lost = in_room & (space.part_of_cell == part) & ~reached
             if np.count_nonzero(lost) * plan.lattice.cell**2 >= PART_M2:
                 yield _corner(plan, room, lost, body, empty)
 
 
 def main_part(plan: FloorPlan, space: Space) -> int | None:
-    """Return the part of a space that is the home: that of the entrance, else the largest.
-
-    None where the entrance is in no part.
-    """
+    """Return the part of a space with the entrance, or the largest; None if no part has it."""
     if plan.entrance is None:
         return 0
     x, y = plan.lattice.point_at(plan.entrance)
@@ -311,13 +308,13 @@ def main_part(plan: FloorPlan, space: Space) -> int | None:
 
 
 def _closed_room(
-    room: Room, body: str, empty: Space | None, space: Space, here: NDArray[np.bool_]
+    room: Room, body: str, empty: Space | None, space: Space, in_room: NDArray[np.bool_]
 ) -> Finding:
     severity: Severity = "wrong" if room.area_m2 >= TINY_ROOM_M2 else "odd"
     size = f"{room.name} ({room.area_m2:.1f} m2)"
-    if empty is not None and (here & (empty.part_of_cell == 0)).any():
+    if empty is not None and (in_room & (empty.part_of_cell == 0)).any():
         text = f"furniture keeps {body} out of {size}"
-    elif (here & (space.part_of_cell >= 0)).any():
+    elif (in_room & (space.part_of_cell >= 0)).any():
         text = f"{body} can't get to {size}"
     else:
         text = f"{body} fits nowhere in {size}"
@@ -361,13 +358,13 @@ def _standing_in_walls(plan: FloorPlan) -> Iterator[Finding]:
 
 
 def _uses(plan: FloorPlan) -> Iterator[Finding]:
-    """Find what nobody can get to."""
+    """Find the objects that nobody can get to."""
     if not plan.objects:
         return
     try:
         space = Home(plan).space(PERSON_RADIUS)
     except FloorPlanError:
-        return  # said about the robot, or of no use to say of a home for dolls
+        return  # reported for the robot; for a home of dolls it doesn't matter
     standing = space.part_of_cell == (main_part(plan, space) or 0)
     for thing in plan.objects:
         if thing.uses:

@@ -1,4 +1,4 @@
-"""Ways that mind costs: distance from walls, no-go areas, and a user's own costs."""
+"""Routes of least cost: distance from walls, no-go areas, and a user's own costs."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -11,7 +11,7 @@ from pydantic import Field
 
 from fleet2d.component import Settings
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.home.space import ROUTES_KEPT, Space
+from fleet2d.floorplan.home.space import CACHED_ROUTES, Space
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.fields import MOST_COST, cost_distance, descend, squared_distance
 from fleet2d.kernels.masks import label_parts
@@ -22,21 +22,21 @@ from fleet2d.units import Length
 I64 = NDArray[np.int64]
 I32 = NDArray[np.int32]
 
-NO_WAY = -1
+CLOSED = -1
 
 
 class CostmapSettings(Settings):
-    """What makes ways of robots dearer than they are long.
+    """The costs that routes of robots pay in addition to their length.
 
-    A cost of 100 % counts a cell double. Robots take the cheapest way; without a costmap it is the
-    shortest.
+    A cost of 100 % counts a cell double. Robots take the cheapest route, which without a costmap is
+    the shortest.
     """
 
     clearance: Length = Field(
         default=0.5,
         ge=0,
         le=5,
-        description="distance from walls and furniture from which on nothing is added",
+        description="distance from walls and furniture from which on no cost is added",
     )
     wall_cost: int = Field(
         default=200,
@@ -45,7 +45,7 @@ class CostmapSettings(Settings):
         description="cost beside a wall or furniture [%]; less farther away",
     )
     no_go: Literal["forbid", "cost", "ignore"] = Field(
-        default="forbid", description="what the floor plan's no-go areas are"
+        default="forbid", description="how routes treat the floor plan's no-go areas"
     )
     no_go_cost: int = Field(
         default=500, ge=0, le=MOST_COST, description="cost of a no-go area with no_go: cost [%]"
@@ -55,30 +55,30 @@ class CostmapSettings(Settings):
 def costs_of(
     plan: FloorPlan, settings: CostmapSettings, obstacles: Sequence[shapely.Polygon] = ()
 ) -> I32:
-    """Return the cost of each cell [%]: int32 (rows, columns), -1 where no way leads.
+    """Return the cost of each cell [%]: int32 (rows, columns), -1 where no route leads.
 
     Args:
         plan: The floor plan.
-        settings: What makes ways dear.
-        obstacles: What stands in the way besides the walls [m].
+        settings: The settings of the costmap.
+        obstacles: Footprints of obstacles besides the walls [m].
     """
     cell = plan.lattice.cell
     free = plan.free & ~cells_within(plan, tuple(obstacles))
-    # Walls run between cells, not through the middle of the nearest one that isn't free.
+    # Walls run along cells that aren't free, half a cell nearer than the middle of these.
     walls_away = (np.sqrt(squared_distance(free).astype(np.float64)) - 0.5) * cell
     near = 1.0 - np.clip(walls_away / max(settings.clearance, cell), 0.0, 1.0)
     costs = np.rint(settings.wall_cost * near).astype(np.int32)
     if settings.no_go != "ignore":
         no_go = cells_within(plan, plan.no_go)
         if settings.no_go == "forbid":
-            costs[no_go] = NO_WAY
+            costs[no_go] = CLOSED
         else:
             costs[no_go] += settings.no_go_cost
     return np.minimum(costs, MOST_COST).astype(np.int32)
 
 
 def cells_within(plan: FloorPlan, areas: tuple[shapely.Polygon, ...]) -> NDArray[np.bool_]:
-    """Return the cells whose centre is within one of some areas [m]: bool (rows, columns)."""
+    """Return the cells whose centre is in one of the areas [m]: bool (rows, columns)."""
     mask = np.zeros(plan.free.shape, np.bool_)
     if areas:
         xs, ys = plan.lattice.centre_axes()
@@ -91,21 +91,21 @@ def cells_within(plan: FloorPlan, areas: tuple[shapely.Polygon, ...]) -> NDArray
 
 
 class CostedSpace(Space):
-    """The places where a body may be that minds costs: none of those where no way leads.
+    """The places of a body that pays costs: those of a space, without closed cells.
 
-    The body keeps its radius from them. The connected parts are those between which a way leads,
-    and routes are the cheapest.
+    The body keeps its radius from closed cells. Connected parts are joined by routes, and routes
+    are the cheapest.
 
     Attributes:
-        base: Where the body fits.
-        cost: int32 (rows, columns) [%], below 0 where its centre may not be.
+        base: The space where the body fits.
+        cost: Cost of each cell [%], int32 (rows, columns), below 0 where its centre may not be.
     """
 
     def __init__(self, base: Space, cost: NDArray[np.signedinteger]) -> None:
-        """Take the places out of a space where no way leads.
+        """Remove closed cells from a space.
 
         Args:
-            base: Where the body fits.
+            base: The space where the body fits.
             cost: int (rows, columns), as for `route_by_cost`.
 
         Raises:
@@ -114,14 +114,14 @@ class CostedSpace(Space):
         self.__dict__.update(base.__dict__)
         cells = base.radius / base.plan.lattice.cell + 0.5  # up to the border of a cell
         near = squared_distance(np.ascontiguousarray(cost >= 0)) <= cells * cells
-        self._given = cost
-        self.base, self.cost = base, np.where(near, NO_WAY, cost).astype(np.int32)
-        self.route = lru_cache(ROUTES_KEPT)(self._find_route)
+        self._original_cost = cost
+        self.base, self.cost = base, np.where(near, CLOSED, cost).astype(np.int32)
+        self.route = lru_cache(CACHED_ROUTES)(self._find_route)
         self.cells = lru_cache(None)(self._find_cells)
-        self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
-        self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
+        self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
+        self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
         self.rooms_of = lru_cache(None)(self._find_rooms)
-        # Where a body fits, cells that share a side are never of two parts.
+        # Cells of the space that share a side always belong to one part.
         part = label_parts((base.part_of_cell >= 0) & (self.cost >= 0), diagonal=False)
         sizes = np.bincount(part[part >= 0])
         self.parts = len(sizes)
@@ -135,8 +135,8 @@ class CostedSpace(Space):
         self.part_of_cell = np.where(part >= 0, rank[part], np.int32(-1))
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Make it anew from what it was made from."""
-        return CostedSpace, (self.base, self._given)
+        """Pickle it by the arguments that it was made from."""
+        return CostedSpace, (self.base, self._original_cost)
 
     def part_at(self, x: int, y: int) -> int:
         """Return the connected part of a lattice point; -1 where the body can't be or go."""
@@ -144,13 +144,15 @@ class CostedSpace(Space):
         if self.base.part_at(x, y) < 0 or self.cost[row, column] < 0:
             return -1
         near = (row, column)
-        if self.part_of_cell[near] < 0:  # the point is in the space, the centre of its cell isn't
+        if (
+            self.part_of_cell[near] < 0
+        ):  # the point is in the space, but the centre of its cell isn't
             near = _nearest(self.base, self.part_of_cell >= 0, (x, y)) or near
         return int(self.part_of_cell[near])
 
     def part_near(self, x: int, y: int) -> int:
-        """Return the largest part that a body comes to which leaves the closed cells round it."""
-        closed = closed_round(self.base, self.cost, (x, y))
+        """Return the largest part beside the closed cells around a point, or the nearest part."""
+        closed = closed_cells_around(self.base, self.cost, (x, y))
         if closed is None:
             return super().part_near(x, y)
         ring = np.pad(closed, 1)
@@ -168,15 +170,16 @@ def route_by_cost(
 ) -> I64 | None:
     """Return a cheapest path (n, 2) from `start` to `goal` [lattice], or None.
 
-    It is found on cells and then pulled taut where that makes it no dearer, so it is the cheapest
-    up to what a grid of cells can tell. Closed cells round the start are left, at the highest cost.
+    It is searched on cells and then pulled taut where that doesn't raise its cost, so it is the
+    cheapest up to the resolution of the grid. A route that starts in closed cells leaves them at
+    the highest cost.
 
     Args:
-        space: Where the body can be.
-        cost: int (rows, columns) [%], below 0 where no way leads; what is above 1000 counts as
-            1000.
-        start: Where it is.
-        goal: Where it wants to be.
+        space: The space of the body.
+        cost: Cost of each cell [%], int (rows, columns), below 0 for closed cells; values above
+            1000 count as 1000.
+        start: Where the body is (x, y) [lattice].
+        goal: Where it is to be (x, y) [lattice].
 
     Example:
         >>> import fleet2d
@@ -185,42 +188,42 @@ def route_by_cost(
         >>> a, b = (space.nearest(*home.plan.lattice.to_lattice(r.anchor_xy).tolist())
         ...         for r in home.rooms[:2])
         >>> free = np.zeros(home.plan.free.shape, np.int32)
-        >>> way = route_by_cost(space, free, a, b)
-        >>> tuple(way[0].tolist()) == a, tuple(way[-1].tolist()) == b
+        >>> route = route_by_cost(space, free, a, b)
+        >>> tuple(route[0].tolist()) == a, tuple(route[-1].tolist()) == b
         (True, True)
     """
     part = space.part_at(*goal)
     if part < 0:
         return None
     cells = space.part_of_cell == part
-    costs = np.where(cells & (cost >= 0), np.minimum(cost, MOST_COST), NO_WAY).astype(np.int32)
+    costs = np.where(cells & (cost >= 0), np.minimum(cost, MOST_COST), CLOSED).astype(np.int32)
     last = _nearest(space, costs >= 0, goal)
     if cost[goal[1] // SUB, goal[0] // SUB] < 0 or last is None:
         return None
-    closed = closed_round(space, costs, start)
+    closed = closed_cells_around(space, costs, start)
     if closed is not None:
-        costs[closed] = MOST_COST  # somebody who stands there leaves it
+        costs[closed] = MOST_COST  # a body that stands there may leave
     first = _nearest(space, costs >= 0, start)
     assert first is not None
     field = cost_distance(costs, last, first)
-    found = descend(costs, field, first)
-    if len(found) == 0:
+    route_cells = descend(costs, field, first)
+    if len(route_cells) == 0:
         return None
-    centres = found[:, ::-1] * SUB + CELL_CENTRE
+    centres = route_cells[:, ::-1] * SUB + CELL_CENTRE
     begin = space.route(start, (int(centres[0, 0]), int(centres[0, 1])))
     end = space.route((int(centres[-1, 0]), int(centres[-1, 1])), goal)
     if begin is None or end is None:
         return None
-    way = np.concatenate([begin[:-1], centres, end[1:]])
-    pulled = pull_taut(space.mesh, costs, np.ascontiguousarray(way))
+    route = np.concatenate([begin[:-1], centres, end[1:]])
+    pulled = pull_taut(space.mesh, costs, np.ascontiguousarray(route))
     pulled.setflags(write=False)
     return pulled
 
 
-def closed_round(
+def closed_cells_around(
     space: Space, cost: NDArray[np.signedinteger], at: tuple[int, int]
 ) -> NDArray[np.bool_] | None:
-    """Return the closed cells round a place, bool (rows, columns); None for an open one."""
+    """Return the closed cells around a place, bool (rows, columns); None for an open place."""
     closed = (space.part_of_cell >= 0) & (cost < 0)
     row, column = at[1] // SUB, at[0] // SUB
     if not closed[row, column]:
@@ -230,12 +233,14 @@ def closed_round(
     return mask
 
 
-def _nearest(space: Space, open_: NDArray[np.bool_], at: tuple[int, int]) -> tuple[int, int] | None:
+def _nearest(
+    space: Space, is_open: NDArray[np.bool_], at: tuple[int, int]
+) -> tuple[int, int] | None:
     """Return the (row, column) of the open cell nearest to a point; ties: lowest row, column."""
     row, column = at[1] // SUB, at[0] // SUB
-    if open_[row, column]:
+    if is_open[row, column]:
         return row, column
-    cells = np.argwhere(open_)
+    cells = np.argwhere(is_open)
     if len(cells) == 0:
         return None
     xs, ys = space.plan.lattice.centre_axes()

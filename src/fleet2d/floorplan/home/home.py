@@ -11,26 +11,26 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.cache import Cache
 from fleet2d.floorplan.geometry.gates import Gates, Segment
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.home.costmap import CostedSpace
 from fleet2d.floorplan.home.layers import COSTMAP, Layers
 from fleet2d.floorplan.home.space import Space
-from fleet2d.floorplan.kept import Kept
+from fleet2d.floorplan.names import find_named
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.problems import did_you_mean
 
-# Where one leaves a home whose plan names no entrance: the first of these that it has.
-WAYS_OUT = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")
-# Arrangements of doors and furniture whose walls and spaces are kept for when they come again.
-ARRANGEMENTS_KEPT = 128
-# Homes whose walls and spaces a process keeps for its next run, and what else of each.
-HOMES_KEPT = 8
-VALUES_KEPT = 512
+# Types of rooms through which people leave a home without an entrance, the likeliest first.
+EXIT_ROOMS = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")
+# Arrangements of doors and furniture whose walls and spaces are cached, for each home.
+CACHED_ARRANGEMENTS = 128
+# Homes whose walls and spaces a process caches for its next run, and further values of each.
+CACHED_HOMES = 8
+CACHED_VALUES = 512
 
 T = TypeVar("T")
 
@@ -38,16 +38,16 @@ NOTHING: frozenset[int] = frozenset()
 
 
 class Home:
-    """A floor plan as the entities of a run use it, and what of it changes during the run.
+    """The home of a run: its floor plan, and what changes of it during the run.
 
     Attributes:
         plan: The floor plan, which never changes.
         doors: The doorways that have a door, by the number of the door.
-        rooms: The rooms by index, as they are used at present.
-        objects: What stands in the home at present.
-        shut: The doors that are shut.
-        locked: The doors that nobody opens by hand.
-        version: Counts the changes.
+        rooms: The rooms by index, with their present types.
+        objects: The objects at their present places.
+        shut: Numbers of the doors that are shut.
+        locked: Numbers of the doors that nobody can open by hand.
+        version: Number of changes so far.
         layers: Named arrays with a value for each cell.
 
     Example:
@@ -69,15 +69,15 @@ class Home:
         self._shapes = _shapes_of(plan, [self.door_line(door) for door in range(len(self.doors))])
         self._walls: tuple[int, Mesh] = (-1, plan.mesh)
         self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
-        # The costs as they were when last asked for, how often they were others than before, and
-        # the spaces of bodies that mind them.
+        # The layer `costmap` at its last use, the number of its changes, and the spaces of bodies
+        # that pay its costs.
         self._costs: NDArray[np.int32] = np.zeros((0, 0), np.int32)
         self._costs_version = 0
         self._costed: dict[Space, CostedSpace] = {}
 
     @property
     def constants(self) -> dict[str, object]:
-        """What of it never changes during a run, by name."""
+        """The parts of it that never change during a run, by name."""
         return {"plan": self.plan, "walls": self.plan.mesh, "shapes": self._shapes}
 
     def draw(self, ax: Any = None) -> Any:
@@ -88,35 +88,37 @@ class Home:
         """Show the floor plan in a notebook, where matplotlib is installed."""
         return self.plan._repr_png_()
 
-    def kept(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what `make` returns, once for all runs in this home.
+    def cached(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the value of a key, which all runs in this home share.
 
         Args:
-            key: All that it depends on besides the floor plan: walls, spaces, objects, numbers.
-            make: Makes it. Nobody may change it afterwards: arrays must be read-only.
+            key: All that the value depends on besides the floor plan: walls, spaces, objects,
+                numbers.
+            make: Makes the value at its first use. It must not change afterwards: arrays must be
+                read-only.
         """
-        return self._shapes.kept.get(key, make)
+        return self._shapes.values.get(key, make)
 
     @property
     def walls(self) -> Mesh:
-        """What ends sight at present: the walls, shut doors and tall furniture [lattice]."""
+        """What blocks sight at present: walls, shut doors and tall furniture [lattice]."""
         if self._walls[0] != self.version:
             self._walls = self.version, self._shapes.walls(self.shut, _tall(self.objects))
         return self._walls[1]
 
     def space(self, radius: float, *, opens_doors: bool = False) -> Space:
-        """Return the space of bodies of a radius [m] at present, built when first asked for.
+        """Return the present space of bodies of a radius, built at its first use.
 
         Args:
-            radius: Of the body [m].
-            opens_doors: Whether shut doors that aren't locked are no hindrance.
+            radius: The radius of the body [m].
+            opens_doors: Whether the body passes shut doors that aren't locked.
         """
         shut = self.shut & self.locked if opens_doors else self.shut
         return self._shapes.space(radius, shut, self.objects)
 
     @property
     def costs_version(self) -> int:
-        """Counts the changes of the layer `costmap`; 0 without one."""
+        """Number of changes of the layer `costmap`; 0 without one."""
         if COSTMAP in self.layers:
             values = self.layers[COSTMAP].values
             if not np.array_equal(self._costs, values):
@@ -126,14 +128,14 @@ class Home:
 
     @property
     def hinders(self) -> bool:
-        """Whether ways may be closed at present that are open at other times."""
+        """Whether routes may be closed at present that are open at other times."""
         return bool(self.shut) or self.costs_version > 1
 
     def costed(self, space: Space) -> Space:
-        """Return what a space is to a body that minds the costmap: itself without one.
+        """Return the space of a body that pays the costs of the costmap; the same without one.
 
         Raises:
-            FloorPlanError: The costmap leaves no place to be.
+            FloorPlanError: The costmap leaves no place for the body.
         """
         if self.costs_version == 0:
             return space
@@ -142,7 +144,7 @@ class Home:
         return self._costed[space]
 
     def door_line(self, door: int) -> Segment:
-        """Return where a door is when shut [lattice]."""
+        """Return the segment at which a shut door stands [lattice]."""
         doorway = self.doors[door]
         (x0, y0), (x1, y1) = self.plan.lattice.to_lattice((doorway.start, doorway.end)).tolist()
         return (x0, y0), (x1, y1)
@@ -158,15 +160,15 @@ class Home:
         self.version += 1
 
     def put(self, thing: PlacedObject) -> None:
-        """Let an object stand as given, in place of the one of its name."""
+        """Replace the object of the same name."""
         self.objects = tuple(thing if o.name == thing.name else o for o in self.objects)
         self.version += 1
 
     def use_room_as(self, room: Room, kind: str) -> None:
         """Change what a room is used for."""
-        wanted = room_type(kind)
-        changed = replace(room, type=wanted, labels=(wanted,))
-        self.rooms = tuple(changed if r.index == room.index else r for r in self.rooms)
+        new_type = room_type(kind)
+        changed_room = replace(room, type=new_type, labels=(new_type,))
+        self.rooms = tuple(changed_room if r.index == room.index else r for r in self.rooms)
         self.version += 1
 
     def object(self, name: str) -> PlacedObject:
@@ -175,16 +177,10 @@ class Home:
         Raises:
             PlacementError: There is no such object.
         """
-        names = [thing.name for thing in self.objects]
-        if name in names:
-            return self.objects[names.index(name)]
-        raise PlacementError(
-            f"{self.plan.name} has no object {name!r}{did_you_mean(name, names)}"
-            f" Its objects are: {', '.join(names) or 'none'}"
-        )
+        return find_named(self.objects, name, self.plan.name, "object", PlacementError)
 
     def approach(self, use: UsePlace, space: Space, part: int) -> tuple[int, int]:
-        """Return the lattice point from which a body steps to the place where an object is used.
+        """Return the lattice point from which a body steps to a place where an object is used.
 
         Raises:
             PlacementError: The space has no such part.
@@ -193,17 +189,17 @@ class Home:
         x, y = self.plan.lattice.point_at(at)
         if space.part_at(x, y) == part:
             return x, y
-        near = space.nearest(x, y, part)
-        if near is None:
+        point = space.nearest(x, y, part)
+        if point is None:
             raise PlacementError(f"a body of radius {space.radius:g} m fits nowhere here")
-        return near
+        return point
 
     def room_of(self, thing: PlacedObject) -> Room | None:
-        """Return the room that holds the middle of an object, as the plan has it."""
+        """Return the room of the plan that holds the middle of an object."""
         return self._shapes.room_of(thing)
 
     def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
-        """Return where one steps from to a place on an object [lattice], if it is such a place."""
+        """Return the point from which a body steps to a place of use [lattice]; None for others."""
         if not self.objects:
             return None
         if self._places[0] != self.version:
@@ -225,18 +221,18 @@ class Home:
         Raises:
             PlacementError: The space has no such part.
         """
-        found = space.nearest(*self._door(space, part), part)
-        if found is None:
+        point = space.nearest(*self._door(space, part), part)
+        if point is None:
             raise PlacementError(
                 f"a body of radius {space.radius:g} m fits nowhere in {self.plan.name}"
             )
-        return found
+        return point
 
     def _door(self, space: Space, part: int) -> tuple[int, int]:
-        """Return the plan's entrance, or the middle of the room that one likely leaves from."""
+        """Return the plan's entrance, or the middle of the likeliest room with an exit."""
         at = self.plan.entrance
         if at is None:
-            rooms = [room for kind in WAYS_OUT for room in self.rooms if room.type == kind]
+            rooms = [room for kind in EXIT_ROOMS for room in self.rooms if room.type == kind]
             rooms += sorted(self.rooms, key=lambda room: -room.cells)
             reachable = (room for room in rooms if len(space.cells(room.index, part)))
             at = next(reachable, self.rooms[0]).anchor_xy
@@ -245,43 +241,43 @@ class Home:
 
 
 class _Shapes:
-    """Walls and spaces of a home, by what is shut and what stands where; runs share them."""
+    """Walls and spaces of a home, by shut doors and objects; all runs in the home share them."""
 
     def __init__(self, plan: FloorPlan, door_lines: Sequence[Segment]) -> None:
         self.plan = plan
-        self.kept = Kept(VALUES_KEPT)
+        self.values = Cache(CACHED_VALUES)
         self.door_lines = door_lines
         self._room_of: dict[str, tuple[PlacedObject, Room | None]] = {}
-        self.walls = lru_cache(ARRANGEMENTS_KEPT)(self._find_walls)
-        self._gates = lru_cache(ARRANGEMENTS_KEPT)(self._find_gates)
-        self.space_of = lru_cache(ARRANGEMENTS_KEPT)(self._find_space)
+        self.walls = lru_cache(CACHED_ARRANGEMENTS)(self._make_walls)
+        self._gates = lru_cache(CACHED_ARRANGEMENTS)(self._make_gates)
+        self.space_of = lru_cache(CACHED_ARRANGEMENTS)(self._make_space)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        """Return itself: branches of a run share it, too."""
+        """Return itself, as branches of a run share it, too."""
         return self
 
     def room_of(self, thing: PlacedObject) -> Room | None:
-        known = self._room_of.get(thing.name)
-        if known is None or known[0] is not thing:
+        entry = self._room_of.get(thing.name)
+        if entry is None or entry[0] is not thing:
             middle = thing.footprint.centroid
-            known = thing, self.plan.room_at(middle.x, middle.y)
-            self._room_of[thing.name] = known
-        return known[1]
+            entry = thing, self.plan.room_at(middle.x, middle.y)
+            self._room_of[thing.name] = entry
+        return entry[1]
 
     def space(
         self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]
     ) -> Space:
         return self.space_of(radius, frozenset(shut), _solid(objects))
 
-    def _find_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
+    def _make_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
         if not self.door_lines:
-            return self._built(tall)
+            return self._build_mesh(tall)
         return self._gates(tall).shut(shut)
 
-    def _find_gates(self, tall: tuple[PlacedObject, ...]) -> Gates:
-        return Gates(self._built(tall), self.door_lines)
+    def _make_gates(self, tall: tuple[PlacedObject, ...]) -> Gates:
+        return Gates(self._build_mesh(tall), self.door_lines)
 
-    def _built(self, tall: tuple[PlacedObject, ...]) -> Mesh:
+    def _build_mesh(self, tall: tuple[PlacedObject, ...]) -> Mesh:
         plan = self.plan
         if not tall and not self.door_lines:
             return plan.mesh
@@ -295,7 +291,7 @@ class _Shapes:
         corners = [end for line in self.door_lines for end in line]
         return build_mesh(polygons, plan.lattice.columns, plan.lattice.rows, corners)
 
-    def _find_space(
+    def _make_space(
         self, radius: float, shut: frozenset[int], solid: tuple[PlacedObject, ...]
     ) -> Space:
         space = Space(
@@ -309,17 +305,17 @@ class _Shapes:
         return space
 
 
-_SHAPES = Kept(HOMES_KEPT)
+_SHAPES = Cache(CACHED_HOMES)
 
 
 def keep_homes(count: int) -> None:
-    """Keep the walls and spaces of so many homes for later runs, about 10 MB each."""
-    _SHAPES.keep(count)
+    """Cache the walls and spaces of at least `count` homes for later runs, about 10 MB each."""
+    _SHAPES.grow(count)
 
 
 def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
-    """Return the walls and spaces of a plan with doors, the same for all runs in it."""
-    # The plan itself, not one like it: a state that is written to a file refers to it.
+    """Return the walls and spaces of a plan with doors, which all runs in it share."""
+    # By identity, since a state that is saved to a file refers to the plan itself.
     return _SHAPES.get((id(plan), *door_lines), lambda: _Shapes(plan, door_lines))
 
 

@@ -22,17 +22,17 @@ LayerType = Literal[
 ]  # fmt: skip
 
 SEEN_LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")
-"""Layers that a run keeps for each robot with a camera, as NAME.ROBOT."""
+"""Layers that a run itself maintains for each robot with a camera, as NAME.ROBOT."""
 COSTMAP = "costmap"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*(\.[A-Za-z][A-Za-z0-9_-]*)?")
 
 
 class LayerSettings(Settings):
-    """A layer of the floor plan: what its cells hold, and when it is stored."""
+    """A layer of the floor plan: type and unit of its values, and when it is stored."""
 
-    dtype: LayerType = Field(default="float", description="what a cell holds")
-    fill: float = Field(default=0.0, description="what every cell holds at first")
+    dtype: LayerType = Field(default="float", description="type of the values")
+    fill: float = Field(default=0.0, description="initial value of every cell")
     unit: str = Field(default="", description="unit of the values")
     description: str = Field(default="", description="one line for a reader of the file")
     store: bool = Field(default=True, description="whether a run stores it at its end")
@@ -50,7 +50,7 @@ class LayerSettings(Settings):
 
 
 def check_layers(layers: dict[str, LayerSettings]) -> dict[str, LayerSettings]:
-    """Refuse names that no layer can have, and settings that a layer of the run's own has not."""
+    """Refuse invalid names, and settings that don't apply to layers which the run maintains."""
     for name, settings in layers.items():
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
             raise problem_at(
@@ -83,11 +83,11 @@ class Layer:
 
     Attributes:
         name: Its name.
-        fill: What cells hold that nobody wrote to.
+        fill: Initial value of every cell.
         unit: Unit of the values.
-        description: What it is, in a line.
+        description: A line that says what it is.
         store: Whether a run stores it at its end.
-        every: How often it is stored besides; None for never.
+        every: Interval at which it is also stored before; None for never.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Layer:
         settings: LayerSettings,
         source: Callable[[], NDArray[Any]] | None = None,
     ) -> None:
-        """Make a layer whose cells all hold the fill; one with a source has its values from it."""
+        """Make a layer filled with its initial value, or one whose values come from `source`."""
         self.name, self.settings = name, settings
         self.fill: float = settings.fill
         self.unit, self.description = settings.unit, settings.description
@@ -109,7 +109,7 @@ class Layer:
             self._values: NDArray[Any] = np.full(shape, settings.fill, self.dtype)
 
     def __repr__(self) -> str:
-        """Say what it is."""
+        """Return name, type and unit."""
         return f"<Layer {self.name}: {self.dtype}{f' [{self.unit}]' if self.unit else ''}>"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -118,9 +118,9 @@ class Layer:
 
     @property
     def values(self) -> NDArray[Any]:
-        """The values, (rows, columns); write to the array, or assign another.
+        """The values (rows, columns); write to the array, or assign another.
 
-        Those of a layer that the run keeps itself are a copy, worked out when asked for.
+        The values of a layer that the run maintains itself are computed anew, and are a copy.
         """
         return self._values if self._source is None else self._source()
 
@@ -171,7 +171,7 @@ class Layers(Mapping[str, Layer]):
     """
 
     def __init__(self, plan: FloorPlan) -> None:
-        """Begin without any."""
+        """Make a mapping without layers."""
         self._plan = plan
         self._layers: dict[str, Layer] = {}
 
@@ -179,29 +179,29 @@ class Layers(Mapping[str, Layer]):
         """Return a layer.
 
         Raises:
-            ComponentError: There is none of that name; says which there are, and how to get one.
+            ComponentError: No layer has that name.
         """
         if name not in self._layers:
-            kept = name.partition(".")[0]
-            how = (
-                f"to have it kept, write floorplan.layers.{kept}: {{}} in the scenario, or"
-                f" needs = {{{kept!r}}} in an algorithm"
-                if kept in SEEN_LAYERS
+            base = name.partition(".")[0]
+            advice = (
+                f"to have it kept, write floorplan.layers.{base}: {{}} in the scenario, or"
+                f" needs = {{{base!r}}} in an algorithm"
+                if base in SEEN_LAYERS
                 else "add it by home.layers.add(), or in the scenario under floorplan.layers"
             )
             known = ", ".join(self._layers) or "none"
             raise ComponentError(
                 f"there is no layer {name!r}{did_you_mean(name, self._layers)} There are: {known};"
-                f" {how}"
+                f" {advice}"
             )
         return self._layers[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Go through the names."""
+        """Iterate over the names."""
         return iter(self._layers)
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of layers."""
         return len(self._layers)
 
     def __contains__(self, name: object) -> bool:
@@ -219,16 +219,16 @@ class Layers(Mapping[str, Layer]):
         store: bool = True,
         every: timedelta | None = None,
     ) -> Layer:
-        """Add a layer, and return it; one that is there already with the same cells is returned.
+        """Add a layer and return it; one of the same name, type and unit is returned as it is.
 
         Args:
             name: Its name: letters, digits, '_' and '-'.
-            dtype: What a cell holds.
-            fill: What every cell holds at first.
+            dtype: Type of the values.
+            fill: Initial value of every cell.
             unit: Unit of the values.
-            description: What it is, in a line.
+            description: A line that says what it is.
             store: Whether the run stores it at its end.
-            every: How often it is stored besides.
+            every: Interval at which it is also stored before.
 
         Raises:
             ComponentError: The name is taken by another layer, or something is wrong with it.
@@ -256,12 +256,12 @@ class Layers(Mapping[str, Layer]):
             raise ComponentError(
                 f"a layer can't be named {name!r}: use letters, digits, '_' and '-', a letter first"
             )
-        known = self._layers.get(name)
-        if known is None:
-            known = self._layers[name] = Layer(name, self._plan, settings, source)
-        elif (known.dtype, known.unit) != (np.dtype(settings.dtype), settings.unit):
+        layer = self._layers.get(name)
+        if layer is None:
+            layer = self._layers[name] = Layer(name, self._plan, settings, source)
+        elif (layer.dtype, layer.unit) != (np.dtype(settings.dtype), settings.unit):
             raise ComponentError(
-                f"there is a layer {name!r} of {known.dtype} [{known.unit}] already: name yours"
+                f"there is a layer {name!r} of {layer.dtype} [{layer.unit}] already: name yours"
                 " otherwise"
             )
-        return known
+        return layer

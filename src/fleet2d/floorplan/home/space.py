@@ -1,4 +1,4 @@
-"""Where a round body can be, and its shortest ways: the free space shrunk by the body's radius."""
+"""The space of a round body and its shortest routes: free space shrunk by the body's radius."""
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
@@ -11,9 +11,9 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
-from fleet2d.floorplan.kept import read_only
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.fields import walking_distance
 from fleet2d.kernels.mesh import (
@@ -27,12 +27,12 @@ from fleet2d.kernels.mesh import (
 from fleet2d.kernels.routes import Corners, Routes
 from fleet2d.kernels.sight import line_of_sight
 
-# Snapping the shrunk walls and rounding a pose move it by less than this many lattice units.
+# Snapping of the shrunk walls and rounding of a pose add up to less than this [lattice].
 ROUNDING = 3
-# How many free cells are tried for a way back into the space, nearest first.
+# Number of free cells that are tried for a way back into the space, nearest first.
 ESCAPES = 200
-# Answers that a space keeps for when they are asked for again.
-ROUTES_KEPT = 4096
+# Number of results that a space caches of each of its searches.
+CACHED_ROUTES = 4096
 
 I64 = NDArray[np.int64]
 
@@ -46,7 +46,7 @@ class Space:
     Attributes:
         radius: The body's radius [m].
         mesh: Triangles of the space [lattice]; empty when the body fits nowhere.
-        part_of_cell: int32 (rows, columns), the connected part that holds each cell's centre, -1
+        part_of_cell: The connected part that holds each cell's centre, int32 (rows, columns), -1
             where the body can't be.
         parts: Number of connected parts; part 0 holds the most cells.
     """
@@ -60,13 +60,13 @@ class Space:
         obstacles: Sequence[Polygon] = (),
         shut: Sequence[Segment] = (),
     ) -> None:
-        """Work out the space.
+        """Compute the space.
 
         Args:
             plan: The floor plan.
             radius: The body's radius [m].
-            walls: What a body can't see through; left out: the plan's.
-            obstacles: What else it can't drive through [lattice].
+            walls: The mesh that blocks sight; None for the plan's.
+            obstacles: Further obstacles to movement [lattice].
             shut: The lines of shut doors [lattice].
 
         Raises:
@@ -74,19 +74,19 @@ class Space:
         """
         self.plan = plan
         self.walls = plan.mesh if walls is None else walls
-        # What behaviors ask for again and again: the same rooms, and on rounds the same ways.
-        self.route = lru_cache(ROUTES_KEPT)(self._find_route)
+        # Behaviors repeat their searches: the same rooms, and on rounds the same routes.
+        self.route = lru_cache(CACHED_ROUTES)(self._find_route)
         self.cells = lru_cache(None)(self._find_cells)
-        self.nearest = lru_cache(ROUTES_KEPT)(self._find_nearest)
-        self.part_about = lru_cache(ROUTES_KEPT)(self._find_part)
+        self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
+        self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
         self.rooms_of = lru_cache(None)(self._find_rooms)
         self.radius = radius
-        self.key: tuple[Any, ...] = ()  # by which a home finds it again
+        self.key: tuple[Any, ...] = ()  # the home's key of this space
         lattice = plan.lattice
         reach = radius * lattice.units_per_m
         blocks = [np.asarray(o.exterior.coords) for o in obstacles]
         blocks += [np.array(segment, np.float64) for segment in shut]
-        polygons = _shrunk(plan.polygons, reach, [grown_shape(block, reach) for block in blocks])
+        polygons = _shrink(plan.polygons, reach, [grow_shape(block, reach) for block in blocks])
         if not polygons:
             raise FloorPlanError(
                 f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
@@ -97,7 +97,7 @@ class Space:
         triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
         part = label_triangles(self.mesh.neighbors)
         part_of_cell = np.where(triangles >= 0, part[triangles], -1)
-        # Parts too small to hold a cell's centre are of no use to anyone.
+        # Parts without a cell's centre rank last and aren't counted.
         sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
         order = np.argsort(-sizes, kind="stable")
         rank = np.empty_like(order)
@@ -109,12 +109,12 @@ class Space:
         self.parts = int(np.count_nonzero(sizes))
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Space":
-        """Return itself: what it holds never changes."""
+        """Return itself, as nothing in it changes."""
         return self
 
     @cached_property
     def routes(self) -> Routes:
-        """The corners of the space and the legs between them, built when first needed."""
+        """The corners of the space and the legs between them, built at their first use."""
         return Routes(self.mesh, self._corners())
 
     def part_at(self, x: int, y: int) -> int:
@@ -124,7 +124,7 @@ class Space:
         return int(self._part_of_triangle[locate(self.mesh, x, y)])
 
     def part_near(self, x: int, y: int) -> int:
-        """Return the part for a body that stands where it can't be: the nearest one."""
+        """Return the part nearest to a point outside the space."""
         near = self.nearest(x, y)
         return 0 if near is None else self.part_at(*near)
 
@@ -140,7 +140,7 @@ class Space:
         return self.part_near(x, y) if part < 0 else part
 
     def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
-        """Return the cells (n, 2) as (row, column) of a part of the space, in one room if given."""
+        """Return the cells (row, column) of a part of the space, or of a room, int64 (n, 2)."""
         mask = self.part_of_cell == part
         if room is not None:
             mask &= self.plan.room_of_cell == room
@@ -150,13 +150,13 @@ class Space:
         self, x: int, y: int, part: int | None = None, room: int | None = None
     ) -> tuple[int, int] | None:
         """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
-        found = self._by_distance(x, y, part, room)
-        return self.plan.lattice.cell_centre(*found[0].tolist()) if len(found) else None
+        cells = self._by_distance(x, y, part, room)
+        return self.plan.lattice.cell_centre(*cells[0].tolist()) if len(cells) else None
 
     def _find_route(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
         """Return the shortest path (n, 2) from `start` to `goal` [lattice], or None.
 
-        A start on the border of the space, where a walk can be broken off, first steps back in.
+        From a start on the border of the space, where a walk may end early, it first leads inside.
         """
         if not strictly_inside(self.mesh, *goal):
             return None
@@ -168,19 +168,19 @@ class Space:
         return None if route is None else read_only(np.concatenate([[start], route]))
 
     def distance_field(self, places: I64) -> NDArray[np.float64]:
-        """Return how far each cell is on foot from the nearest of some places.
+        """Return the walking distance of each cell from the nearest of some places.
 
         Args:
             places: Lattice points (n, 2).
 
         Returns:
-            float64 (rows, columns) [m], steps to sides and corners of cells, so up to 8 % longer
-            than the straight way; infinite where the body can't be or come from.
+            float64 (rows, columns) [m], by steps to sides and corners of cells, so up to 8 % longer
+            than the straight line; infinite where the body can't be or come from.
         """
         return self._metres(self._steps(places))
 
     def distances(self, place: tuple[int, int], points: I64) -> NDArray[np.float64]:
-        """Return how far some points are on foot from a place, as `distance_field` measures.
+        """Return the walking distances of points from a place, as `distance_field` measures them.
 
         Args:
             place: Lattice point.
@@ -218,7 +218,7 @@ class Space:
         return cells[np.argsort(away, kind="stable")]
 
     def _corners(self) -> Corners:
-        """Find the vertices where the border turns into the space."""
+        """Return the vertices at which the border turns into the space."""
         vertices = self.mesh.vertices
         before, at, after = [], [], []
         for polygon in self._polygons:
@@ -228,8 +228,10 @@ class Space:
                 at.append(points)
                 after.append(np.roll(points, -1, axis=0))
         p, q, r = np.concatenate(before), np.concatenate(at), np.concatenate(after)
-        a, b = q - p, r - q
-        reflex = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0  # the free space lies to the left
+        into, out = q - p, r - q
+        reflex = (
+            into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
+        )  # the free space lies to the left
         keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
         ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
         walls_meeting = np.bincount(ids, minlength=len(vertices))
@@ -242,21 +244,21 @@ class Space:
         )
 
 
-def _shrunk(
+def _shrink(
     polygons: Sequence[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
 ) -> list[Polygon]:
-    """Return the polygons [lattice] shrunk by an octagon of at least `radius` to each side.
+    """Shrink polygons by an octagon of at least `radius` to each side.
 
     Args:
-        polygons: Free space.
-        radius: Of the body.
-        blocked: Places taken out of what is left.
+        polygons: Free space [lattice].
+        radius: The radius of the body [lattice].
+        blocked: Shapes that are removed from the result.
     """
     octagon = _octagon(radius)
     shrunk: list[Polygon] = []
     for polygon in polygons:
         grown = [
-            _grown_walls(np.asarray(r.coords), octagon)
+            _grow_walls(np.asarray(r.coords), octagon)
             for r in (polygon.exterior, *polygon.interiors)
         ]
         grown.append(np.array(blocked, np.object_))
@@ -275,20 +277,20 @@ def _octagon(radius: float) -> I64:
     return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
 
 
-def grown_shape(corners: NDArray[np.float64], radius: float) -> BaseGeometry:
-    """Return a line or the inside of a ring [lattice], grown by the octagon of a body.
+def grow_shape(corners: NDArray[np.float64], radius: float) -> BaseGeometry:
+    """Grow a line, or the inside of a ring [lattice], by the octagon of a body.
 
     Args:
         corners: Two ends, or the closed ring of an outline, float64 (n, 2).
-        radius: Of the body [lattice].
+        radius: The radius of the body [lattice].
     """
-    walls = _grown_walls(corners, _octagon(radius))
+    walls = _grow_walls(corners, _octagon(radius))
     solid = [Polygon(corners)] if len(corners) > 3 else []
     return shapely.union_all([*walls, *solid])
 
 
-def _grown_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:
-    """Return every wall of a ring, grown by the octagon, as convex polygons."""
+def _grow_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:
+    """Grow every wall of a ring by the octagon; return convex polygons."""
     ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
     return np.asarray(shapely.convex_hull(shapely.multipoints(ends)))
 
@@ -298,5 +300,5 @@ def _even_at_least(value: float) -> int:
 
 
 def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:
-    """Return the way straight on: int64 (2, 2), read-only as those of `Space.route` are."""
+    """Return the straight route, int64 (2, 2), read-only as those of `Space.route` are."""
     return read_only(np.array([begin, end], np.int64))

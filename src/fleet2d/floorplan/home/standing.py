@@ -1,4 +1,4 @@
-"""Where a body can stand among walls and furniture, on cells, and how it gets to use an object."""
+"""Cells where a body can stand among walls and furniture, and places to use an object from."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -16,15 +16,15 @@ from fleet2d.kernels.mesh import locate, strictly_inside
 from fleet2d.kernels.sight import line_of_sight
 
 BODY_RADIUS = 0.25
-"""The radius of the body that furniture leaves ways for [m]: a large person's."""
+"""The radius of the body that furniture leaves space for [m]: that of a large person."""
 
-# How far from what it is used for a body may stand [m]; for somebody who sits or lies there, how
-# far it is to the nearest place to get on from.
+# How far from a place of use a body may stand [m]; and how far from it a body that sits or lies
+# there may get up.
 STAND_REACH = 0.35
 SIT_REACH = 1.6
-# The nearest places that are tried for a way onto a piece of furniture.
-TRIED = 600
-# Lattice units that snapping of the grown footprint may add.
+# Number of cells that are tried for a way onto a piece of furniture, nearest first.
+ATTEMPTS = 600
+# What snapping of the grown footprint may add [lattice].
 SLACK = 8
 HALF = UNITS_PER_CELL // 2
 
@@ -34,15 +34,15 @@ Window = tuple[slice, slice]
 def standing_cells(
     plan: FloorPlan, radius: float, objects: Iterable[PlacedObject] | None = None
 ) -> NDArray[np.bool_]:
-    """Return the cells on which the middle of a body can be, bool (rows, columns).
+    """Return the cells where the middle of a body can be, bool (rows, columns).
 
-    A cell beside furniture counts if the body can be all over it: neighbors among the cells are
-    joined in truth.
+    A cell beside furniture counts only if the body can be at every point of it, so that a body can
+    walk between neighboring cells.
 
     Args:
         plan: The floor plan.
         radius: The body's radius [m].
-        objects: The furniture to mind; None for the plan's.
+        objects: The furniture in the way; None for the plan's.
 
     Raises:
         FloorPlanError: The body fits nowhere between the walls.
@@ -90,16 +90,16 @@ def with_approaches(
     standing: NDArray[np.bool_],
     others: Iterable[PlacedObject] = (),
 ) -> PlacedObject:
-    """Return an object with only those places to use it from that a body can get to.
+    """Return an object with only those places of use that a body can get to.
 
-    Somebody who stands before an object stands on the nearest cell where there is room. Somebody
-    who sits or lies on it gets there from the nearest such cell in sight of the place.
+    A person who stands at an object stands on the nearest cell where a body can stand. A person who
+    sits or lies on it gets there from the nearest such cell in sight of the place.
 
     Args:
-        plan: The floor plan, whose walls are not stepped through.
-        thing: The object; its own footprint is already taken from `standing`.
-        standing: Where the middle of the body can be, bool (rows, columns).
-        others: What else there is, which is not stepped over; a chair that one sits on may be.
+        plan: The floor plan.
+        thing: The object; `standing` already excludes its footprint.
+        standing: Cells where the middle of the body can be, bool (rows, columns).
+        others: Other objects, over which no body steps, except for a chair to sit on.
     """
     x0, y0, x1, y1 = thing.footprint.bounds
     near = shapely.box(x0 - SIT_REACH, y0 - SIT_REACH, x1 + SIT_REACH, y1 + SIT_REACH)
@@ -112,9 +112,9 @@ def with_approaches(
     for use in thing.uses:
         reach = STAND_REACH if use.posture == "stand" else SIT_REACH
         at = Point(use.x, use.y)
-        seat = use.posture != "stand"
-        in_the_way = [shape for shape in solid if not (seat and shape.intersects(at))]
-        cell = nearest_standing(plan, use, standing, reach, in_the_way)
+        is_seat = use.posture != "stand"
+        obstacles = [shape for shape in solid if not (is_seat and shape.intersects(at))]
+        cell = nearest_standing(plan, use, standing, reach, obstacles)
         if cell is None:
             continue
         x, y = plan.lattice.to_metres(plan.lattice.cell_centre(*cell)).tolist()
@@ -129,16 +129,16 @@ def nearest_standing(
     use: UsePlace,
     standing: NDArray[np.bool_],
     reach: float,
-    in_the_way: Sequence[Polygon] = (),
+    obstacles: Sequence[Polygon] = (),
 ) -> tuple[int, int] | None:
-    """Return the cell (row, column) to get to a use place from, or None if there is none.
+    """Return the cell (row, column) from which a body gets to a place of use, or None.
 
     Args:
         plan: The floor plan.
         use: The place.
-        standing: Where the middle of the body can be, bool (rows, columns).
-        reach: How far it may be from the place [m].
-        in_the_way: What is not stepped over [m].
+        standing: Cells where the middle of the body can be, bool (rows, columns).
+        reach: Largest distance from the place [m].
+        obstacles: Shapes over which no body steps [m].
     """
     lattice = plan.lattice
     x, y = lattice.point_at((use.x, use.y))
@@ -152,19 +152,19 @@ def nearest_standing(
     away = (xs[columns] - x) ** 2 + (ys[rows] - y) ** 2
     near = np.flatnonzero(away <= units * units)
     triangle = locate(plan.mesh, x, y)
-    for i in near[np.argsort(away[near], kind="stable")][:TRIED].tolist():
+    for i in near[np.argsort(away[near], kind="stable")][:ATTEMPTS].tolist():
         row, column = int(rows[i]), int(columns[i])
         centre = lattice.cell_centre(row, column)
         if not line_of_sight(plan.mesh, x, y, triangle, *centre):
             continue
         step = LineString([(use.x, use.y), lattice.to_metres(centre).tolist()])
-        if not any(step.intersects(shape) for shape in in_the_way):
+        if not any(step.intersects(shape) for shape in obstacles):
             return row, column
     return None
 
 
 def _window(lattice: Lattice, points: NDArray[np.int64]) -> Window:
-    """Return the rows and columns of the cells round lattice points (n, 2)."""
+    """Return the rows and columns of the cells around lattice points (n, 2)."""
     (x0, y0), (x1, y1) = points.min(axis=0) // UNITS_PER_CELL, points.max(axis=0) // UNITS_PER_CELL
     rows = slice(*np.clip((y0, y1 + 1), 0, lattice.rows).tolist())
     columns = slice(*np.clip((x0, x1 + 1), 0, lattice.columns).tolist())

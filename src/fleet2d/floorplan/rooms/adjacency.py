@@ -1,4 +1,4 @@
-"""Which rooms one can walk to from a room: through doorways, and across borders without a wall."""
+"""Links between rooms: doorways, and borders without a wall."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from fleet2d.floorplan.rooms.doorways import Doorway, Segment
 
 _CENTRE = UNITS_PER_CELL // 2 + 1
 
-# A shorter border without a wall, in cells, is where two walls' cells happen to touch.
+# Least length of an open border [cells]; a shorter one is an artifact of the cells at walls.
 MIN_SIDES = 2
 
 
 @dataclass(frozen=True)
 class RoomLink:
-    """A way between two rooms.
+    """A link between two rooms.
 
     Attributes:
         rooms: Their indices, the lower first.
@@ -36,7 +36,7 @@ class RoomLink:
 def room_links(
     lattice: Lattice, room_of_cell: NDArray[np.int16], doorways: Sequence[Doorway]
 ) -> tuple[RoomLink, ...]:
-    """Return the ways between rooms: doorways by index, then open borders by rooms."""
+    """Return the links between rooms: doorways by index, then open borders by rooms."""
     doors = [
         RoomLink((min(d.rooms), max(d.rooms)), "doorway", d.width_m, d.index)
         for d in doorways
@@ -47,23 +47,23 @@ def room_links(
 
 
 def doorway_segments(lattice: Lattice, doorways: Sequence[Doorway]) -> list[Segment]:
-    """Return where doorways are [lattice]."""
-    found = []
+    """Return the doorways as segments [lattice]."""
+    segments = []
     for doorway in doorways:
         (x0, y0), (x1, y1) = lattice.to_lattice((doorway.start, doorway.end)).tolist()
-        found.append(((x0, y0), (x1, y1)))
-    return found
+        segments.append(((x0, y0), (x1, y1)))
+    return segments
 
 
 def open_borders(
     lattice: Lattice, room_of_cell: NDArray[np.int16], passages: Sequence[Segment]
 ) -> tuple[RoomLink, ...]:
-    """Return where rooms meet without a wall, other than in a passage.
+    """Return the borders of rooms without a wall, except in passages.
 
     Args:
         lattice: Of the plan.
         room_of_cell: Room index of each cell, -1 where not free.
-        passages: Doorways [lattice]: cells on their two sides don't count.
+        passages: Doorways [lattice]; borders across them don't count.
     """
     counts: dict[tuple[int, int], list[int]] = {}
     for axis in (0, 1):
@@ -74,8 +74,8 @@ def open_borders(
         for passage in passages:
             across |= _crosses(first, step, passage)
         pairs = np.sort(pairs[~across], axis=1)
-        found, sides = np.unique(pairs[:, 0] * 2**16 + pairs[:, 1], return_counts=True)
-        for pair, number in zip(found.tolist(), sides.tolist(), strict=True):
+        keys, sides = np.unique(pairs[:, 0] * 2**16 + pairs[:, 1], return_counts=True)
+        for pair, number in zip(keys.tolist(), sides.tolist(), strict=True):
             counts.setdefault(divmod(pair, 2**16), [0, 0])[axis] = number
     return tuple(
         RoomLink(rooms, "open", max(sides) * lattice.cell)
@@ -85,7 +85,7 @@ def open_borders(
 
 
 def _border(rooms: NDArray[np.int16], axis: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the (row, column) of cells whose next one has another room, and both rooms."""
+    """Return the (row, column) of cells whose successor has another room, and both rooms."""
     before, after = (rooms[:-1], rooms[1:]) if axis == 0 else (rooms[:, :-1], rooms[:, 1:])
     differ = (before != after) & (before >= 0) & (after >= 0)
     pairs = np.stack([before[differ], after[differ]], axis=1).astype(np.int64)
@@ -100,13 +100,15 @@ def _crosses(
     along = np.array(passage[1]) - start
 
     def side(
-        of: NDArray[np.int64], way: NDArray[np.int64], point: NDArray[np.int64]
+        origin: NDArray[np.int64], direction: NDArray[np.int64], point: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        gap = point - of
-        turn: NDArray[np.int64] = np.sign(way[..., 0] * gap[..., 1] - way[..., 1] * gap[..., 0])
+        gap = point - origin
+        turn: NDArray[np.int64] = np.sign(
+            direction[..., 0] * gap[..., 1] - direction[..., 1] * gap[..., 0]
+        )
         return turn
 
-    parted = side(start, along, first) * side(start, along, first + step) <= 0
-    between = side(first, step, start) * side(first, step, start + along) <= 0
-    both: NDArray[np.bool_] = parted & between
+    meets_line = side(start, along, first) * side(start, along, first + step) <= 0
+    meets_segment = side(first, step, start) * side(first, step, start + along) <= 0
+    both: NDArray[np.bool_] = meets_line & meets_segment
     return both

@@ -1,4 +1,4 @@
-"""Chambers: what the passages of a floor plan cut its free space into."""
+"""Chambers: the parts into which passages cut the free space of a floor plan."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from fleet2d.kernels.chambers import spread_labels
 from fleet2d.kernels.mesh import WALL, Mesh, label_triangles, rasterize_cells
 
 MIN_CHAMBER_M2 = 0.8
-"""What is smaller, such as the space within a thick wall, is no room."""
+"""Least area of a chamber; smaller ones, such as space in a thick wall, are joined to others."""
 
 I32 = NDArray[np.int32]
 
@@ -40,7 +40,7 @@ class Chambers:
     Attributes:
         of_cell: The chamber of each free cell, -1 elsewhere, int32 (rows, columns).
         count: Number of chambers; each has a cell.
-        links: The passages between them that really part them.
+        links: The passages that separate two of them.
     """
 
     of_cell: I32
@@ -58,8 +58,8 @@ def cut_chambers(
 ) -> Chambers:
     """Cut free space at passages.
 
-    A passage with the same chamber on both sides parts nothing, and is ignored. So is the widest
-    passage of a chamber that is too small.
+    A passage with the same chamber on both sides is ignored. So is the widest passage of a chamber
+    that is too small.
 
     Args:
         lattice: Of the plan.
@@ -69,8 +69,8 @@ def cut_chambers(
         segments: The passages [lattice], exactly from wall to wall; they don't touch each other.
         min_area_m2: Chambers smaller than this are joined to others [m²].
     """
-    known = {(x, y) for x, y in mesh.vertices.tolist()}
-    jambs = [end for segment in segments for end in segment if end not in known]
+    corners = {(x, y) for x, y in mesh.vertices.tolist()}
+    jambs = [end for segment in segments for end in segment if end not in corners]
     if jambs:
         mesh = build_mesh(polygons, lattice.columns, lattice.rows, corners=jambs)
     gates = Gates(mesh, segments)
@@ -79,25 +79,27 @@ def cut_chambers(
     sides = _sides(gates.mesh, shut, part, segments)
     areas = _areas(shut, part) / lattice.units_per_m**2
     lengths = [(x1 - x0) ** 2 + (y1 - y0) ** 2 for (x0, y0), (x1, y1) in segments]
-    joined = _joined(areas, sides, lengths, min_area_m2)
+    joined = _join_small(areas, sides, lengths, min_area_m2)
     triangle = rasterize_cells(shut, lattice.rows, lattice.columns)
     chamber = np.append(joined[part], -1).astype(np.int32)[triangle]  # the last serves -1
-    if (free & (chamber < 0)).any():  # a centre that lies on a passage has no triangle
+    if (free & (chamber < 0)).any():  # the centre of a cell on a passage has no triangle
         chamber = spread_labels(chamber, free)
-    return _numbered(chamber, free, joined, sides)
+    return _number_chambers(chamber, free, joined, sides)
 
 
 def _sides(
-    whole: Mesh, shut: Mesh, part: I32, segments: Sequence[Segment]
+    open_mesh: Mesh, shut_mesh: Mesh, part: I32, segments: Sequence[Segment]
 ) -> list[tuple[int, int]]:
     """Return the parts on the two sides of each passage."""
     number = {frozenset(segment): i for i, segment in enumerate(segments)}
-    found: list[list[int]] = [[] for _ in segments]
-    for triangle, edge in np.argwhere((whole.neighbors != WALL) & (shut.neighbors == WALL)):
-        ends = whole.triangles[triangle, [edge, (edge + 1) % 3]]
-        (x0, y0), (x1, y1) = whole.vertices[ends].tolist()
-        found[number[frozenset(((x0, y0), (x1, y1)))]].append(int(part[triangle]))
-    return [(min(parts), max(parts)) for parts in found]
+    parts_beside: list[list[int]] = [[] for _ in segments]
+    for triangle, edge in np.argwhere(
+        (open_mesh.neighbors != WALL) & (shut_mesh.neighbors == WALL)
+    ):
+        ends = open_mesh.triangles[triangle, [edge, (edge + 1) % 3]]
+        (x0, y0), (x1, y1) = open_mesh.vertices[ends].tolist()
+        parts_beside[number[frozenset(((x0, y0), (x1, y1)))]].append(int(part[triangle]))
+    return [(min(parts), max(parts)) for parts in parts_beside]
 
 
 def _areas(mesh: Mesh, part: I32) -> NDArray[np.float64]:
@@ -109,13 +111,13 @@ def _areas(mesh: Mesh, part: I32) -> NDArray[np.float64]:
     return total / 2
 
 
-def _joined(
+def _join_small(
     areas: NDArray[np.float64],
     sides: Sequence[tuple[int, int]],
     lengths: Sequence[int],
     min_area_m2: float,
 ) -> NDArray[np.int64]:
-    """Return which parts are one chamber: for each part the lowest part of its chamber."""
+    """Join small parts to others; return for each part the lowest part of its chamber."""
     owner = np.arange(len(areas))
     total = areas.copy()
     while True:
@@ -134,7 +136,7 @@ def _joined(
         owner[owner == high] = low
 
 
-def _numbered(
+def _number_chambers(
     chamber: I32,
     free: NDArray[np.bool_],
     joined: NDArray[np.int64],
@@ -142,11 +144,11 @@ def _numbered(
 ) -> Chambers:
     """Return the chambers numbered by their first cells, row by row."""
     lost = free & (chamber < 0)
-    if lost.any():  # free cells that no way across sides leads to
+    if lost.any():  # free cells that share no side with others
         chamber = np.where(lost, len(joined), chamber).astype(np.int32)
-    found = chamber[free]
+    chamber_of_free = chamber[free]
     first = np.full(len(joined) + 1, -1)
-    first[found[::-1]] = np.arange(len(found))[::-1]  # of equals the last, so the first, stays
+    first[chamber_of_free[::-1]] = np.arange(len(chamber_of_free))[::-1]  # the last write wins
     kinds = np.flatnonzero(first >= 0)
     number = np.full(len(joined) + 2, -1, np.int32)
     number[kinds[np.argsort(first[kinds], kind="stable")]] = np.arange(len(kinds))

@@ -1,4 +1,4 @@
-"""Find the passages of a floor plan: where the way between two walls is short, and opens out.
+"""Find the passages of a floor plan: short lines between walls, with wider space on both sides.
 
 A passage is a line from a corner of a wall to another corner, or to the nearest point of a wall,
 that can't be made shorter by moving its ends: where the clearance to the walls has a local minimum.
@@ -22,52 +22,41 @@ I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
 
 MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.4
-"""Widths of doorways: a person doesn't get through less, and double doors end at about that."""
+"""Widths of doorways, from what a person fits through to a double door."""
 MAX_OPENING_M = 2.8
-"""The widest opening that still parts two rooms, as between a kitchen and where one eats."""
+"""The widest opening that still separates rooms, such as a kitchen and its dining area."""
 LEAN = 0.2
-"""How far a passage may lean: sine of the angle between it and the shortest. Traced walls do."""
+"""Largest sine of the angle between a passage and the shortest line, since traced walls lean."""
 OFFSETS_M = (0.15, 0.3, 0.45, 0.6)
-"""How far behind a passage the space is looked at; the last is the thickest wall."""
+"""Distances behind a passage at which the space is checked; the last is the thickest wall."""
 WIDENINGS_M = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
-"""By how much the space behind a passage may be seen to be wider, on either side of it."""
+"""Amounts of widening, on either side of a passage, that are checked behind it."""
 MIN_WIDENING_M, WIDENING_SHARE = 0.3, 0.2
-"""So much wider it must be: in metres, and in parts of the passage's width."""
+"""Least widening behind a passage: in metres, and as a share of its width."""
 APART_M = 0.5
 """Passages with middles nearer than this are the two sides of one wall."""
 SHRINK = 0.97
-"""How much of a passage must be seen from its middle: its ends, on walls, see nothing."""
+"""Share of a passage that must be visible from its middle; the very ends are on walls."""
 STUB_M = (0.15, 0.3, 0.45)
-"""How far beyond the ends of an opening there must be wall: it is a gap in one."""
+"""Distances beyond the ends of an opening at which there must be wall for it to be a gap in one."""
 ASIDE_M = 0.06
-"""How far beside that line the wall may be found."""
+"""How far beside the line of an opening that wall may be."""
 SIDEWAYS = (-1, 0, 1)
 TINY = 1e-9
 PER_CORNER = 6
-"""The shortest of so many passages that could end at a corner are looked at."""
-
-
-@dataclass(frozen=True)
-class Passage:
-    """A short way from wall to wall.
-
-    Attributes:
-        segment: Its ends [lattice], even, on corners or within a unit of a wall.
-        width_m: Distance between its ends [m].
-    """
-
-    segment: Segment
-    width_m: float
-
-    @property
-    def is_doorway(self) -> bool:
-        """Whether it is as narrow as a doorway; else it is a wider opening."""
-        return self.width_m <= MAX_DOOR_M
+"""Number of passages that are checked for each corner, the shortest first."""
 
 
 @dataclass(frozen=True)
 class _Walls:
-    """All walls: start, end, and what comes before and after each start; float64 (n, 2)."""
+    """All walls.
+
+    Attributes:
+        start: First corner of each wall [lattice], float64 (n, 2).
+        end: Its last corner.
+        before: The corner before `start` on the same ring.
+        reflex: Whether the corner at `start` stands out into free space, bool (n,).
+    """
 
     start: F64
     end: F64
@@ -77,8 +66,8 @@ class _Walls:
 
 def find_passages(
     mesh: Mesh, polygons: Sequence[Polygon], units_per_m: float, *, gaps_only: bool = True
-) -> list[Passage]:
-    """Return where free space narrows and opens out again on both sides, the shortest first.
+) -> list[Segment]:
+    """Return the lines at which free space narrows and opens out on both sides, shortest first.
 
     Args:
         mesh: The free space.
@@ -88,7 +77,8 @@ def find_passages(
             narrowing counts.
 
     Returns:
-        Lines that don't touch each other.
+        Lines that don't touch each other [lattice]; their ends have even coordinates, and are on
+        corners or within a unit of a wall.
     """
     walls = _walls(polygons)
     lines = np.concatenate([_corner_to_corner(walls, units_per_m), _to_walls(walls, units_per_m)])
@@ -98,13 +88,8 @@ def find_passages(
         lines = lines[_opens(mesh, lines, side, units_per_m)]
     if gaps_only:
         lines = lines[_in_a_wall(mesh, walls, lines, units_per_m)]
-    return [
-        Passage(
-            ((int(x0), int(y0)), (int(x1), int(y1))),
-            float(((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5) / units_per_m,
-        )
-        for x0, y0, x1, y1 in lines[_one_of_each(lines, units_per_m)].tolist()
-    ]
+    apart = lines[_one_of_each(lines, units_per_m)].tolist()
+    return [((x0, y0), (x1, y1)) for x0, y0, x1, y1 in apart]
 
 
 def _walls(polygons: Sequence[Polygon]) -> _Walls:
@@ -126,8 +111,8 @@ def _corner_to_corner(walls: _Walls, units_per_m: float) -> I64:
     chosen = np.flatnonzero(walls.reflex)
     tree = shapely.STRtree(np.asarray(shapely.points(walls.start[chosen])))
     first, second = tree.query(_around(walls.start[chosen], units_per_m))
-    once = first < second
-    first, second = chosen[first[once]], chosen[second[once]]
+    in_order = first < second
+    first, second = chosen[first[in_order]], chosen[second[in_order]]
     length2 = _length2(np.hstack([walls.start[first], walls.start[second]]).astype(np.int64))
     near = length2 <= (MAX_OPENING_M * units_per_m) ** 2
     first, second = first[near], second[near]
@@ -163,22 +148,22 @@ def _around(points: F64, units_per_m: float) -> NDArray[np.object_]:
 
 
 def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> NDArray[np.bool_]:
-    """Return whether lines to other points don't get shorter by moving off the corner."""
-    well = np.ones(len(corner), np.bool_)
+    """Return which lines to other points get no shorter if their end moves off the corner."""
+    is_shortest = np.ones(len(corner), np.bool_)
     line = other - walls.start[corner]
     length = np.sqrt((line * line).sum(axis=1))
     for side in (walls.before[corner], walls.end[corner]):
         wall = side - walls.start[corner]
-        along = (line * wall).sum(axis=1)
-        well &= along <= LEAN * length * np.sqrt((wall * wall).sum(axis=1))
-    return well
+        component = (line * wall).sum(axis=1)
+        is_shortest &= component <= LEAN * length * np.sqrt((wall * wall).sum(axis=1))
+    return is_shortest
 
 
 def _of_width(lines: I64, units_per_m: float) -> I64:
     length2 = _length2(lines)
     low, high = (MIN_DOOR_M * units_per_m) ** 2, (MAX_OPENING_M * units_per_m) ** 2
-    kept: I64 = lines[(length2 >= low) & (length2 <= high)]
-    return kept
+    fitting: I64 = lines[(length2 >= low) & (length2 <= high)]
+    return fitting
 
 
 def _length2(lines: I64) -> I64:
@@ -188,16 +173,16 @@ def _length2(lines: I64) -> I64:
 
 
 def _shortest_first(lines: I64) -> I64:
-    """Return the lines in one order, of those from one corner only the shortest."""
+    """Sort the lines by length, and drop all but the shortest from each corner."""
     order = np.lexsort((*lines.T[::-1], _length2(lines)))
     ordered = lines[order]
     keys = _keys(ordered[:, :2])
     by_corner = np.argsort(keys, kind="stable")
-    found = keys[by_corner]
-    rank = np.arange(len(found)) - np.searchsorted(found, found)
-    kept = np.empty(len(ordered), np.bool_)
-    kept[by_corner] = rank < PER_CORNER
-    result: I64 = ordered[kept]
+    sorted_keys = keys[by_corner]
+    rank = np.arange(len(sorted_keys)) - np.searchsorted(sorted_keys, sorted_keys)
+    is_short = np.empty(len(ordered), np.bool_)
+    is_short[by_corner] = rank < PER_CORNER
+    result: I64 = ordered[is_short]
     return result
 
 
@@ -211,7 +196,7 @@ def _all_free(mesh: Mesh, lines: I64) -> NDArray[np.bool_]:
 
 
 def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.bool_]:
-    """Return which lines have clearly wider space behind them on a side (1 is the left)."""
+    """Return which lines have wider space behind them on a side (1: left, -1: right)."""
     span = (lines[:, 2:] - lines[:, :2]).astype(np.float64)
     length = np.sqrt((span * span).sum(axis=1))
     along = span / length[:, None]
@@ -219,46 +204,46 @@ def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.
     middle = (lines[:, :2] + lines[:, 2:]) // 2
     needed = np.maximum(MIN_WIDENING_M, WIDENING_SHARE * length / units_per_m)
     opens = np.zeros(len(lines), np.bool_)
-    waiting = np.arange(len(lines))
+    undecided = np.arange(len(lines))
     for offset in OFFSETS_M:
         behind = middle + np.rint(away * (offset * units_per_m)).astype(np.int64)
-        waiting = waiting[see_each(mesh, middle[waiting], behind[waiting])]
+        undecided = undecided[see_each(mesh, middle[undecided], behind[undecided])]
         targets = [
-            along[waiting] * (length[waiting] / 2 + step * units_per_m)[:, None] * direction
+            along[undecided] * (length[undecided] / 2 + step * units_per_m)[:, None] * direction
             for direction in (1, -1)
             for step in WIDENINGS_M
         ]
-        # One line after the other, so that its eye is looked up once.
-        eyes = np.repeat(behind[waiting], len(targets), axis=0)
-        there = eyes + np.rint(np.stack(targets, axis=1).reshape(-1, 2)).astype(np.int64)
-        seen = see_each(mesh, eyes, there).reshape(-1, 2, len(WIDENINGS_M))
+        # All targets of one line in a row, so that the triangle of its eye is located only once.
+        eyes = np.repeat(behind[undecided], len(targets), axis=0)
+        goals = eyes + np.rint(np.stack(targets, axis=1).reshape(-1, 2)).astype(np.int64)
+        seen = see_each(mesh, eyes, goals).reshape(-1, 2, len(WIDENINGS_M))
         wider = np.where(seen, WIDENINGS_M, 0.0).max(axis=2).sum(axis=1)
-        enough = wider >= needed[waiting] - TINY
-        opens[waiting[enough]] = True
-        waiting = waiting[~enough]
+        enough = wider >= needed[undecided] - TINY
+        opens[undecided[enough]] = True
+        undecided = undecided[~enough]
     return opens
 
 
 def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> NDArray[np.bool_]:
-    """Return which lines are narrow, or have a wall in line with them at both corners."""
+    """Return which lines are no wider than a door, or continue in a wall at both ends."""
     span = (lines[:, 2:] - lines[:, :2]).astype(np.float64)
     length = np.sqrt((span * span).sum(axis=1))
     along = span / length[:, None] * units_per_m
     aside = np.stack([-along[:, 1], along[:, 0]], axis=1) * ASIDE_M
-    fine = np.ones(len(lines), np.bool_)
+    both_in_wall = np.ones(len(lines), np.bool_)
     corners = _keys(walls.start[walls.reflex].astype(np.int64))
     for end, outwards in ((lines[:, :2], -along), (lines[:, 2:], along)):
-        found = ~np.isin(_keys(end), corners)
+        in_wall = ~np.isin(_keys(end), corners)
         shifts = [
             outwards * beyond + sideways * aside for sideways in SIDEWAYS for beyond in STUB_M
         ]
         places = (end + np.rint(np.stack(shifts)).astype(np.int64)).reshape(-1, 2)
         seen = see_each(mesh, places, places)  # in free space a place sees itself
         walled = ~seen.reshape(len(SIDEWAYS), len(STUB_M), len(lines))
-        found |= walled.all(axis=1).any(axis=0)
-        fine &= found
-    fine |= length <= MAX_DOOR_M * units_per_m
-    return fine
+        in_wall |= walled.all(axis=1).any(axis=0)
+        both_in_wall &= in_wall
+    both_in_wall |= length <= MAX_DOOR_M * units_per_m
+    return both_in_wall
 
 
 def _keys(points: I64) -> I64:
@@ -268,17 +253,17 @@ def _keys(points: I64) -> I64:
 
 
 def _one_of_each(lines: I64, units_per_m: float) -> list[int]:
-    """Return which lines to keep, going by the order given, so that none is beside another."""
-    kept: list[int] = []
+    """Return the indices of lines that are apart from all lines chosen before them."""
+    chosen: list[int] = []
     shapes = np.asarray(shapely.linestrings(lines.reshape(-1, 2, 2).astype(np.float64)))
     middle = (lines[:, :2] + lines[:, 2:]) / 2
     apart2 = (APART_M * units_per_m) ** 2
     for i in range(len(lines)):
-        if kept:
-            gap = middle[kept] - middle[i]
+        if chosen:
+            gap = middle[chosen] - middle[i]
             if (gap * gap).sum(axis=1).min() < apart2:
                 continue
-            if shapely.intersects(shapes[kept], shapes[i]).any():
+            if shapely.intersects(shapes[chosen], shapes[i]).any():
                 continue
-        kept.append(i)
-    return kept
+        chosen.append(i)
+    return chosen

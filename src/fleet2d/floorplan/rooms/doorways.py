@@ -14,19 +14,19 @@ from fleet2d.floorplan.geometry.lattice import Lattice
 Point = tuple[float, float]
 Segment = tuple[tuple[int, int], tuple[int, int]]
 
-# How far beyond the given end of a door line its wall may be [m].
+# How far beyond the end of a door line its wall may be [m].
 REACH_M = 0.3
-# A corner as near as this to where a line meets the wall is where it was meant to end [lattice].
+# A line that meets a wall within this distance of a corner ends at the corner [lattice].
 AT_CORNER = 8
-# How far from a door line the rooms on its two sides are looked for [m].
+# Distances from a door line at which the rooms on its two sides are looked up [m].
 BESIDE_M = (0.1, 0.2, 0.3, 0.45, 0.6)
-# Of a line and an area: the line's inside is all in the area's inside, its ends on the border.
+# DE-9IM pattern of a line and an area: the line lies in the area, with its ends on the border.
 _FROM_WALL_TO_WALL = "1FFF0F***"
 
 
 @dataclass(frozen=True)
 class DoorLine:
-    """A doorway as a file or a search gives it: a line across a passage.
+    """A doorway in a file, or from a search: a line across a passage.
 
     Attributes:
         start: One jamb (x, y) [m], on a wall or near one.
@@ -50,7 +50,7 @@ class Doorway:
         name: Unique in the plan, such as `bathroom_0-hallway_0`.
         start: One jamb (x, y) [m], exactly on a wall.
         end: The other jamb (x, y) [m].
-        rooms: Indices of the rooms on its left and its right, seen from start to end; equal where
+        rooms: Indices of the rooms on its left and its right, looking from start to end; equal if
             it stands in the middle of a room.
         leaf: Whether there is a door in it that can be shut; False for a mere opening.
     """
@@ -74,13 +74,13 @@ def fit_lines(
 ) -> tuple[list[Polygon], list[Segment | None], list[str]]:
     """Fit door lines to the walls, exactly.
 
-    A line is lengthened or cut to end at the walls beside it. On a slanted wall no lattice point
-    may lie, so the wall gets a corner there, less than a millimetre off.
+    A line is lengthened or cut to end at the walls beside it. A slanted wall may have no lattice
+    point there, so it gets a corner, less than a millimetre off.
 
     Args:
         lattice: Of the plan.
         polygons: Free space [lattice].
-        lines: Where doorways shall be [m].
+        lines: The doorways [m].
 
     Returns:
         The free space, with corners added; the segment of each line [lattice], or None where it
@@ -89,13 +89,13 @@ def fit_lines(
     walls = list(polygons)
     segments: list[Segment | None] = []
     notes: list[str] = []
-    kept: list[LineString] = []
+    placed: list[LineString] = []
     for line in lines:
         ends = lattice.to_lattice((line.start, line.end)).astype(np.float64)
         fitted = _fit(walls, ends, REACH_M * lattice.units_per_m)
-        if fitted is not None and not any(fitted[1].intersects(other) for other in kept):
+        if fitted is not None and not any(fitted[1].intersects(other) for other in placed):
             walls = fitted[0]
-            kept.append(fitted[1])
+            placed.append(fitted[1])
             start, end = shapely.get_coordinates(fitted[1]).astype(np.int64).tolist()
             segments.append(((start[0], start[1]), (end[0], end[1])))
             continue
@@ -124,12 +124,12 @@ def name_doorways(
         fitted: The lines, and where they are [lattice].
     """
     doorways: list[Doorway] = []
-    own = {line.name for line, _ in fitted if line.name}
+    own_names = {line.name for line, _ in fitted if line.name}
     used: Counter[str] = Counter()
     for line, segment in fitted:
         rooms = rooms_beside(lattice, room_of_place, segment)
         name = line.name
-        while name is None or (not line.name and name in own):
+        while name is None or (not line.name and name in own_names):
             joined = "-".join(room_names[room] for room in rooms)
             used[joined] += 1
             name = joined if used[joined] == 1 else f"{joined}-{used[joined]}"
@@ -168,23 +168,23 @@ def _jamb(
     polygon: Polygon, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> tuple[int, int] | None:
     """Return the even lattice point where the way from `start` to `end` first meets a wall."""
-    met = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, end])))
-    if len(met) == 0:
+    hits = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, end])))
+    if len(hits) == 0:
         return None
-    hit = met[np.argmin(((met - start) ** 2).sum(axis=1))]
+    nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))]
     corners = shapely.get_coordinates(polygon)
-    away = np.abs(corners - hit).max(axis=1)
+    away = np.abs(corners - nearest).max(axis=1)
     if away.min() <= AT_CORNER:
         x, y = corners[np.argmin(away)].tolist()
     else:
-        x, y = (2 * np.rint(hit / 2)).tolist()
+        x, y = (2 * np.rint(nearest / 2)).tolist()
     return int(x), int(y)
 
 
 def _with_corner(polygon: Polygon, point: NDArray[np.float64]) -> Polygon:
     """Return the polygon with a corner at a point on or beside one of its walls.
 
-    Also where the point is on the wall: another corner might move that wall away from it.
+    It is added even if the point is on the wall, since another corner might move that wall.
     """
     if (shapely.get_coordinates(polygon) == point).all(axis=1).any():
         return polygon
@@ -199,11 +199,11 @@ def _with_corner(polygon: Polygon, point: NDArray[np.float64]) -> Polygon:
 def rooms_beside(
     lattice: Lattice, room_of_place: NDArray[np.int16], segment: Segment
 ) -> tuple[int, int]:
-    """Return the rooms to the left and to the right of a segment, looked for step by step."""
+    """Return the rooms to the left and to the right of a segment, the nearest that differ."""
     (x0, y0), (x1, y1) = segment
     dx, dy = x1 - x0, y1 - y0
     length = (dx * dx + dy * dy) ** 0.5
-    found: list[int] = []
+    sides: list[int] = []
     for side in (1, -1):
         room = -1
         for step in BESIDE_M:
@@ -211,12 +211,12 @@ def rooms_beside(
             x, y = round((x0 + x1) / 2 - dy * reach), round((y0 + y1) / 2 + dx * reach)
             row, column = lattice.cell_of(x, y)
             if 0 <= row < lattice.rows and 0 <= column < lattice.columns:
-                seen = int(room_of_place[row, column])
-                room = seen if room < 0 else room
-                if seen >= 0 and found and room == found[0]:
-                    room = seen
-        found.append(room)
-    left, right = found
+                other = int(room_of_place[row, column])
+                room = other if room < 0 else room
+                if other >= 0 and sides and room == sides[0]:
+                    room = other
+        sides.append(room)
+    left, right = sides
     if left < 0 or right < 0:
         left = right = max(left, right, 0)
     return left, right

@@ -1,8 +1,8 @@
-"""Which chamber is which room, where a file draws rough boxes over a plan.
+"""Label chambers by the rough boxes that a file draws over a plan.
 
-The walls say where rooms end; a box says what a chamber is. A box is matched to the chamber that it
-outlines, and doesn't reach into others. Where several boxes lie in one chamber, as in an open
-plan, they divide it.
+Walls determine where rooms end, and boxes how they are labelled. A box is matched to the chamber
+that it outlines, and doesn't reach into others. Several boxes in one chamber, as in an open plan,
+divide it.
 """
 
 from collections.abc import Sequence
@@ -22,64 +22,65 @@ I64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 OUTLINES = 0.5
-"""A box outlines a chamber if the two boxes overlap by so much of what both cover."""
+"""A box outlines a chamber if the intersection of box and chamber's frame is at least this share
+of their union."""
 REACHES = 0.3
-"""A box also has what an opening joins to its chamber, if it covers so much of that."""
+"""A box also claims a chamber that an opening joins to its own, if it covers this share of it."""
 TOUCHES = 0.15
-"""A box of which a smaller part is in the chamber, and that covers less than half of it, only
-touches it."""
+"""A box only touches a chamber that has less than this share of the box's cells, and of which the
+box covers less than half."""
 NOT_FREE, TOO_SMALL = "covers no free space", "covers too little free space"
 ONLY_TOUCHES = "only touches rooms"
 KEEPS = 0.25
-"""Boxes over one another: one that keeps a smaller part of its cells is the same room."""
+"""Where boxes overlap: one that keeps less than this share of its cells is no room of its own."""
 MIN_ROOM_M2, MIN_ROOM_WIDTH_M = 0.5, 0.4
-"""What is smaller, or nowhere as wide, is no room for a label."""
+"""Least area and width of a room with a label."""
 MIN_REST_M2, MIN_REST_WIDTH_M = 2.5, 0.8
-"""What no box covers is a room of its own from this size and this width on …"""
+"""Least area and width of a room without a label …"""
 REST_SHARE, REST_SHARE_OF_ONE = 0.06, 0.3
-"""… and if it is so much of its chamber, in which several labels are, or one."""
+"""… and its least share of a chamber that has several labels, or only one."""
 
 
 @dataclass
-class _Block:
-    """Chambers that openings join into one, and the boxes that claim each of them."""
+class _JoinedChambers:
+    """Chambers that openings join into one, and for each box the chambers that it claims."""
 
     chambers: list[int]
-    claims: dict[int, set[int]] = field(default_factory=dict)  # box: chambers
+    claims: dict[int, set[int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Labelled:
-    """The rooms that came of boxes.
+class ChamberLabels:
+    """The rooms that chambers and boxes make.
 
     Attributes:
-        of_cell: For each free cell the number of its box; from the number of boxes on, rooms that
-            no box claims; -1 where not free. int32 (rows, columns).
-        rests: How many rooms no box claims.
-        merged: The box that each box's labels go to: itself, or one that covers it.
-        lost: Boxes that are no room, and why, in the order given.
+        of_cell: For each free cell the number of its box, or from the number of boxes on that of
+            a room that no box claims; -1 where not free. int32 (rows, columns).
+        rests: Number of rooms that no box claims.
+        merged: For each box the box that gets its labels: itself, or one that covers it.
+        dropped: For each box that is no room the reason; by box.
     """
 
     of_cell: I32
     rests: int
     merged: dict[int, int]
-    lost: dict[int, str]
+    dropped: dict[int, str]
 
 
 def label_chambers(
-    chambers: Chambers, boxes: Sequence[Patch], wide: Sequence[bool], cell: float
-) -> Labelled:
+    chambers: Chambers, boxes: Sequence[Patch], is_opening: Sequence[bool], cell: float
+) -> ChamberLabels:
     """Divide chambers among boxes.
 
     Args:
         chambers: The free space, cut at doorways and openings.
         boxes: The free cells of each box.
-        wide: Whether each line that the chambers were cut at is an opening, and no doorway.
+        is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
         cell: Side of a cell [m].
     """
     frames = label_frames(chambers.of_cell, chambers.count)
-    claims, lost = _claims(chambers, frames, boxes, wide, cell)
-    blocks = _blocks(chambers, claims, wide, cell)
+    claims, dropped = _claims(chambers, frames, boxes, is_opening, cell)
+    blocks = _blocks(chambers, claims, is_opening, cell)
     out = np.full(chambers.of_cell.shape, -1, np.int32)
     for box in sorted(claims, key=lambda b: (-boxes[b].cells, -b)):
         claimed = np.zeros(chambers.count + 1, np.bool_)  # its last entry serves -1
@@ -87,17 +88,17 @@ def label_chambers(
         window = boxes[box].window
         out[window][boxes[box].mask & claimed[chambers.of_cell[window]]] = box
     merged = {box: box for box in range(len(boxes))}
-    following = len(boxes)
+    next_room = len(boxes)
     for block in blocks:
         window = _window(frames[block.chambers])
         inside = np.isin(chambers.of_cell[window], block.chambers)
         labels = np.where(inside, out[window], -1).astype(np.int32)
         for box in sorted(block.claims, key=lambda b: (-boxes[b].cells, -b)):
-            whole = _seen_in(boxes[box], window, inside)
-            _keep_one_piece(labels, box, whole, cell, merged, lost)
-        labels, following = _filled(labels, inside, cell, following)
+            cells = _cells_in(boxes[box], window, inside)
+            _keep_one_piece(labels, box, cells, cell, merged, dropped)
+        labels, next_room = _fill(labels, inside, cell, next_room)
         out[window][inside] = labels[inside]
-    return Labelled(out, following - len(boxes), merged, dict(sorted(lost.items())))
+    return ChamberLabels(out, next_room - len(boxes), merged, dict(sorted(dropped.items())))
 
 
 # --- Which boxes claim which chambers ------------------------------------------------------------
@@ -107,38 +108,38 @@ def _claims(
     chambers: Chambers,
     frames: I64,
     boxes: Sequence[Patch],
-    wide: Sequence[bool],
+    is_opening: Sequence[bool],
     cell: float,
 ) -> tuple[dict[int, set[int]], dict[int, str]]:
-    """Return the chambers of each box, and the boxes that have none."""
+    """Return the chambers that each box claims, and the reasons of boxes that claim none."""
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
-    beside: dict[int, set[int]] = {c: set() for c in range(chambers.count)}
+    neighbors: dict[int, set[int]] = {c: set() for c in range(chambers.count)}
     for link in chambers.links:
-        if wide[link.line]:
+        if is_opening[link.line]:
             a, b = link.chambers
-            beside[a].add(b)
-            beside[b].add(a)
+            neighbors[a].add(b)
+            neighbors[b].add(a)
     claims: dict[int, set[int]] = {}
-    lost: dict[int, str] = {}
+    dropped: dict[int, str] = {}
     for number, box in enumerate(boxes):
         counts = np.bincount(chambers.of_cell[box.window][box.mask], minlength=chambers.count)
         if _too_small(box, cell):
-            lost[number] = TOO_SMALL if box.cells else NOT_FREE
+            dropped[number] = TOO_SMALL if box.cells else NOT_FREE
             continue
         overlap = _overlaps(box.frame, frames)
         overlap[counts < OUTLINES * OUTLINES * sizes] = 0
         best = int(np.argmax(overlap)) if overlap.max() >= OUTLINES else int(np.argmax(counts))
         if counts[best] < TOUCHES * counts.sum() and counts[best] < OUTLINES * sizes[best]:
-            lost[number] = ONLY_TOUCHES
+            dropped[number] = ONLY_TOUCHES
             continue
         claims[number] = {best}
-        waiting = [best]
-        while waiting:
-            for near in sorted(beside[waiting.pop()] - claims[number]):
-                if counts[near] >= REACHES * sizes[near]:
-                    claims[number].add(near)
-                    waiting.append(near)
-    return claims, lost
+        queue = [best]
+        while queue:
+            for neighbor in sorted(neighbors[queue.pop()] - claims[number]):
+                if counts[neighbor] >= REACHES * sizes[neighbor]:
+                    claims[number].add(neighbor)
+                    queue.append(neighbor)
+    return claims, dropped
 
 
 def _too_small(box: Patch, cell: float) -> bool:
@@ -148,7 +149,7 @@ def _too_small(box: Patch, cell: float) -> bool:
 
 
 def _overlaps(frame: I64, frames: I64) -> NDArray[np.float64]:
-    """Return for each frame what it has in common with one, in parts of what both cover."""
+    """Return the intersection of a frame with each of others, as a share of their union."""
     low, high = np.maximum(frame[:2], frames[:, :2]), np.minimum(frame[2:], frames[:, 2:])
     common = np.clip(high - low, 0, None).prod(axis=1)
     areas = (frames[:, 2:] - frames[:, :2]).prod(axis=1)
@@ -157,9 +158,9 @@ def _overlaps(frame: I64, frames: I64) -> NDArray[np.float64]:
 
 
 def _blocks(
-    chambers: Chambers, claims: dict[int, set[int]], wide: Sequence[bool], cell: float
-) -> list[_Block]:
-    """Join chambers across openings that part no two labels."""
+    chambers: Chambers, claims: dict[int, set[int]], is_opening: Sequence[bool], cell: float
+) -> list[_JoinedChambers]:
+    """Join chambers across openings, except where they separate two labels."""
     owner = list(range(chambers.count))
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
     by_chamber: dict[int, set[int]] = {c: set() for c in owner}
@@ -173,10 +174,10 @@ def _blocks(
         tiny = any(
             not by_chamber[one] and sizes[one] * cell**2 < MIN_REST_M2 for one in link.chambers
         )
-        if wide[link.line] and (free or shared or tiny):
+        if is_opening[link.line] and (free or shared or tiny):
             low, high = sorted((owner[a], owner[b]))
             owner = [low if root == high else root for root in owner]
-    blocks = {root: _Block([]) for root in sorted(set(owner))}
+    blocks = {root: _JoinedChambers([]) for root in sorted(set(owner))}
     for chamber, root in enumerate(owner):
         blocks[root].chambers.append(chamber)
         for box in by_chamber[chamber]:
@@ -188,84 +189,84 @@ def _blocks(
 
 
 def _window(frames: I64) -> tuple[slice, slice]:
-    """Return the rows and columns of all of some frames."""
+    """Return the rows and columns of the smallest window that holds all frames."""
     (row, column), (end_row, end_column) = frames[:, :2].min(axis=0), frames[:, 2:].max(axis=0)
     return slice(int(row), int(end_row)), slice(int(column), int(end_column))
 
 
-def _seen_in(box: Patch, window: tuple[slice, slice], inside: Mask) -> Mask:
-    """Return the cells of a box that are in a window, bool (rows, columns) of the window."""
-    shared = [
+def _cells_in(box: Patch, window: tuple[slice, slice], inside: Mask) -> Mask:
+    """Return the cells of a box inside a block, bool (rows, columns) of the block's window."""
+    common = [
         (max(a.start, b.start), max(min(a.stop, b.stop), a.start, b.start))
         for a, b in zip(box.window, window, strict=True)
     ]
-    here, there = (
+    target, source = (
         tuple(
-            slice(low - of.start, high - of.start)
-            for (low, high), of in zip(shared, by, strict=True)
+            slice(low - extent.start, high - extent.start)
+            for (low, high), extent in zip(common, bounds, strict=True)
         )
-        for by in (window, box.window)
+        for bounds in (window, box.window)
     )
-    seen = np.zeros(inside.shape, np.bool_)
-    seen[here] = box.mask[there]
-    return seen & inside
+    cells = np.zeros(inside.shape, np.bool_)
+    cells[target] = box.mask[source]
+    return cells & inside
 
 
-def _filled(labels: I32, inside: Mask, cell: float, following: int) -> tuple[I32, int]:
-    """Give every cell of a block a room; returns also the number for the next one without a box."""
-    claimants = np.flatnonzero(np.bincount(labels[labels >= 0]))
-    before = following
-    following = _rests(labels, inside, len(claimants), cell, following)
-    if len(claimants) == 1 and following == before:
-        return np.where(inside, claimants[0], -1).astype(np.int32), following
+def _fill(labels: I32, inside: Mask, cell: float, next_room: int) -> tuple[I32, int]:
+    """Give every cell of a block a room; return also the number of the next room without a box."""
+    boxes = np.flatnonzero(np.bincount(labels[labels >= 0]))
+    first_room = next_room
+    next_room = _number_rests(labels, inside, len(boxes), cell, next_room)
+    if len(boxes) == 1 and next_room == first_room:
+        return np.where(inside, boxes[0], -1).astype(np.int32), next_room
     if (labels[inside] < 0).any():
         labels = spread_labels(labels, inside)
-    while (labels[inside] < 0).any():  # parts that no way across sides joins to a label
+    while (labels[inside] < 0).any():  # parts that share no side with labelled cells
         part = label_parts(inside & (labels < 0), False)
-        labels[part == 0] = following
-        following += 1
-    return labels, following
+        labels[part == 0] = next_room
+        next_room += 1
+    return labels, next_room
 
 
 def _keep_one_piece(
-    labels: I32, box: int, whole: Mask, cell: float, merged: dict[int, int], lost: dict[int, str]
+    labels: I32, box: int, whole: Mask, cell: float, merged: dict[int, int], dropped: dict[int, str]
 ) -> None:
-    """Leave a box its largest piece; or nothing, if that is no room any more."""
+    """Leave a box its largest piece, or nothing if that is too small to be a room."""
     own = labels == box
     if own.any():
         part = label_parts(own, False)
         largest = part == np.argmax(np.bincount(part[own]))
         labels[own & ~largest] = -1
         own = largest
-    kept = int(np.count_nonzero(own))
-    if kept >= KEEPS * np.count_nonzero(whole) and kept * cell**2 >= MIN_ROOM_M2:
+    cells = int(np.count_nonzero(own))
+    if cells >= KEEPS * np.count_nonzero(whole) and cells * cell**2 >= MIN_ROOM_M2:
         return
     labels[own] = -1
-    over = labels[whole & (labels >= 0)]
-    if len(over) and np.count_nonzero(whole):
-        merged[box] = int(np.argmax(np.bincount(over)))
+    covering = labels[whole & (labels >= 0)]
+    if len(covering) and np.count_nonzero(whole):
+        merged[box] = int(np.argmax(np.bincount(covering)))
     else:
-        lost[box] = TOO_SMALL
+        dropped[box] = TOO_SMALL
 
 
-def _rests(labels: I32, inside: Mask, claimants: int, cell: float, following: int) -> int:
-    """Number what of a block no box covers, where it is large enough to be a room."""
+def _number_rests(labels: I32, inside: Mask, boxes: int, cell: float, next_room: int) -> int:
+    """Number the parts of a block that no box covers and that are large enough to be rooms."""
     rest = inside & (labels < 0)
-    if claimants == 0:
-        labels[rest] = following
-        return following + 1
-    share = REST_SHARE_OF_ONE if claimants == 1 else REST_SHARE
-    enough = max(MIN_REST_M2 / cell**2, share * np.count_nonzero(inside))
-    if np.count_nonzero(rest) < enough:
-        return following
+    if boxes == 0:
+        labels[rest] = next_room
+        return next_room + 1
+    share = REST_SHARE_OF_ONE if boxes == 1 else REST_SHARE
+    least = max(MIN_REST_M2 / cell**2, share * np.count_nonzero(inside))
+    if np.count_nonzero(rest) < least:
+        return next_room
     radius = MIN_REST_WIDTH_M / 2 / cell
     core = squared_distance(np.pad(rest, 1))[1:-1, 1:-1] >= radius**2
     if not core.any():
-        return following
+        return next_room
     opened = rest & (squared_distance(~core) < radius**2)
     part = label_parts(opened, False)
     sizes = np.bincount(part[opened])
-    for number in np.flatnonzero(sizes >= enough):
-        labels[part == number] = following
-        following += 1
-    return following
+    for number in np.flatnonzero(sizes >= least):
+        labels[part == number] = next_room
+        next_room += 1
+    return next_room

@@ -1,4 +1,4 @@
-"""Where rooms touch, and where a door leads through the wall between them; in metres."""
+"""Borders at which rooms touch, and passages of doors through the walls between them [m]."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,28 +13,28 @@ Place = tuple[float, float]
 Vector = NDArray[np.float64]
 
 TOUCH_M = 0.02
-"""Outlines no further apart than this touch: coordinates are rounded, to 1 cm in degrees."""
+"""Outlines no further apart than this touch, as coordinates are rounded (degrees to 1 cm)."""
 REACH_M = 0.6
-"""No wall is thicker."""
+"""Largest thickness of a wall."""
 NEAR_M = 0.25
-"""A door is no further than this from the wall that it is in."""
+"""Largest distance of a door from the wall that it is in."""
 
-# Where along a door's width the wall's thickness is looked at; first the middle, which decides.
+# Places along a door's width, as shares of it, at which the wall is measured; the first decides.
 _ALONG = (0.5, 0.1, 0.9)
-_OVER = 1e-3  # an opening reaches so far into the space on either side, to be joined to it
+_OVER = 1e-3  # how far an opening reaches into the space on either side, to be joined to it [m]
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A way through a wall.
+    """A door's passage through a wall.
 
     Attributes:
         start: One end of the door as drawn (x, y) [m].
         end: The other end [m].
-        low: Where the wall begins, across from the door as drawn [m]; negative on its right.
-        high: Where the wall ends [m].
-        through: Whether there is free space on both sides; if not, only beyond `low` or, where
-            that is minus infinity, beyond `high`.
+        low: Offset of the wall's near face from the door, to the left [m]; negative: to the right.
+        high: Offset of its far face [m].
+        through: Whether both sides have free space; else only the side beyond `low` has or, if
+            that is minus infinity, the side beyond `high`.
     """
 
     start: Place
@@ -50,19 +50,19 @@ class Passage:
 
     @property
     def opening(self) -> Polygon:
-        """What of the wall is opened."""
+        """The part of the wall that is opened."""
         return self._between(self.low - _OVER, self.high + _OVER)
 
     @property
     def halves(self) -> tuple[Polygon, ...]:
-        """The parts of the wall on either side of its middle; none where there is no wall."""
+        """The opened part of the wall, split along its middle in two; none without a wall."""
         middle = (self.low + self.high) / 2
         if self.high - self.low < _OVER:
             return ()
         return self._between(self.low, middle), self._between(middle, self.high)
 
     def inside(self, depth: float) -> Place:
-        """Return the place so far inside a door that leads outside [m]."""
+        """Return the place at a depth [m] inside a door that leads outside (x, y) [m]."""
         at = self.high + depth if self.low == -np.inf else self.low - depth
         (x0, y0), (x1, y1) = self._beside(at)
         return (x0 + x1) / 2, (y0 + y1) / 2
@@ -79,7 +79,7 @@ class Passage:
 
 
 def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Place, Place]]]:
-    """Yield for each door in a shape the lines that it may be: of an area the longer axis first."""
+    """Yield for each door in a shape its possible lines; of an area its axes, the longer first."""
     for part in shapely.get_parts(shape).tolist():
         corners = shapely.get_coordinates(part)
         if part.geom_type == "LineString":
@@ -92,15 +92,15 @@ def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Place, Place]]]:
 
 
 def find_passage(free: MultiPolygon, start: Place, end: Place) -> Passage | None:
-    """Return the way through the wall beside a door, or None where no wall is near.
+    """Return the passage of a door through the nearest wall, or None without a way through.
 
-    Where the space is open already, the way through is of no length.
+    Where no wall is near, in open space, the passage has no depth.
     """
     first, last = np.array(start), np.array(end)
     if not ((last - first) ** 2).sum() > 0:
         return None
     normal = _normal(first, last)
-    found: list[tuple[float, float]] = []
+    spans: list[tuple[float, float]] = []
     for share in _ALONG:
         walls = _walls_across(free, first + share * (last - first), normal)
         near = [wall for wall in walls if max(wall[0], -wall[1]) <= NEAR_M]
@@ -112,8 +112,8 @@ def find_passage(free: MultiPolygon, start: Place, end: Place) -> Passage | None
             if not inner:
                 return Passage(start, end, *one_sided[0], False) if one_sided else None
         if inner:
-            found.append(min(inner, key=lambda wall: max(wall[0], -wall[1])))
-    low, high = min(low for low, _ in found), max(high for _, high in found)
+            spans.append(min(inner, key=lambda wall: max(wall[0], -wall[1])))
+    low, high = min(low for low, _ in spans), max(high for _, high in spans)
     return Passage(start, end, low, high, True)
 
 
@@ -131,10 +131,10 @@ def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
         sides = _sides(rooms[one])
         pieces = shapely.intersection(sides, near)
         lengths, most = shapely.length(pieces), 2 * TOUCH_M
-        # Where a side only leads away from the border, its first centimetres are near, too.
+        # The first centimetres of a side that leads away from the border are near it, too.
         along = (lengths > most) | ((lengths > 0) & (lengths >= shapely.length(sides) / 2))
-        kept = shapely.get_parts(pieces[along])
-        lines = kept[shapely.get_type_id(kept) == shapely.GeometryType.LINESTRING]
+        parts = shapely.get_parts(pieces[along])
+        lines = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
         borders += shapely.get_parts(shapely.line_merge(shapely.multilinestrings(lines))).tolist()
     return [line for line in borders if isinstance(line, LineString) and line.length > 0]
 
@@ -142,15 +142,15 @@ def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
 def _sides(area: MultiPolygon) -> NDArray[np.object_]:
     """Return the sides of an area, each a line."""
     rings = shapely.get_parts(shapely.boundary(area)).tolist()
-    found = [shapely.get_coordinates(ring) for ring in rings]
+    outlines = [shapely.get_coordinates(ring) for ring in rings]
     starts, ends = (
-        np.concatenate([ring[s] for ring in found]) for s in (slice(-1), slice(1, None))
+        np.concatenate([ring[s] for ring in outlines]) for s in (slice(-1), slice(1, None))
     )
     return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
 
 
 def _walls_across(free: MultiPolygon, at: Vector, normal: Vector) -> list[tuple[float, float]]:
-    """Return what is not free on a line across a door, from and to [m]; infinite at its ends."""
+    """Return the walls on a line across a door, from and to [m]; infinite at the line's ends."""
     across = LineString([at - REACH_M * normal, at + REACH_M * normal])
     walls = []
     for part in shapely.get_parts(across.difference(free)).tolist():
@@ -174,7 +174,7 @@ def _middle_lines(corners: Vector, along: Vector) -> list[tuple[Place, Place]]:
         (low, high), (left, right) = spans[number], spans[1 - number]
         aside = (left + right) / 2 * axes[1 - number]
         middle_lines.append((high - low, _ends(low * axis + aside, high * axis + aside)))
-    return [line for _, line in sorted(middle_lines, key=lambda found: -found[0])]
+    return [line for _, line in sorted(middle_lines, key=lambda pair: -pair[0])]
 
 
 def _normal(start: Vector, end: Vector) -> Vector:

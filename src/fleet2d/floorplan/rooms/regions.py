@@ -1,4 +1,4 @@
-"""Regions: parts of a floor plan that a file labels, on the lattice and in cells."""
+"""Regions: the parts of a floor plan that a file labels, on the lattice and in cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,18 +47,18 @@ class Region:
         types: Its labels as room types, each once.
         shape: Where it is [lattice], even coordinates; empty for one that is only cells.
         name: Name of the room, or None to be numbered by type.
-        given_type: Type of the room, or None for the one of its types that leads.
+        own_type: Type of the room, or None for the one of its types that leads.
     """
 
     types: tuple[str, ...]
     shape: Polygon | MultiPolygon
     name: str | None = None
-    given_type: str | None = None
+    own_type: str | None = None
 
     @property
     def type(self) -> str:
         """What the room is used for."""
-        return self.given_type or leading_type(self.types)
+        return self.own_type or leading_type(self.types)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Patch:
 
     @property
     def frame(self) -> NDArray[np.int64]:
-        """First row, first column, last row and last column, plus one, of its cells."""
+        """The box around its cells: first row, first column, last row + 1, last column + 1."""
         rows, columns = (np.flatnonzero(self.mask.any(axis=axis)) for axis in (1, 0))
         first = np.array([self.window[0].start, self.window[1].start])
         if len(rows) == 0:
@@ -90,15 +90,18 @@ class Patch:
 
 
 def snap_regions(lattice: Lattice, regions: Sequence[LabelledRegion]) -> list[Region]:
-    """Return the regions on the lattice; those that are equal there are one, with all labels."""
+    """Return the regions on the lattice; regions of equal shape become one, with all labels."""
     return _merge_equal([_snap(lattice, region) for region in regions])
 
 
 def paint_regions(free: NDArray[np.bool_], regions: list[Region]) -> NDArray[np.int64]:
-    """Return the region of each cell: len(regions) for a free cell of none, -1 where not free."""
+    """Return the index of the region of each cell, int64 (rows, columns).
+
+    The smallest region wins. Free cells outside all regions have `len(regions)`, others -1.
+    """
     painted = np.where(free, len(regions), NOT_FREE).astype(np.int64)
-    order = sorted(range(len(regions)), key=lambda k: (-regions[k].shape.area, -k))
-    for k in order:
+    by_area = sorted(range(len(regions)), key=lambda k: (-regions[k].shape.area, -k))
+    for k in by_area:
         _paint_one(painted, regions[k].shape, k)
     return painted
 
@@ -123,14 +126,14 @@ def _inside(
     free: NDArray[np.bool_], window: tuple[slice, slice], shape: Polygon | MultiPolygon
 ) -> NDArray[np.bool_]:
     """Return which free cells of a window have their centre inside a shape."""
-    chosen = free.copy()
+    inside = free.copy()
     if not shape.equals(shapely.box(*shape.bounds)):
-        y, x = np.nonzero(chosen)
+        y, x = np.nonzero(inside)
         centre_x = (x + window[1].start) * UNITS_PER_CELL + TO_CENTRE
         centre_y = (y + window[0].start) * UNITS_PER_CELL + TO_CENTRE
         shapely.prepare(shape)
-        chosen[y, x] = shapely.contains_xy(shape, centre_x, centre_y)
-    return chosen
+        inside[y, x] = shapely.contains_xy(shape, centre_x, centre_y)
+    return inside
 
 
 def cells_in(free: NDArray[np.bool_], shape: Polygon | MultiPolygon) -> Patch:
@@ -147,16 +150,16 @@ def _snap(lattice: Lattice, region: LabelledRegion) -> Region:
 
 
 def _merge_equal(regions: list[Region]) -> list[Region]:
-    """Return the regions with those of exactly the same shape joined, at the place of the first."""
+    """Join regions of exactly the same shape, at the place of the first."""
     by_shape: dict[bytes, Region] = {}
     for region in regions:
         key = shapely.to_wkb(region.shape)
-        known = by_shape.get(key)
-        if known is None:
+        first = by_shape.get(key)
+        if first is None:
             by_shape[key] = region
             continue
-        types = tuple(dict.fromkeys(known.types + region.types))
+        types = tuple(dict.fromkeys(first.types + region.types))
         by_shape[key] = Region(
-            types, known.shape, known.name or region.name, known.given_type or region.given_type
+            types, first.shape, first.name or region.name, first.own_type or region.own_type
         )
     return list(by_shape.values())

@@ -1,6 +1,5 @@
-"""Rooms: disjoint sets of cells that cover all free space, and what they are called."""
+"""Rooms: disjoint sets of cells that cover all free space, with their names and types."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,12 +9,11 @@ from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.names import number_names
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, paint_regions, snap_regions
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
-from fleet2d.kernels.chambers import fill_beside, label_frames
-from fleet2d.kernels.fields import squared_distance as squared_distance_kernel
-
-__all__ = ["NO_ROOM", "LabelledRegion", "Room", "assign_rooms", "beside_rooms", "make_rooms"]
+from fleet2d.kernels.chambers import label_frames
+from fleet2d.kernels.fields import squared_distance
 
 NO_ROOM = -1
 
@@ -61,7 +59,7 @@ def assign_rooms(
 
     Returns:
         The room of each cell, int16 (rows, columns), -1 where not free; the rooms in the file's
-        order; and a sentence for each region that became no room.
+        order; and a sentence for each region that is no room.
 
     Raises:
         FloorPlanError: Two regions ask for the same name.
@@ -69,7 +67,7 @@ def assign_rooms(
     merged = snap_regions(lattice, regions)
     painted = paint_regions(free, merged)
     counts = np.bincount(painted[free], minlength=len(merged) + 1)
-    notes = [lost_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
+    notes = [dropped_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
     if counts[-1]:
         merged = [*merged, Region((), Polygon())]
     room_of_cell, rooms = make_rooms(lattice, painted, merged)
@@ -87,35 +85,22 @@ def make_rooms(
         merged: The regions.
     """
     counts = np.bincount(painted[painted != NO_ROOM], minlength=len(merged))
-    kept = [k for k in range(len(merged)) if counts[k] > 0]
-    if len(kept) > np.iinfo(np.int16).max:
-        raise FloorPlanError(f"the floor plan has {len(kept)} rooms: at most 32767 are possible")
+    with_cells = [k for k in range(len(merged)) if counts[k] > 0]
+    if len(with_cells) > np.iinfo(np.int16).max:
+        raise FloorPlanError(
+            f"the floor plan has {len(with_cells)} rooms: at most 32767 are possible"
+        )
     index_of = np.full(len(counts) + 1, NO_ROOM, np.int16)  # its last entry serves -1
-    index_of[kept] = np.arange(len(kept))
+    index_of[with_cells] = np.arange(len(with_cells))
     room_of_cell = index_of[painted]
-    names = _names([merged[k] for k in kept])
-    frames = label_frames(room_of_cell.astype(np.int32), len(kept))
+    regions = [merged[k] for k in with_cells]
+    names = number_names([r.name for r in regions], [r.type for r in regions], "room")
+    frames = label_frames(room_of_cell.astype(np.int32), len(with_cells))
     rooms = tuple(
-        _room(lattice, room_of_cell, frames[i], i, names[i], merged[k]) for i, k in enumerate(kept)
+        _room(lattice, room_of_cell, frames[i], i, names[i], region)
+        for i, region in enumerate(regions)
     )
     return room_of_cell, rooms
-
-
-def _names(regions: list[Region]) -> list[str]:
-    """Return a name for each room: its own, or its type and a number."""
-    own = Counter(region.name for region in regions if region.name is not None)
-    twice = [name for name, uses in own.items() if uses > 1]
-    if twice:
-        raise FloorPlanError(f"two rooms are named {twice[0]!r}: give each room its own name")
-    names: list[str] = []
-    used: Counter[str] = Counter()
-    for region in regions:
-        name, kind = region.name, region.type
-        while name is None or (region.name is None and name in own):
-            name = f"{kind}_{used[kind]}"
-            used[kind] += 1
-        names.append(name)
-    return names
 
 
 def _room(
@@ -128,7 +113,7 @@ def _room(
 ) -> Room:
     row0, column0, row1, column1 = frame.tolist()
     inside = room_of_cell[row0:row1, column0:column1] == index
-    depth = squared_distance_kernel(np.pad(inside, 1))
+    depth = squared_distance(np.pad(inside, 1))
     deepest = np.unravel_index(np.argmax(depth), depth.shape)  # the first of equals
     row, column = row0 + int(deepest[0]) - 1, column0 + int(deepest[1]) - 1
     x, y = lattice.to_metres(lattice.cell_centre(row, column)).tolist()
@@ -147,24 +132,14 @@ def _room(
     )
 
 
-def lost_note(
+def dropped_note(
     lattice: Lattice,
     region: Region,
-    why: str = "has no free cell that isn't a smaller room's: it is no room",
+    reason: str = "has no free cell that isn't a smaller room's: it is no room",
 ) -> str:
-    """Say that a region is no room."""
+    """Return the sentence which says that a region is no room, and why."""
     name = region.name or " and ".join(region.types) or UNKNOWN
     if region.shape.is_empty:
         return f"the region {name} is empty: it is no room"
     (x0, y0), (x1, y1) = lattice.to_metres(np.reshape(region.shape.bounds, (2, 2))).tolist()
-    return f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}"
-
-
-def beside_rooms(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Return the rooms of cells, where cells without one take that of a neighbor.
-
-    First of a neighbor to the side, then of one across a corner; west before east, south before
-    north.
-    """
-    filled: NDArray[np.int16] = fill_beside(room_of_cell)
-    return filled
+    return f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {reason}"

@@ -1,4 +1,4 @@
-"""Rooms of a plan without labels, found from its walls alone.
+"""Rooms of a plan without labels, segmented by its walls alone.
 
 The method is Voronoi segmentation (Thrun, "Learning metric-topological maps for indoor mobile
 robot navigation", Artificial Intelligence 99, 1998), one of the four that Bormann, Jordan, Li,
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from fleet2d.floorplan.rooms.chambers import Chambers
 
 MIN_ROOM_M2 = 1.2
-"""What a doorway parts is a room from this size on: a toilet."""
+"""Least area of a room behind a doorway, such as a toilet."""
 MIN_OPEN_ROOM_M2 = 4.0
-"""What only an opening parts is a room from this size on: smaller is an alcove."""
+"""Least area of a room behind an opening; a smaller space is an alcove."""
 
 
-def segment_rooms(chambers: Chambers, wide: Sequence[bool], cell: float) -> NDArray[np.int64]:
+def segment_rooms(chambers: Chambers, is_opening: Sequence[bool], cell: float) -> NDArray[np.int64]:
     """Join chambers into rooms.
 
     Args:
         chambers: The free space, cut at doorways and openings.
-        wide: Whether each line that the chambers were cut at is an opening, and no doorway.
+        is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
         cell: Side of a cell [m].
 
     Returns:
@@ -35,19 +35,19 @@ def segment_rooms(chambers: Chambers, wide: Sequence[bool], cell: float) -> NDAr
     areas = sizes * cell**2
     owner = np.arange(chambers.count)
     while True:
-        ways = [
-            (areas[owner[one]], not wide[link.line], link.line, owner[one], owner[other])
+        candidates = [
+            (areas[owner[one]], not is_opening[link.line], link.line, owner[one], owner[other])
             for link in chambers.links
             for one, other in (link.chambers, link.chambers[::-1])
             if owner[one] != owner[other]
-            and areas[owner[one]] < (MIN_OPEN_ROOM_M2 if wide[link.line] else MIN_ROOM_M2)
+            and areas[owner[one]] < (MIN_OPEN_ROOM_M2 if is_opening[link.line] else MIN_ROOM_M2)
         ]
-        if not ways:
+        if not candidates:
             break
         # The smallest goes first, across an opening rather than a doorway.
-        *_, small, into = min(ways)
-        areas[into] += areas[small]
-        owner[owner == small] = into
+        *_, smallest, into = min(candidates)
+        areas[into] += areas[smallest]
+        owner[owner == smallest] = into
     roots = sorted(set(owner.tolist()), key=lambda root: (-areas[root], root))
     number = np.full(chambers.count + 1, -1, np.int64)  # its last entry serves -1
     number[:-1] = [roots.index(root) for root in owner.tolist()]

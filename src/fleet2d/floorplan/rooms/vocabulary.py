@@ -1,12 +1,12 @@
-"""Room types: their vocabulary, what else they are called, and which of several types leads."""
+"""Room types: the vocabulary, other names of its types, and which of several types leads."""
 
 import re
 
 UNKNOWN = "unknown"
 
-# HouseExpo's 25 categories and nothing else need no entry of their own: `room_type` spells them.
-# The order decides the type of a room with several labels. It puts first what a household does
-# its living in, the special before the general (a child's room is a bedroom), catch-alls last.
+# HouseExpo's 25 categories, as `room_type` spells them. The order decides the type of a room with
+# several labels: living spaces come first, special types before general ones (a child's room is a
+# bedroom), and catch-alls last.
 PRIORITY = (
     "kitchen",
     "child_room",
@@ -87,8 +87,8 @@ ALSO_CALLED = {
     "balcony": ("balkon", "balcon", "balcón", "balcone"),
     "terrace": ("patio", "deck", "terrasse", "terraza", "terrazza", "terras"),
 }
-"""What people and apps call rooms, where the vocabulary has another word for them: in English,
-German, French, Spanish, Italian and Dutch."""
+"""Other names of room types, as people and apps use them, in English, German, French, Spanish,
+Italian and Dutch."""
 _TYPE_OF = {kind: kind for kind in PRIORITY} | {
     name: kind for kind, names in ALSO_CALLED.items() for name in names
 }
@@ -108,9 +108,9 @@ def room_type(label: str) -> str:
 
 
 def usual_type(name: str) -> str:
-    """Return the room type for a room's name: of the vocabulary if its words are there.
+    """Return the room type that a room's name means, from the vocabulary where it has one.
 
-    The last words decide, then the first ones; a number behind them doesn't matter.
+    The last words decide, then the first ones; a trailing number is ignored.
 
     Example:
         >>> usual_type("Master Bedroom"), usual_type("Küche"), usual_type("Bedroom 2")
@@ -126,15 +126,14 @@ def usual_type(name: str) -> str:
         words.pop()
     endings = ["_".join(words[first:]) for first in range(len(words))]
     beginnings = ["_".join(words[:last]) for last in range(len(words) - 1, 0, -1)]
-    found = (_TYPE_OF[some] for some in (*endings, *beginnings) if some in _TYPE_OF)
-    return next(found, own)
+    types = (_TYPE_OF[part] for part in (*endings, *beginnings) if part in _TYPE_OF)
+    return next(types, own)
 
 
 def leading_type(types: tuple[str, ...]) -> str:
     """Return the type of a room that carries all of `types`.
 
-    A type that is not in the vocabulary comes after those that are; among several of them the
-    first given wins.
+    Types outside the vocabulary come after those in it; of several such types the first wins.
 
     Example:
         >>> leading_type(("toilet", "bathroom"))

@@ -1,4 +1,4 @@
-"""Who opens to whom: doors and openings by what rooms are for, until all can be reached."""
+"""Which rooms open to which: doors and openings by the types of rooms, until all are linked."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from fleet2d.floorplan.synthetic.draws import Choices
 from fleet2d.floorplan.synthetic.geometry import Box, Wall
 from fleet2d.floorplan.synthetic.program import Brief
 
-JAMB = 2  # units from a door to the corner of a room, at least
+JAMB = 2  # least distance of a door from the corner of a room [units]
 
 
 class Gap(NamedTuple):
@@ -27,7 +27,7 @@ class Gap(NamedTuple):
     leaf: bool | None
 
 
-# How bad it is that two kinds of rooms open to each other, where it is done at all.
+# Cost of a passage between two types of rooms; other pairs never open to each other.
 _COSTS: dict[tuple[str, str], float] = {
     ("entryway", "hallway"): 0,
     ("entryway", "living_room"): 0,
@@ -87,10 +87,10 @@ COSTS: Mapping[tuple[str, str], float] = {
     **_COSTS,
     **{(b, a): cost for (a, b), cost in _COSTS.items()},
 }
-# Rooms that lead on to others.
-_PASSED = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
-# A corridor of 1 m may end in a door of 0.9 m.
-_SHARED = {"hallway", "entryway", "living_room", "dining_room", "kitchen"}
+# Rooms through which the way to other rooms may lead.
+_PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
+# Between these a passage needs no jambs: a corridor of 1 m may end in a door of 0.9 m.
+_WITHOUT_JAMBS = {"hallway", "entryway", "living_room", "dining_room", "kitchen"}
 _SOCIAL = ("living_room", "dining_room", "kitchen")
 
 
@@ -118,24 +118,24 @@ class Widths:
 
 @dataclass
 class Access:
-    """Links between rooms.
+    """A tree of links that joins all rooms.
 
     Attributes:
-        links: The walls with a passage, in the order found: a tree first, then loops.
-        cost: How bad the tree is.
+        links: The walls with a passage, in the order in which they joined the tree.
+        cost: Sum of the costs of the links, see `COSTS`.
     """
 
     links: list[Wall]
     cost: float
 
 
-def linked(
+def link_rooms(
     briefs: Sequence[Brief], boxes: Sequence[Box], walls: Sequence[Wall], widths: Widths
 ) -> Access | None:
-    """Return a tree of links that reaches every room at the least cost, or None.
+    """Return the tree of links that joins all rooms at the least cost, or None if there is none.
 
-    Prim's algorithm from the entryway, else the living room; private rooms are never passed
-    through, except by what belongs to them.
+    Prim's algorithm from the entryway, else the living room. Nobody has to pass through a private
+    room, except to the bathroom or wardrobe that belongs to it.
     """
     best = _best_links(briefs, boxes, walls, widths)
     start = min(
@@ -148,15 +148,15 @@ def linked(
     )
     reached, links, cost = {start}, [], 0.0
     while len(reached) < len(briefs):
-        open_links = [
+        candidates = [
             (price, pair, wall)
             for pair, (price, wall) in best.items()
             if (pair[0] in reached) != (pair[1] in reached)
             and _passable(briefs, *(pair if pair[0] in reached else pair[::-1]))
         ]
-        if not open_links:
+        if not candidates:
             return None
-        price, pair, wall = min(open_links, key=lambda link: link[:2])
+        price, pair, wall = min(candidates, key=lambda link: link[:2])
         reached.update(pair)
         links.append(wall)
         cost += price
@@ -164,16 +164,16 @@ def linked(
 
 
 def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
-    """Tell whether one may have to pass through a room to get to another."""
-    if briefs[to].kind in ("kitchen", "dining_room"):  # they belong together
+    """Return whether the way to a room may lead through another."""
+    if briefs[to].kind in ("kitchen", "dining_room"):  # these belong to the living space
         return briefs[through].kind in _SOCIAL
-    return briefs[through].kind in _PASSED or briefs[to].partner == through
+    return briefs[through].kind in _PASSABLE or briefs[to].partner == through
 
 
 def _best_links(
     briefs: Sequence[Brief], boxes: Sequence[Box], walls: Sequence[Wall], widths: Widths
 ) -> dict[tuple[int, int], tuple[float, Wall]]:
-    """Return for each pair of rooms that may open to each other the cost, and the longest wall."""
+    """Return the cost and the longest common wall of each pair of rooms that may be linked."""
     best: dict[tuple[int, int], tuple[float, Wall]] = {}
     for wall in walls:
         a, b = sorted((boxes[wall.first].room, boxes[wall.second].room))
@@ -181,7 +181,7 @@ def _best_links(
             continue
         price = _price(briefs, a, b)
         kinds = {briefs[a].kind, briefs[b].kind}
-        needed = widths.of(kinds) + (0 if kinds <= _SHARED else 2 * JAMB)
+        needed = widths.of(kinds) + (0 if kinds <= _WITHOUT_JAMBS else 2 * JAMB)
         if price is None or wall.length < needed:
             continue
         if (a, b) not in best or wall.length > best[a, b][1].length:
@@ -196,7 +196,7 @@ def _price(briefs: Sequence[Brief], a: int, b: int) -> float | None:
     return COSTS.get((briefs[a].kind, briefs[b].kind))
 
 
-def with_loops(
+def add_loops(
     access: Access,
     briefs: Sequence[Brief],
     boxes: Sequence[Box],
@@ -204,25 +204,25 @@ def with_loops(
     widths: Widths,
     choices: Choices,
 ) -> list[Wall]:
-    """Return the tree's links and some more, as homes have a way round.
+    """Return the tree's links and a few more, since real homes have circular routes.
 
-    In an open plan two of the three borders between living, dining and kitchen are open: three
-    would leave a post in the middle.
+    In an open plan only two of the three borders between living room, dining room and kitchen are
+    open: three would leave a post in the middle.
     """
     links = list(access.links)
-    taken = {_rooms(boxes, wall) for wall in links}
+    open_pairs = {_rooms(boxes, wall) for wall in links}
     for pair, (price, wall) in _best_links(briefs, boxes, walls, widths).items():
         kinds = {briefs[pair[0]].kind, briefs[pair[1]].kind}
-        likely = 0
+        percent = 0
         if kinds <= set(_SOCIAL):
-            likely = 45 if not widths.open_plan else 0
+            percent = 45 if not widths.open_plan else 0
         elif kinds <= {*_SOCIAL, "hallway", "entryway"}:
-            likely = 60 if price < 1 else 20
+            percent = 60 if price < 1 else 20
         elif kinds & {"laundry", "garage", "storage"} and price <= 0.3:
-            likely = 30
-        if pair not in taken and choices.chance(likely):
+            percent = 30
+        if pair not in open_pairs and choices.chance(percent):
             links.append(wall)
-            taken.add(pair)
+            open_pairs.add(pair)
     return links
 
 
@@ -231,7 +231,7 @@ def _rooms(boxes: Sequence[Box], wall: Wall) -> tuple[int, int]:
     return a, b
 
 
-def gaps_for(
+def draw_gaps(
     links: Sequence[Wall],
     briefs: Sequence[Brief],
     boxes: Sequence[Box],
@@ -239,7 +239,7 @@ def gaps_for(
     widths: Widths,
     choices: Choices,
 ) -> list[Gap]:
-    """Return the passages: openings between living spaces, doors elsewhere, near a corner."""
+    """Draw the passages: openings between living spaces, elsewhere doors near a corner."""
     gaps = [
         Gap(wall, wall.low, wall.high, None)
         for wall in walls

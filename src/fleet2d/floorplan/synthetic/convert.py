@@ -1,4 +1,4 @@
-"""From a generated home to a floor plan."""
+"""Convert a generated home to a floor plan."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ Rectangle = tuple[int, int, int, int]
 
 
 def floor_plan(house: House, name: str, cell: float, source: str) -> FloorPlan:
-    """Return the floor plan of a generated home.
+    """Convert a generated home to a floor plan.
 
     Args:
         house: The home.
@@ -42,7 +42,7 @@ def _clear(box: Box) -> Rectangle:
 
 
 def _hole(gap: Gap) -> Rectangle:
-    """Return the space of a passage: as deep as its wall."""
+    """Return the space of a passage, which is as deep as its wall."""
     near, far = _faces(gap.wall)
     if gap.wall.upright:
         return near, gap.low, far, gap.high
@@ -50,7 +50,7 @@ def _hole(gap: Gap) -> Rectangle:
 
 
 def _faces(wall: Wall) -> tuple[int, int]:
-    """Return the low and the high face of a wall, along the way through it."""
+    """Return the coordinates of a wall's low and high face [units]."""
     if wall.second == -1:
         return wall.at - WALL, wall.at - WALL + OUTER_WALL
     if wall.first == -1:
@@ -77,7 +77,7 @@ def _entrance(door: Gap) -> tuple[float, float]:
 
 
 def _regions(house: House) -> list[LabelledRegion]:
-    """Return the rooms, which end in the middle of their walls; the front door is its room's."""
+    """Return the rooms up to the middle of their walls; the front door belongs to its room."""
     regions = []
     for index, brief in enumerate(house.briefs):
         shapes = [_to_middle(box) for box in house.boxes if box.room == index]

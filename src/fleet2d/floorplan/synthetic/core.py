@@ -1,4 +1,4 @@
-"""The core of a home, where it is lived in together, and the block with its garage."""
+"""The core of a home, which is its living spaces, and the block with its garage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,33 +7,33 @@ from fleet2d.floorplan.synthetic.draws import Choices
 from fleet2d.floorplan.synthetic.geometry import Box
 from fleet2d.floorplan.synthetic.grouping import Groups
 from fleet2d.floorplan.synthetic.program import Brief
-from fleet2d.floorplan.synthetic.slicing import Cut, Leaf, Tree, squarest, tree_area
+from fleet2d.floorplan.synthetic.slicing import Cut, Leaf, Tree, choose_squarest, tree_area
 
 
 def core_trees(groups: Groups, briefs: Sequence[Brief], choices: Choices) -> list[Tree]:
     """Draw trees of living room, dining room and kitchen; wings are to their high x and y."""
-    of = {brief.kind: i for i, brief in enumerate(briefs)}
-    living = Leaf(of["living_room"])
+    room_of = {brief.kind: i for i, brief in enumerate(briefs)}
+    living = Leaf(room_of["living_room"])
     trees: list[Tree] = []
     for across in (True, False):
-        cook = _kitchen(of["kitchen"], groups.pantry, across, choices)
-        if "dining_room" in of:
-            trees += _with_dining(living, Leaf(of["dining_room"]), cook, across)
+        kitchen = _kitchen(room_of["kitchen"], groups.pantry, across, choices)
+        if "dining_room" in room_of:
+            trees += _with_dining(living, Leaf(room_of["dining_room"]), kitchen, across)
             continue
-        trees += [Cut(across, (cook, living)), Cut(across, (living, cook))]
+        trees += [Cut(across, (kitchen, living)), Cut(across, (living, kitchen))]
         share = choices.between(45, 65)
         low, high = Leaf(living.room, share), Leaf(living.room, 100 - share)
-        trees.append(Cut(across, (low, Cut(not across, (cook, high)))))
+        trees.append(Cut(across, (low, Cut(not across, (kitchen, high)))))
     return choices.shuffled(trees)[: max(5, len(trees) * 5 // 6)]
 
 
-def _with_dining(living: Leaf, dine: Leaf, cook: Tree, across: bool) -> list[Tree]:
-    sides = (Cut(not across, (dine, cook)), Cut(not across, (cook, dine)))
+def _with_dining(living: Leaf, dining: Leaf, kitchen: Tree, across: bool) -> list[Tree]:
+    sides = (Cut(not across, (dining, kitchen)), Cut(not across, (kitchen, dining)))
     return [
         *(Cut(across, (side, living)) for side in sides),
         *(Cut(across, (living, side)) for side in sides),
-        Cut(across, (cook, dine, living)),
-        Cut(across, (living, dine, cook)),
+        Cut(across, (kitchen, dining, living)),
+        Cut(across, (living, dining, kitchen)),
     ]
 
 
@@ -54,14 +54,14 @@ class Service:
 
     Attributes:
         trees: Ways to divide it.
-        wide: Its width, where the core is high enough [units].
+        width: Its width, where the core is high enough [units].
         whole: Whether it is as high as the core in any case.
         at_high: Whether it is flush with the core's high side, else with its low one.
         out: How far it stands out there [units].
     """
 
     trees: list[Tree]
-    wide: int
+    width: int
     whole: bool
     at_high: bool
     out: int
@@ -69,14 +69,14 @@ class Service:
     def boxes(self, areas: Mapping[int, float], right: int, low: int, high: int) -> list[Box]:
         """Return its rooms left of a core between two heights [units]."""
         area = tree_area(self.trees[0], areas)
-        tall = min(int(area / self.wide + 0.5), high - low)
-        if self.whole or tall > high - low - 20:
-            tall = high - low
+        height = min(int(area / self.width + 0.5), high - low)
+        if self.whole or height > high - low - 20:
+            height = high - low
         if not self.whole:
             low, high = (low, high + self.out) if self.at_high else (low - self.out, high)
-        low, high = (high - tall, high) if self.at_high else (low, low + tall)
-        wide = int(area / tall + 0.5)
-        return squarest(self.trees, areas, (right - wide, low, right, high))
+        low, high = (high - height, high) if self.at_high else (low, low + height)
+        width = int(area / height + 0.5)
+        return choose_squarest(self.trees, areas, (right - width, low, right, high))
 
 
 def service_block(groups: Groups, outline: str | None, choices: Choices) -> Service | None:

@@ -37,7 +37,7 @@ class Choices:
         return low + self.below(max(high - low, 0) + 1)
 
     def chance(self, percent: int) -> bool:
-        """Return True in so many of a hundred cases."""
+        """Return True with a probability of `percent` in a hundred."""
         return self.below(100) < percent
 
     def pick(self, items: Sequence[T]) -> T:
@@ -46,12 +46,12 @@ class Choices:
 
     def weighted(self, items: Sequence[tuple[T, int]]) -> T:
         """Return an item with probability in proportion to its weight."""
-        left = self.below(sum(weight for _, weight in items))
+        rest = self.below(sum(weight for _, weight in items))
         for item, weight in items:
-            if left < weight:
+            if rest < weight:
                 return item
-            left -= weight
-        raise AssertionError("weights add up to more than is drawn")
+            rest -= weight
+        raise AssertionError("the draw is below the sum of the weights")
 
     def shuffled(self, items: Sequence[T]) -> list[T]:
         """Return `items` in random order (Fisher and Yates)."""

@@ -91,7 +91,7 @@ def inner_walls(boxes: Sequence[Box]) -> list[Wall]:
 
 def outer_walls(boxes: Sequence[Box], walls: Sequence[Wall]) -> list[Wall]:
     """Return the parts of the boxes' sides that no other box touches."""
-    found = []
+    outer = []
     for i, box in enumerate(boxes):
         touching: dict[tuple[bool, bool], list[tuple[int, int]]] = {
             (upright, high): [] for upright in (True, False) for high in (True, False)
@@ -105,12 +105,12 @@ def outer_walls(boxes: Sequence[Box], walls: Sequence[Wall]) -> list[Wall]:
             side = (box.x1 if upright else box.y1) if high else (box.x0 if upright else box.y0)
             pair = (i, -1) if high else (-1, i)
             for low, top in _gaps(sorted(spans), low_end, high_end - WALL):
-                found.append(Wall(*pair, upright, side, low, top))
-    return found
+                outer.append(Wall(*pair, upright, side, low, top))
+    return outer
 
 
 def _gaps(spans: Sequence[tuple[int, int]], low: int, high: int) -> list[tuple[int, int]]:
-    """Return what sorted spans leave of [low, high], a wall's thickness away from each."""
+    """Return the parts of [low, high] that are at least a wall's thickness away from the spans."""
     gaps = []
     for start, end in spans:
         if start - WALL > low:
@@ -121,8 +121,8 @@ def _gaps(spans: Sequence[tuple[int, int]], low: int, high: int) -> list[tuple[i
     return gaps
 
 
-def overlap(boxes: Sequence[Box]) -> bool:
-    """Tell whether any two boxes share more than their sides."""
+def boxes_overlap(boxes: Sequence[Box]) -> bool:
+    """Return whether any two boxes share more than their sides."""
     return any(
         a.x0 < b.x1 and b.x0 < a.x1 and a.y0 < b.y1 and b.y0 < a.y1
         for i, a in enumerate(boxes)
@@ -130,14 +130,14 @@ def overlap(boxes: Sequence[Box]) -> bool:
     )
 
 
-def turned(boxes: Sequence[Box], way: int) -> list[Box]:
-    """Return the boxes in one of the eight ways to turn and mirror them (0 to 7)."""
-    found = list(boxes)
-    if way & 1:
-        found = [Box(b.room, -b.x1, b.y0, -b.x0, b.y1) for b in found]
-    if way & 2:
-        found = [Box(b.room, b.x0, -b.y1, b.x1, -b.y0) for b in found]
-    if way & 4:
-        found = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in found]
-    x0, y0 = min(b.x0 for b in found), min(b.y0 for b in found)
-    return [Box(b.room, b.x0 - x0, b.y0 - y0, b.x1 - x0, b.y1 - y0) for b in found]
+def turn_boxes(boxes: Sequence[Box], orientation: int) -> list[Box]:
+    """Return the boxes in one of their eight orientations, turned and mirrored (0 to 7)."""
+    oriented = list(boxes)
+    if orientation & 1:
+        oriented = [Box(b.room, -b.x1, b.y0, -b.x0, b.y1) for b in oriented]
+    if orientation & 2:
+        oriented = [Box(b.room, b.x0, -b.y1, b.x1, -b.y0) for b in oriented]
+    if orientation & 4:
+        oriented = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in oriented]
+    x0, y0 = min(b.x0 for b in oriented), min(b.y0 for b in oriented)
+    return [Box(b.room, b.x0 - x0, b.y0 - y0, b.x1 - x0, b.y1 - y0) for b in oriented]

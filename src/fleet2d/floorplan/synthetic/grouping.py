@@ -1,4 +1,4 @@
-"""Which rooms go together: what belongs to a bedroom beside it, small rooms one behind another."""
+"""Groups of rooms that stay together: a bedroom and its bathroom, small rooms in a row."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from fleet2d.floorplan.synthetic.draws import Choices
 from fleet2d.floorplan.synthetic.program import Brief
 from fleet2d.floorplan.synthetic.slicing import Slot
 
-Group = list[Slot]
+RoomGroup = list[Slot]
 """Slots that stay next to each other in this order."""
 
 
@@ -23,27 +23,27 @@ class Groups:
         closet: A small room for the end of a corridor, or None.
     """
 
-    entry: Group | None = None
-    private: list[Group] = field(default_factory=list)
+    entry: RoomGroup | None = None
+    private: list[RoomGroup] = field(default_factory=list)
     service: list[int] = field(default_factory=list)
     pantry: list[int] = field(default_factory=list)
     closet: int | None = None
 
 
-def grouped(briefs: Sequence[Brief], choices: Choices) -> Groups:
-    """Sort the rooms."""
-    of = _by_kind(briefs)
+def group_rooms(briefs: Sequence[Brief], choices: Choices) -> Groups:
+    """Group the rooms by where they may go."""
+    by_kind = _by_kind(briefs)
     groups = Groups()
-    if of["garage"]:
-        groups.service = of["garage"] + of["gym"]
-    small = _small_rooms(of, groups, choices)
-    shared = [i for i in of["bathroom"] if briefs[i].partner is None]
+    if by_kind["garage"]:
+        groups.service = by_kind["garage"] + by_kind["gym"]
+    small = _small_rooms(by_kind, groups, choices)
+    shared = [i for i in by_kind["bathroom"] if briefs[i].partner is None]
     fronts = choices.shuffled(shared + small)
-    for bed in of["bedroom"]:
+    for bed in by_kind["bedroom"]:
         owned = [i for i, brief in enumerate(briefs) if brief.partner == bed]
         groups.private.append([*_beside(owned, fronts, briefs, choices), (bed,)])
-    if of["entryway"]:
-        groups.entry = _entry_group(of["entryway"][0], fronts, briefs, choices)
+    if by_kind["entryway"]:
+        groups.entry = _entry_group(by_kind["entryway"][0], fronts, briefs, choices)
     for room in fronts:
         if briefs[room].kind == "bathroom":
             groups.private.append([(room,)])
@@ -51,9 +51,9 @@ def grouped(briefs: Sequence[Brief], choices: Choices) -> Groups:
             groups.closet = room
         else:
             groups.pantry.append(room)
-    groups.private += [[(i,)] for i in of["office"]]
-    if not of["garage"]:
-        groups.private += [[(i,)] for i in of["gym"]]
+    groups.private += [[(i,)] for i in by_kind["office"]]
+    if not by_kind["garage"]:
+        groups.private += [[(i,)] for i in by_kind["gym"]]
     return groups
 
 
@@ -65,18 +65,18 @@ def _by_kind(briefs: Sequence[Brief]) -> dict[str, list[int]]:
     }
 
 
-def _small_rooms(of: dict[str, list[int]], groups: Groups, choices: Choices) -> list[int]:
+def _small_rooms(by_kind: dict[str, list[int]], groups: Groups, choices: Choices) -> list[int]:
     """Return the small rooms for strips; the others go to the service block or the kitchen."""
-    kept = list(of["toilet"])
-    for room in of["laundry"] + of["storage"]:
+    strip_rooms = list(by_kind["toilet"])
+    for room in by_kind["laundry"] + by_kind["storage"]:
         place = choices.weighted((("service", 60), ("pantry", 25), ("strip", 15)))
         if place == "service" and groups.service:
             groups.service.append(room)
         elif place == "strip" or groups.pantry:
-            kept.append(room)
+            strip_rooms.append(room)
         else:
             groups.pantry.append(room)
-    return kept
+    return strip_rooms
 
 
 def _beside(

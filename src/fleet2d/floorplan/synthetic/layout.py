@@ -1,24 +1,25 @@
-"""Draw a layout: a kind of plan, at the scale at which the home is as large as asked for."""
+"""Draw a layout: a kind of plan, at the scale at which the home has the requested area."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fleet2d.floorplan.synthetic.draws import Choices
 from fleet2d.floorplan.synthetic.geometry import PER_M2, Box
-from fleet2d.floorplan.synthetic.grouping import grouped
+from fleet2d.floorplan.synthetic.grouping import group_rooms
 from fleet2d.floorplan.synthetic.plans import Placing, across, columns, inline, two_wings
 from fleet2d.floorplan.synthetic.program import Brief
-from fleet2d.floorplan.synthetic.request import Request, promising
-from fleet2d.floorplan.synthetic.slicing import gross
+from fleet2d.floorplan.synthetic.request import LayoutRequest, is_promising
+from fleet2d.floorplan.synthetic.slicing import gross_area
 
-# Clear area of the rooms in that of the home: the rest are gaps of doors.
+# Share of the home's clear area that is in rooms; the rest is in door gaps.
 ROOMS_SHARE = 0.992
-CLOSE = 0.012
+# How far the area may be from the requested one, as a share of it, and the tries to get there.
+TOLERANCE = 0.012
 ROUNDS = 7
 
 
 @dataclass(frozen=True)
-class Layout:
+class RoomLayout:
     """A home's rooms, placed.
 
     Attributes:
@@ -30,9 +31,9 @@ class Layout:
     boxes: list[Box]
 
 
-def drawn(request: Request, choices: Choices) -> Layout | None:
+def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
     """Draw one layout, or return None where the rooms do not fit as drawn."""
-    groups = grouped(request.briefs, choices)
+    groups = group_rooms(request.briefs, choices)
     bedrooms = sum(brief.kind == "bedroom" for brief in request.briefs)
     briefs = [*request.briefs, Brief("hallway", 0.0)]
     hall = len(briefs) - 1
@@ -49,21 +50,21 @@ def drawn(request: Request, choices: Choices) -> Layout | None:
         placing = across(groups, request, briefs, hall, choices)
     if placing is None:
         return None
-    boxes = _sized(placing, briefs, request.area_m2)
-    return None if boxes is None else Layout(briefs, boxes)
+    boxes = _place_at_scale(placing, briefs, request.area_m2)
+    return None if boxes is None else RoomLayout(briefs, boxes)
 
 
-def _sized(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box] | None:
-    """Place the rooms at the scale at which their clear areas add up as wanted."""
-    wanted = area_m2 * PER_M2 * ROOMS_SHARE
+def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box] | None:
+    """Place the rooms at the scale at which their clear areas add up to the requested area."""
+    target = area_m2 * PER_M2 * ROOMS_SHARE
     factor = 1.0
     for _ in range(ROUNDS):
-        areas = {i: gross(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}
+        areas = {i: gross_area(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}
         boxes = placing(areas)
-        if boxes is None or not promising(boxes, briefs):
+        if boxes is None or not is_promising(boxes, briefs):
             return None
-        found = sum(box.clear_area for box in boxes)
-        if abs(found - wanted) <= CLOSE * wanted:
+        area = sum(box.clear_area for box in boxes)
+        if abs(area - target) <= TOLERANCE * target:
             return boxes
-        factor *= wanted / found
+        factor *= target / area
     return None

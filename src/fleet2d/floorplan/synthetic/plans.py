@@ -1,4 +1,4 @@
-"""Whole plans: how core, wings and garage stand to each other."""
+"""Whole plans: arrangements of core, wings and garage."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -10,24 +10,24 @@ from fleet2d.floorplan.synthetic.draws import Choices
 from fleet2d.floorplan.synthetic.geometry import Box
 from fleet2d.floorplan.synthetic.grouping import Groups
 from fleet2d.floorplan.synthetic.program import Brief
-from fleet2d.floorplan.synthetic.request import Request
-from fleet2d.floorplan.synthetic.slicing import Mouth, Strip, Tree, squarest, tree_area
+from fleet2d.floorplan.synthetic.request import LayoutRequest
+from fleet2d.floorplan.synthetic.slicing import Mouth, Strip, Tree, choose_squarest, tree_area
 from fleet2d.floorplan.synthetic.wing import Wing
-from fleet2d.floorplan.synthetic.wings import drawn_wing, with_bays
+from fleet2d.floorplan.synthetic.wings import add_bays, draw_wing
 
-# The core is at least so deep [units].
+# Least depth of the core [units].
 LEAST_CORE = 70
 
 Areas = Mapping[int, float]
 Placing = Callable[[Areas], list[Box] | None]
-"""Places a plan's rooms for gross areas of them [units²]; None where they do not fit."""
+"""Places the rooms of a plan, by their gross areas [units²]; returns None where they do not fit."""
 
 
 def inline(
-    groups: Groups, request: Request, briefs: Sequence[Brief], hall: int, choices: Choices
+    groups: Groups, request: LayoutRequest, briefs: Sequence[Brief], hall: int, choices: Choices
 ) -> Placing | None:
     """Core in the middle, a wing in line with it, the service block on its other side."""
-    wing = drawn_wing(groups.private, groups.entry, groups.closet, hall, request, briefs, choices)
+    wing = draw_wing(groups.private, groups.entry, groups.closet, hall, request, briefs, choices)
     if wing is None:
         return None
     core = core_trees(groups, briefs, choices)
@@ -37,16 +37,16 @@ def inline(
     mouth = Mouth(True, 0, 0, wing.width)
 
     def place(areas: Areas) -> list[Box] | None:
-        placed = wing.placed(areas)
-        if placed is None:
+        rooms = wing.place(areas)
+        if rooms is None:
             return None
-        y0, y1 = placed.low - low, placed.high + high
+        y0, y1 = rooms.low - low, rooms.high + high
         if y1 - y0 < LEAST_CORE:
             return None
-        wide = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
-        boxes = placed.boxes + squarest(core, areas, (-wide, y0, 0, y1), [mouth])
+        width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
+        boxes = rooms.boxes + choose_squarest(core, areas, (-width, y0, 0, y1), [mouth])
         if service is not None:
-            boxes += service.boxes(areas, -wide, y0, y1)
+            boxes += service.boxes(areas, -width, y0, y1)
         return boxes
 
     return place
@@ -76,10 +76,10 @@ def _offsets(outline: str | None, choices: Choices) -> tuple[int, int]:
 
 
 def across(
-    groups: Groups, request: Request, briefs: Sequence[Brief], hall: int, choices: Choices
+    groups: Groups, request: LayoutRequest, briefs: Sequence[Brief], hall: int, choices: Choices
 ) -> Placing | None:
     """A long core with a wing at a right angle to it, and the service block at its end."""
-    wing = drawn_wing(groups.private, groups.entry, groups.closet, hall, request, briefs, choices)
+    wing = draw_wing(groups.private, groups.entry, groups.closet, hall, request, briefs, choices)
     if wing is None:
         return None
     core = core_trees(groups, briefs, choices)
@@ -87,23 +87,23 @@ def across(
     at = {"L": choices.pick((0, 100)), "T": 50}.get(request.outline or "")
     if at is None:
         at = choices.weighted(((0, 40), (100, 40), (50, 20)))
-    tall = choices.between(86, 150)
+    height = choices.between(86, 150)
 
     mouth = Mouth(False, 0, 0, wing.width)
 
     def place(areas: Areas) -> list[Box] | None:
-        placed = wing.placed(areas)
-        if placed is None:
+        rooms = wing.place(areas)
+        if rooms is None:
             return None
         area = tree_area(core[0], areas)
-        deep = max(placed.high - placed.low, 1)
-        long = max(int(area / tall + 0.5), deep if request.outline == "rectangle" else 0)
-        left = placed.low + (deep - long) * at // 100
-        high = int(area / long + 0.5)
+        depth = max(rooms.high - rooms.low, 1)
+        length = max(int(area / height + 0.5), depth if request.outline == "rectangle" else 0)
+        left = rooms.low + (depth - length) * at // 100
+        high = int(area / length + 0.5)
         if high < LEAST_CORE:
             return None
-        boxes = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in placed.boxes]
-        boxes += squarest(core, areas, (left, -high, left + long, 0), [mouth])
+        boxes = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in rooms.boxes]
+        boxes += choose_squarest(core, areas, (left, -high, left + length, 0), [mouth])
         if service is not None:
             boxes += service.boxes(areas, left, -high, 0)
         return boxes
@@ -113,7 +113,7 @@ def across(
 
 def two_wings(
     groups: Groups,
-    request: Request,
+    request: LayoutRequest,
     briefs: Sequence[Brief],
     halls: tuple[int, int],
     choices: Choices,
@@ -124,10 +124,10 @@ def two_wings(
     if half < 1 or len(others) - half < 2:
         return None
     plain = replace(request, outline=request.outline and "rectangle")  # without a porch
-    first = drawn_wing(
+    first = draw_wing(
         [main, *others[:half]], groups.entry, groups.closet, halls[0], plain, briefs, choices
     )
-    second = drawn_wing(others[half:], None, None, halls[1], plain, briefs, choices)
+    second = draw_wing(others[half:], None, None, halls[1], plain, briefs, choices)
     if first is None or second is None:
         return None
     core = core_trees(groups, briefs, choices)
@@ -154,45 +154,45 @@ def _between(
         areas: Gross areas of the rooms [units²].
     """
     first, second = wings
-    east = first.placed(areas)
+    east = first.place(areas)
     if east is None:
         return None
     y0, y1 = east.low - offsets[0], east.high + offsets[1]
-    west = _fitted(second, areas, *((y0, y1) if as_core else (east.low, east.high)))
+    west = _fit_wing(second, areas, *((y0, y1) if as_core else (east.low, east.high)))
     if west is None or y1 - y0 < LEAST_CORE:
         return None
-    wide = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
+    width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
     other = next(box for box in west if box.room == second.corridor)
-    mouths = [Mouth(True, 0, 0, first.width), Mouth(True, -wide, other.y0, other.y1)]
-    boxes = east.boxes + squarest(core, areas, (-wide, y0, 0, y1), mouths)
-    return boxes + [Box(b.room, -wide - b.x1, b.y0, -wide - b.x0, b.y1) for b in west]
+    mouths = [Mouth(True, 0, 0, first.width), Mouth(True, -width, other.y0, other.y1)]
+    boxes = east.boxes + choose_squarest(core, areas, (-width, y0, 0, y1), mouths)
+    return boxes + [Box(b.room, -width - b.x1, b.y0, -width - b.x0, b.y1) for b in west]
 
 
-def _fitted(wing: Wing, areas: Areas, low: int, high: int) -> list[Box] | None:
-    """Return a wing's rooms, as deep in all as the span [units] that they are moved to."""
-    placed = wing.placed(areas)
+def _fit_wing(wing: Wing, areas: Areas, low: int, high: int) -> list[Box] | None:
+    """Return a wing's rooms, moved and deepened to fill a span along y [units]."""
+    rooms = wing.place(areas)
     for _ in range(2):
-        if placed is None:
+        if rooms is None:
             return None
-        found = placed.high - placed.low - wing.width
-        depth = wing.back_depth * (high - low - wing.width) / found
+        current = rooms.high - rooms.low - wing.width
+        depth = wing.back_depth * (high - low - wing.width) / current
         wing = replace(wing, back_depth=int(depth + 0.5))
-        placed = wing.placed(areas)
-    if placed is None:
+        rooms = wing.place(areas)
+    if rooms is None:
         return None
-    shift = low - placed.low
-    off = high - placed.high - shift
-    if abs(off) > 6:
+    shift = low - rooms.low
+    rest = high - rooms.high - shift
+    if abs(rest) > 6:
         return None
-    top = placed.high
+    top = rooms.high
     return [
-        Box(b.room, b.x0, b.y0 + shift, b.x1, b.y1 + shift + (off if b.y1 == top else 0))
-        for b in placed.boxes
+        Box(b.room, b.x0, b.y0 + shift, b.x1, b.y1 + shift + (rest if b.y1 == top else 0))
+        for b in rooms.boxes
     ]
 
 
 def columns(
-    groups: Groups, request: Request, briefs: Sequence[Brief], choices: Choices
+    groups: Groups, request: LayoutRequest, briefs: Sequence[Brief], choices: Choices
 ) -> Placing | None:
     """A small home without a corridor: rooms in a column beside the core open to it."""
     slots = [*(groups.entry or [])]
@@ -205,7 +205,7 @@ def columns(
         at = choices.between(1, len(slots) - 2)
         column = replace(column, bays=tuple(-30 * (i == at) for i in range(len(slots))))
     elif request.outline is None and choices.chance(35):
-        column = with_bays(column, choices, False)
+        column = add_bays(column, choices, False)
     core = core_trees(groups, briefs, choices)
     service = service_block(groups, request.outline, choices)
     ratio = choices.between(62, 110)
@@ -213,19 +213,19 @@ def columns(
 
     def place(areas: Areas) -> list[Box] | None:
         total = fsum(areas.values())
-        tall = int(sqrt(total * 100 / (1.45 * ratio)))
-        y0, y1 = -low, tall + high
+        height = int(sqrt(total * 100 / (1.45 * ratio)))
+        y0, y1 = -low, height + high
         if y1 - y0 < LEAST_CORE:
             return None
-        wide = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
-        boxes = squarest(core, areas, (-wide, y0, 0, y1))
-        deep = column.depth(areas, tall)
-        if deep < 40:
+        width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
+        boxes = choose_squarest(core, areas, (-width, y0, 0, y1))
+        depth = column.depth(areas, height)
+        if depth < 40:
             return None
-        beside = column.boxes(areas, tall, deep, 0, 1)
+        beside = column.boxes(areas, height, depth, 0, 1)
         boxes += [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in beside]
         if service is not None:
-            boxes += service.boxes(areas, -wide, y0, y1)
+            boxes += service.boxes(areas, -width, y0, y1)
         return boxes
 
     return place

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.synthetic.draws import Choices
 
-# What corridors and door gaps add to the rooms, as a rule.
+# Area of a home over that of its rooms: corridors and door gaps add to it.
 USUAL_EXTRA = 1.10
 MAX_ROOMS_OF_A_KIND = 8
 SMALLEST_M2 = 30.0
@@ -23,7 +23,15 @@ AREA_QUANTILES = (
 
 
 class Size(NamedTuple):
-    """How large rooms of a kind are: area [m²] at least, as a rule, at most; shortest side [m]."""
+    """The sizes of a type of room.
+
+    Attributes:
+        least: Least area [m²].
+        usual: Usual area [m²].
+        most: Largest area [m²].
+        side: Least length of the shorter side [m].
+        slender: Largest ratio of the sides.
+    """
 
     least: float
     usual: float
@@ -50,7 +58,7 @@ SIZES = {
 }
 
 
-# How far areas are from the usual [%], least and most.
+# Areas in percent of the usual one, least and most.
 SPREAD = {
     "kitchen": (70, 185),
     "bathroom": (50, 165),
@@ -63,7 +71,7 @@ USUAL_SPREAD = (78, 130)
 
 @dataclass(frozen=True)
 class Brief:
-    """A room that is asked for.
+    """A room that a home is to have.
 
     Attributes:
         kind: Its type.
@@ -78,7 +86,7 @@ class Brief:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a user asked for; None where it is left to the generator.
+    """What a user requests; None where it is left to the generator.
 
     Attributes:
         area_m2: Area of the free space.
@@ -96,18 +104,18 @@ class Wishes:
 def least_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
     """Return the least area [m²] of a home with so many rooms."""
     kinds = [*_base(bedrooms, bathrooms), *["garage"] * garage]
-    # A corridor is needed, and room to fit walls to each other, but in the smallest of homes.
+    # All but the smallest homes need a corridor, and some room for fitting walls to each other.
     spare = 1.15 if bedrooms == bathrooms == 1 else min(1.5 + 0.05 * (bedrooms + bathrooms), 2.0)
     return round(spare * fsum(SIZES[kind].least for kind in kinds), 1)
 
 
 def most_area(bedrooms: int, bathrooms: int) -> float:
-    """Return the greatest area [m²] of a home with so many rooms, all others added."""
+    """Return the largest area [m²] of a home with so many rooms and all optional ones."""
     kinds = [*_base(bedrooms, bathrooms), "garage", *(kind for kind, _, _ in OPTIONAL)]
     return round(0.56 * fsum(SIZES[kind].most for kind in kinds), 1)
 
 
-# What else a home may have: its type, from which area [m²], and how often [%].
+# What else a home may have: the type of room, from which area on [m²], and its probability [%].
 OPTIONAL = (
     ("dining_room", 62, 70),
     ("entryway", 70, 62),
@@ -122,25 +130,25 @@ OPTIONAL = (
 )
 
 
-def settle(wishes: Wishes, choices: Choices) -> Wishes:
-    """Return the wishes with everything decided.
+def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
+    """Draw what the wishes leave open.
 
     Raises:
-        FloorPlanError: They contradict each other.
+        FloorPlanError: The wishes contradict each other.
     """
     baths = wishes.bathrooms or 1
     beds = wishes.bedrooms or max(baths - 2, 1)
     garage = bool(wishes.garage)
     area = wishes.area_m2
     if area is None:
-        area = _drawn_area(choices)
+        area = _draw_area(choices)
         most = most_area(wishes.bedrooms or MAX_ROOMS_OF_A_KIND, baths)
         area = round(min(max(area, 1.25 * least_area(beds, baths, garage)), most), 1)
     _check(area, wishes)
     if wishes.bedrooms is None:
-        few = beds
-        beds = min(max((round(area) + choices.between(-36, 36) + 38) // 66, few), 6)
-        while beds > few and least_area(beds, baths, garage) > 0.8 * area:
+        least = beds
+        beds = min(max((round(area) + choices.between(-36, 36) + 38) // 66, least), 6)
+        while beds > least and least_area(beds, baths, garage) > 0.8 * area:
             beds -= 1
         while beds < MAX_ROOMS_OF_A_KIND and most_area(beds, baths) < area:
             beds += 1
@@ -153,7 +161,7 @@ def settle(wishes: Wishes, choices: Choices) -> Wishes:
     return Wishes(area, beds, baths, garage)
 
 
-def _drawn_area(choices: Choices) -> float:
+def _draw_area(choices: Choices) -> float:
     """Draw an area [m²] as HouseExpo's plans have it."""
     share = choices.below(1000) / 10
     for (low, least), (high, most) in pairwise(AREA_QUANTILES):
@@ -171,19 +179,19 @@ def _check(area: float, wishes: Wishes) -> None:
             f" {baths}: give it more bedrooms (floorplan.bedrooms) or fewer bathrooms"
         )
     least, most = least_area(beds, baths, garage), most_area(beds, baths)
-    asked = f"{_count(beds, 'bedroom')} and {_count(baths, 'bathroom')}"
+    rooms = f"{_count(beds, 'bedroom')} and {_count(baths, 'bathroom')}"
     if garage:
-        asked += " and a garage"
+        rooms += " and a garage"
     if area < least:
         fits = [n for n in range(1, beds) if least_area(n, 1, garage=False) <= area]
         at_most = f"; {area:g} m2 fits {_count(max(fits), 'bedroom')}" if fits else ""
         raise FloorPlanError(
-            f"a synthetic home of {area:g} m2 can't have {asked}: they need at least {least:g} m2"
+            f"a synthetic home of {area:g} m2 can't have {rooms}: they need at least {least:g} m2"
             f"{at_most}. Change floorplan.area_m2, or the rooms"
         )
     if area > most and wishes.bedrooms is not None:
         raise FloorPlanError(
-            f"a synthetic home with {asked} has at most {most:g} m2, not {area:g} m2: its rooms"
+            f"a synthetic home with {rooms} has at most {most:g} m2, not {area:g} m2: its rooms"
             " would be halls. Give it more bedrooms (floorplan.bedrooms), or less area"
         )
 
@@ -196,51 +204,51 @@ def _base(bedrooms: int, bathrooms: int) -> list[str]:
     return ["living_room", "kitchen", *["bedroom"] * bedrooms, *["bathroom"] * bathrooms]
 
 
-def rooms_for(wishes: Wishes, choices: Choices, porch: bool = False) -> list[Brief]:
+def choose_rooms(wishes: Wishes, choices: Choices, porch: bool = False) -> list[Brief]:
     """Return the rooms of a home, largest uses first, with areas that add up.
 
     Args:
         wishes: Settled wishes.
         choices: The stream to draw from.
-        porch: Whether there must be an entryway.
+        porch: Whether the home must have an entryway.
     """
     area, beds, baths = wishes.area_m2 or 0.0, wishes.bedrooms or 1, wishes.bathrooms or 1
     kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
-    room = area / USUAL_EXTRA
-    # Rooms are usual in size or up to so much larger before there is one more of them.
+    total = area / USUAL_EXTRA
+    # Another room is added only while the usual sizes of all leave space for it.
     fill = choices.between(70, 104) / 100
-    for kind, from_area, often in OPTIONAL:
+    for kind, from_area, percent in OPTIONAL:
         if porch and kind == "entryway":
             kinds.append(kind)
             continue
-        wanted = area >= from_area and choices.chance(often)
-        if wanted and fsum(SIZES[k].usual for k in [*kinds, kind]) <= fill * room:
+        is_likely = area >= from_area and choices.chance(percent)
+        if is_likely and fsum(SIZES[k].usual for k in [*kinds, kind]) <= fill * total:
             kinds.append(kind)
-    for kind, _, _ in OPTIONAL:  # only what is very large has not yet enough
-        if 0.85 * fsum(SIZES[k].most for k in kinds) < room and kinds.count(kind) < 2:
+    for kind, _, _ in OPTIONAL:  # a very large home takes more rooms
+        if 0.85 * fsum(SIZES[k].most for k in kinds) < total and kinds.count(kind) < 2:
             kinds.append(kind)
     briefs = [Brief(kind, SIZES[kind].usual) for kind in kinds]
-    return scaled(_paired(briefs), room, choices)
+    return scale_areas(_assign_partners(briefs), total, choices)
 
 
-def _paired(briefs: Sequence[Brief]) -> list[Brief]:
-    """Return the rooms where bathrooms beyond the first, and wardrobes, belong to bedrooms."""
-    found = list(briefs)
-    beds = [i for i, brief in enumerate(found) if brief.kind == "bedroom"]
-    baths = [i for i, brief in enumerate(found) if brief.kind == "bathroom"]
-    wardrobes = [i for i, brief in enumerate(found) if brief.kind == "wardrobe"]
-    found[beds[0]] = replace(found[beds[0]], area=SIZES["bedroom"].usual * 1.25)
+def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:
+    """Assign bathrooms beyond the first, and wardrobes, to bedrooms."""
+    paired = list(briefs)
+    beds = [i for i, brief in enumerate(paired) if brief.kind == "bedroom"]
+    baths = [i for i, brief in enumerate(paired) if brief.kind == "bathroom"]
+    wardrobes = [i for i, brief in enumerate(paired) if brief.kind == "wardrobe"]
+    paired[beds[0]] = replace(paired[beds[0]], area=SIZES["bedroom"].usual * 1.25)
     # A home with many bathrooms has a second shared one.
     shared = 1 + (len(baths) > 3)
     for bath, bed in zip(baths[shared:], beds, strict=False):
-        found[bath] = replace(found[bath], partner=bed)
+        paired[bath] = replace(paired[bath], partner=bed)
     for wardrobe in wardrobes:
-        found[wardrobe] = replace(found[wardrobe], partner=beds[0])
-    return found
+        paired[wardrobe] = replace(paired[wardrobe], partner=beds[0])
+    return paired
 
 
-def scaled(briefs: Sequence[Brief], total: float, choices: Choices) -> list[Brief]:
-    """Return the rooms with areas that add up to `total` [m²], as large as their kinds can be."""
+def scale_areas(briefs: Sequence[Brief], total: float, choices: Choices) -> list[Brief]:
+    """Draw areas that add up to `total` [m²] as far as the sizes of the types allow."""
     spreads = [SPREAD.get(brief.kind, USUAL_SPREAD) for brief in briefs]
     usual = [
         brief.area * choices.between(*spread) / 100

@@ -1,4 +1,4 @@
-"""What a layout is drawn for, and whether a room can become what it is for."""
+"""What a layout is requested for, and whether its rooms can come to fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ from fleet2d.floorplan.synthetic.program import SIZES, Brief
 
 
 @dataclass(frozen=True)
-class Request:
-    """What layouts are drawn for.
+class LayoutRequest:
+    """What is requested of a layout.
 
     Attributes:
         briefs: The rooms.
@@ -24,11 +24,11 @@ class Request:
     outline: str | None
 
 
-def promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:
-    """Tell whether rooms are not so slender that no other scale can help."""
+def is_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:
+    """Return whether the rooms could fit at another scale: none is far too narrow or too long."""
     for room, x0, y0, x1, y1 in boxes:
-        wide, high = x1 - x0 - WALL, y1 - y0 - WALL
-        short, long = (wide, high) if wide < high else (high, wide)
+        width, height = x1 - x0 - WALL, y1 - y0 - WALL
+        short, long = (width, height) if width < height else (height, width)
         size = SIZES[briefs[room].kind]
         if short < 0.88 * PER_M * size.side or long > 1.6 * size.slender * short:
             return False

@@ -14,16 +14,14 @@ from typing import NamedTuple, TypeAlias
 
 from fleet2d.floorplan.synthetic.geometry import PER_M2, WALL, Box
 
-# What it weighs against slender rooms that a corridor ends at the wall between two.
-MET = 3.0
-
-
-# A bathroom at the end of a deep strip is larger than asked for rather than narrower [units].
+# Penalty, in slenderness, for a corridor that ends at the wall between two rooms.
+MOUTH_PENALTY = 3.0
+# Least width of a slot: a bathroom at the end of a deep strip gets larger, not narrower [units].
 NARROWEST = 35.0
 
 
 class Leaf(NamedTuple):
-    """A room, or the given share of one that is made of several rectangles."""
+    """A room, or a share of it [%] where it is made of several rectangles."""
 
     room: int
     percent: int = 100
@@ -42,7 +40,7 @@ Slot: TypeAlias = tuple[int, ...]
 """A piece of a strip: one room, or one at the front (where its doors are) and one behind it."""
 
 
-def gross(area_m2: float) -> float:
+def gross_area(area_m2: float) -> float:
     """Return the area [units²] that a room of a clear area [m²] takes with its walls."""
     clear = area_m2 * PER_M2
     return float(clear + 2.1 * WALL * sqrt(clear) + WALL * WALL)
@@ -55,19 +53,23 @@ def tree_area(tree: Tree, areas: Mapping[int, float]) -> float:
     return fsum(tree_area(part, areas) for part in tree.parts)
 
 
-def sliced(tree: Tree, areas: Mapping[int, float], x0: int, y0: int, x1: int, y1: int) -> list[Box]:
+def slice_tree(
+    tree: Tree, areas: Mapping[int, float], x0: int, y0: int, x1: int, y1: int
+) -> list[Box]:
     """Return the rooms of a tree in a rectangle, in proportion to their areas."""
     if isinstance(tree, Leaf):
         return [Box(tree.room, x0, y0, x1, y1)]
     low, high = (x0, x1) if tree.across else (y0, y1)
     boxes: list[Box] = []
     for part, (start, end) in zip(
-        tree.parts, cuts([tree_area(part, areas) for part in tree.parts], low, high), strict=True
+        tree.parts,
+        divide_span([tree_area(part, areas) for part in tree.parts], low, high),
+        strict=True,
     ):
         if tree.across:
-            boxes += sliced(part, areas, start, y0, end, y1)
+            boxes += slice_tree(part, areas, start, y0, end, y1)
         else:
-            boxes += sliced(part, areas, x0, start, x1, end)
+            boxes += slice_tree(part, areas, x0, start, x1, end)
     return boxes
 
 
@@ -87,7 +89,7 @@ class Mouth(NamedTuple):
     high: int
 
 
-def squarest(
+def choose_squarest(
     trees: Sequence[Tree],
     areas: Mapping[int, float],
     sides: tuple[int, int, int, int],
@@ -101,12 +103,15 @@ def squarest(
         sides: The rectangle (x0, y0, x1, y1) [units].
         mouths: Corridors that a wall should not end in.
     """
-    layouts = [sliced(tree, areas, *sides) for tree in trees]
-    return min(layouts, key=lambda boxes: slenderness(boxes) + MET * _unmet(boxes, mouths))
+    layouts = [slice_tree(tree, areas, *sides) for tree in trees]
+    return min(
+        layouts,
+        key=lambda boxes: slenderness(boxes) + MOUTH_PENALTY * _blocked_mouths(boxes, mouths),
+    )
 
 
-def _unmet(boxes: Sequence[Box], mouths: Sequence[Mouth]) -> int:
-    """Return how many corridors end at no one room."""
+def _blocked_mouths(boxes: Sequence[Box], mouths: Sequence[Mouth]) -> int:
+    """Return how many corridors do not end at a single room."""
     return sum(not any(_meets(box, mouth) for box in boxes) for mouth in mouths)
 
 
@@ -117,17 +122,19 @@ def _meets(box: Box, mouth: Mouth) -> bool:
 
 
 def slenderness(boxes: Sequence[Box]) -> float:
-    """Return how far rooms are from squares: 0 for good ones."""
-    found = 0.0
+    """Return how far rooms are from squares: 0 where no side is over 1.2 times the other."""
+    total = 0.0
     for _, x0, y0, x1, y1 in boxes:
-        wide, high = x1 - x0 - WALL, y1 - y0 - WALL
-        ratio = (wide / high if high > 0 else 99.0) if wide > high else high / max(wide, 1)
+        width, height = x1 - x0 - WALL, y1 - y0 - WALL
+        ratio = (
+            (width / height if height > 0 else 99.0) if width > height else height / max(width, 1)
+        )
         if ratio > 1.2:
-            found += (ratio - 1.2) * (ratio - 1.2)
-    return found
+            total += (ratio - 1.2) * (ratio - 1.2)
+    return total
 
 
-def cuts(sizes: Sequence[float], low: int, high: int) -> list[tuple[int, int]]:
+def divide_span(sizes: Sequence[float], low: int, high: int) -> list[tuple[int, int]]:
     """Divide [low, high] in proportion to sizes, without gaps."""
     total = fsum(sizes)
     ends, reached = [low], 0.0
@@ -150,17 +157,17 @@ class Strip:
     bays: tuple[int, ...]
 
     def widths(self, areas: Mapping[int, float], depth: float) -> list[float]:
-        """Return how wide its slots are [units] at a depth [units]."""
-        found = []
+        """Return the widths of its slots [units] at a depth [units]."""
+        widths = []
         for slot, bay in zip(self.slots, self.bays, strict=True):
             area = areas[slot[0]]
             if len(slot) > 1:
                 area += areas[slot[1]]
-            found.append(max(area / (depth + bay), NARROWEST))
-        return found
+            widths.append(max(area / (depth + bay), NARROWEST))
+        return widths
 
     def depth(self, areas: Mapping[int, float], length: float) -> int:
-        """Return the depth [units] at which it is so long [units]; 0 for none below 12 m."""
+        """Return the depth [units] at which it has a length [units]; 0 for none below 12 m."""
         total = fsum(areas[room] for slot in self.slots for room in slot)
         depth = total / length if not any(self.bays) else 0.0
         low, high = max(20, 20 - min(self.bays)), 240
@@ -179,24 +186,24 @@ class Strip:
     def boxes(
         self, areas: Mapping[int, float], length: int, depth: int, front: int, away: int
     ) -> list[Box]:
-        """Return its rooms along x from 0, with their front at y = `front`.
+        """Return its rooms along x, from 0 on, with their front at y = `front`.
 
         Args:
             areas: Gross areas of the rooms [units²].
             length: Its length [units].
             depth: Its depth [units].
-            front: Where the line is that it stands on [units].
-            away: 1 to stand above the line, -1 below it.
+            front: y of its front [units].
+            away: 1 to extend upwards from its front, -1 downwards.
         """
-        found: list[Box] = []
-        spans = cuts(self.widths(areas, depth), 0, length)
+        boxes: list[Box] = []
+        spans = divide_span(self.widths(areas, depth), 0, length)
         for slot, bay, (x0, x1) in zip(self.slots, self.bays, spans, strict=True):
-            deep = front + away * (depth + bay)
+            back = front + away * (depth + bay)
             if len(slot) == 1:
-                found.append(Box(slot[0], x0, min(front, deep), x1, max(front, deep)))
+                boxes.append(Box(slot[0], x0, min(front, back), x1, max(front, back)))
                 continue
             first, second = areas[slot[0]], areas[slot[1]]
-            part = front + away * int((depth + bay) * first / (first + second) + 0.5)
-            found.append(Box(slot[0], x0, min(front, part), x1, max(front, part)))
-            found.append(Box(slot[1], x0, min(part, deep), x1, max(part, deep)))
-        return found
+            middle = front + away * int((depth + bay) * first / (first + second) + 0.5)
+            boxes.append(Box(slot[0], x0, min(front, middle), x1, max(front, middle)))
+            boxes.append(Box(slot[1], x0, min(middle, back), x1, max(middle, back)))
+        return boxes

@@ -1,4 +1,4 @@
-"""The `synthetic` floor plan: a seed and what the home should be like."""
+"""The `synthetic` floor plan: a home drawn by a seed, and its settings."""
 
 from typing import Literal, Self
 
@@ -75,7 +75,7 @@ class Synthetic(FloorPlanSource):
         """Generate the home.
 
         Raises:
-            FloorPlanError: The numbers contradict each other.
+            FloorPlanError: The settings contradict each other.
         """
         wishes = Wishes(self.area_m2, self.bedrooms, self.bathrooms, self.garage)
         style = Style(

@@ -35,13 +35,13 @@ class Wing:
     suite: bool
     closet: int | None = None
 
-    def placed(self, areas: Mapping[int, float]) -> "Placed | None":
-        """Return the wing's rooms, or None where they do not fit together.
+    def place(self, areas: Mapping[int, float]) -> "PlacedWing | None":
+        """Place the wing's rooms; None where they do not fit together.
 
         Args:
             areas: Gross areas of the rooms [units²].
         """
-        back = self._suited()
+        back = self._suite_strip()
         length = int(fsum(back.widths(areas, self.back_depth)) + 0.5)
         depth = self.front.depth(areas, length)
         if not MIN_DEPTH <= depth <= MAX_DEPTH:
@@ -50,22 +50,22 @@ class Wing:
         upper = back.boxes(areas, length, self.back_depth, self.width, 1)
         end = length
         if self.suite:
-            last = upper[-1]  # goes down over the corridor instead of up
-            upper[-1] = Box(last.room, last.x0, 0, last.x1, last.y1 - self.width)
-            end = last.x0
+            suite = upper[-1]  # extends down over the corridor instead of up
+            upper[-1] = Box(suite.room, suite.x0, 0, suite.x1, suite.y1 - self.width)
+            end = suite.x0
             if boxes[-1].x0 > end - REACH:
-                return replace(self, suite=False).placed(areas)
+                return replace(self, suite=False).place(areas)
         if self.closet is not None:
-            deep = int(areas[self.closet] / self.width + 0.5)
-            end -= min(max(deep, 24), 52)
+            depth_of_closet = int(areas[self.closet] / self.width + 0.5)
+            end -= min(max(depth_of_closet, 24), 52)
             boxes.append(Box(self.closet, end, 0, length, self.width))
         if self.corridor is not None:
             if end < 24:
                 return None
             boxes.append(Box(self.corridor, 0, 0, end, self.width))
-        return Placed([*boxes, *upper], length, -depth, self.width + self.back_depth)
+        return PlacedWing([*boxes, *upper], length, -depth, self.width + self.back_depth)
 
-    def _suited(self) -> Strip:
+    def _suite_strip(self) -> Strip:
         """Return the back strip, its last slot as much deeper as the corridor is wide."""
         if not self.suite:
             return self.back
@@ -74,7 +74,7 @@ class Wing:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedWing:
     """A wing's rooms in its own frame.
 
     Attributes:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import HOURS
-from fleet2d.floorplan.kept import read_only
+from fleet2d.floorplan.cache import read_only
 from fleet2d.kernels.mesh import SUB
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def walking_distances(home: "Home") -> F64:
         float64 (rooms, rooms), symmetric, read-only.
     """
     space = home.space(RADIUS)
-    return home.kept(("walking distances", space), lambda: read_only(_distances(home, space)))
+    return home.cached(("walking distances", space), lambda: read_only(_distances(home, space)))
 
 
 def _distances(home: "Home", space: "Space") -> F64:

@@ -1,4 +1,4 @@
-"""Homes that runs of one process share: made once, by content, and changed by nobody."""
+"""Homes that the runs of a process share: made once for each content, and read-only."""
 
 import json
 from pathlib import Path
@@ -9,45 +9,45 @@ import pytest
 
 import fleet2d
 from fleet2d.floorplan import source
+from fleet2d.floorplan.cache import Cache
 from fleet2d.floorplan.formats.bundled import HOMES
 from fleet2d.floorplan.home import home as homes
-from fleet2d.floorplan.kept import Kept
 from fleet2d.metrics.presence.occupancy import walking_distances
 
 SHORT = "simulation.duration=6 h"
 
 
 @pytest.fixture(autouse=True)
-def nothing_kept() -> None:
+def empty_caches() -> None:
     source._PLANS.clear()
     homes._SHAPES.clear()
 
 
-def test_value_asked_for_longest_ago_is_dropped() -> None:
-    kept, made = Kept(most=2), list[str]()
+def test_value_used_least_recently_is_dropped() -> None:
+    cache, calls = Cache(size=2), list[str]()
     for key in "abacb":
-        kept.get(key, lambda key=key: made.append(key))
+        cache.get(key, lambda key=key: calls.append(key))
 
-    assert list("abcb") == made
-    assert len(kept) == 2
+    assert list("abcb") == calls
+    assert len(cache) == 2
 
 
-def test_what_fails_is_not_kept() -> None:
-    kept = Kept(most=2)
+def test_value_that_could_not_be_made_is_not_stored() -> None:
+    cache = Cache(size=2)
     with pytest.raises(ZeroDivisionError):
-        kept.get("a", lambda: 1 // 0)
+        cache.get("a", lambda: 1 // 0)
 
-    assert kept.get("a", lambda: 5) == 5
+    assert cache.get("a", lambda: 5) == 5
 
 
-def test_it_keeps_more_when_told_to_and_never_fewer() -> None:
-    kept, made = Kept(most=1), list[str]()
-    kept.keep(2)
-    kept.keep(1)
+def test_cache_grows_and_never_shrinks() -> None:
+    cache, calls = Cache(size=1), list[str]()
+    cache.grow(2)
+    cache.grow(1)
     for key in "abab":
-        kept.get(key, lambda key=key: made.append(key))
+        cache.get(key, lambda key=key: calls.append(key))
 
-    assert list("ab") == made
+    assert list("ab") == calls
 
 
 def test_second_run_shares_plan_spaces_and_ratings() -> None:
@@ -105,7 +105,7 @@ def test_run_is_the_same_whatever_ran_before_in_its_home() -> None:
     assert alone == fleet2d.run(None, SHORT, seed=4).digest
 
 
-def test_floor_plans_of_one_content_keep_their_own_source() -> None:
+def test_equal_floor_plans_have_spaces_of_their_own() -> None:
     plans = [fleet2d.load_floorplan() for _ in range(2)]
     first, second = (fleet2d.Home(plan) for plan in plans)
 
