@@ -69,18 +69,18 @@ inline Pose camera_pose(const Lenses& lenses, i64 camera, Pose robot, i64 moment
     return pose;
 }
 
-// How many points of a user's body are in view of the camera at `eye`, the user's centre being at (dx, dy)
-// from it. `triangle` holds the eye.
-inline i64 points_in_view(const Mesh& walls, const Lenses& lenses, i64 camera, i64 user, Pose eye, i64 triangle, i64 dx,
+// Which points of a user's body are in view of the camera at `eye`, bit i for number i, the user's centre being at
+// (dx, dy) from it. `triangle` holds the eye.
+inline u64 points_in_view(const Mesh& walls, const Lenses& lenses, i64 camera, i64 user, Pose eye, i64 triangle, i64 dx,
                           i64 dy) {
     const i64 near = lenses.near_squared[camera], far = lenses.far_squared[camera];
     const i64 half_angle = lenses.half_angle[camera];
-    i64 shown = 0;
+    u64 shown = 0;
     for (i64 i = 0; i <= lenses.points[camera]; ++i) {
         const i64 px = dx + lenses.bodies(camera, user, i, 0), py = dy + lenses.bodies(camera, user, i, 1);
         const i64 squared = px * px + py * py;
         if (near <= squared && squared <= far && in_wedge(eye.heading, half_angle, px, py)) {
-            shown += line_of_sight(walls, eye.x, eye.y, triangle, eye.x + px, eye.y + py);
+            shown |= u64{line_of_sight(walls, eye.x, eye.y, triangle, eye.x + px, eye.y + py)} << i;
         }
     }
     return shown;

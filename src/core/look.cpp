@@ -1,7 +1,10 @@
 #include "look.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
+
+#include "occlusion.hpp"
 
 namespace fleet2d {
 namespace {
@@ -37,8 +40,15 @@ void write(View<i64> row, const Sighting& sighting) { std::memcpy(row.data, &sig
 class Lookout {
 public:
     Lookout(const Mesh& walls, const Lenses& lenses, const Rule& rule, const Window& window, Onlooker onlooker,
-            View<const u8, 3> shown)
-        : walls_(walls), lenses_(lenses), rule_(rule), window_(window), onlooker_(onlooker), shown_(shown) {}
+            View<const u64, 3> shown, View<const i64> radii)
+        : walls_(walls),
+          lenses_(lenses),
+          rule_(rule),
+          window_(window),
+          onlooker_(onlooker),
+          shown_(shown),
+          hides_(radii.size() > 0),
+          obstacles_(window, radii) {}
 
     // All intervals, in order of their first steps.
     std::vector<Interval> intervals() {
@@ -91,8 +101,7 @@ private:
             if (shown_.size() > 0) {
                 split_by_method(interval);
             } else {
-                interval.shown = points_shown(camera, user, eye, dx, dy);
-                if (interval.shown > 0) found_.push_back(interval);
+                add(interval, points_shown(camera, user, eye, dx, dy));
             }
             step = next_multiple(until, period);
         }
@@ -100,23 +109,40 @@ private:
 
     // Take over what another method says of each step.
     void split_by_method(Interval interval) {
+        const View<const u64> shown = shown_[interval.camera][interval.user];
         const i64 end = interval.end;
-        for (i64 step = interval.begin; step < end; ++step) {
-            const i64 shown = shown_(interval.camera, interval.user, step - window_.first);
-            const bool goes_on = step > interval.begin && shown == interval.shown;
-            if (!goes_on) {
-                interval.end = step;
-                if (step > interval.begin && interval.shown > 0) found_.push_back(interval);
-                interval.begin = step;
-                interval.shown = shown;
-            }
+        for (i64 step = interval.begin; step < end;) {
+            const u64 points = shown[step - window_.first];
+            interval.begin = step;
+            while (step < end && shown[step - window_.first] == points) ++step;
+            interval.end = step;
+            add(interval, points);
         }
-        interval.end = end;
-        if (interval.shown > 0) found_.push_back(interval);
     }
 
-    // How many points of a user's body are in view.
-    i64 points_shown(i64 camera, i64 user, const Pose& eye, i64 dx, i64 dy) {
+    // Add an interval in which some points are in view, as far as no body hides them.
+    void add(Interval interval, u64 points) {
+        if (points == 0) return;
+        if (!hides_) {
+            interval.shown = std::popcount(points);
+            found_.push_back(interval);
+            return;
+        }
+        const i64 count = lenses_.points[interval.camera] + 1, other = onlooker_.first_other + interval.user;
+        View<const i64, 2> outline = lenses_.bodies[interval.camera][interval.user];
+        outline.shape[0] = count;
+        for (const Glimpse& glimpse : obstacles_.split({interval.begin, interval.end, points}, onlooker_.body, other,
+                                                       interval.eye, interval.dx, interval.dy, outline)) {
+            if (glimpse.points == 0) continue;
+            interval.begin = glimpse.begin;
+            interval.end = glimpse.end;
+            interval.shown = std::popcount(glimpse.points);
+            found_.push_back(interval);
+        }
+    }
+
+    // Which points of a user's body are in view, bodies between apart.
+    u64 points_shown(i64 camera, i64 user, const Pose& eye, i64 dx, i64 dy) {
         if (dx * dx + dy * dy > lenses_.widest(camera, user)) return 0;
         const i64 half_angle = lenses_.half_angle[camera];
         if (!near_wedge(eye.heading, half_angle, dx, dy, lenses_.reach(camera, user))) return 0;
@@ -132,7 +158,9 @@ private:
     const Rule& rule_;
     const Window& window_;
     const Onlooker onlooker_;
-    const View<const u8, 3> shown_;
+    const View<const u64, 3> shown_;
+    const bool hides_;  // whether bodies hide each other
+    Obstacles obstacles_;
     std::vector<Interval> found_;
     Pose located_{};          // the camera that was located last
     i64 triangle_ = OUTSIDE;  // that holds it
@@ -406,8 +434,9 @@ private:
 }  // namespace
 
 LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule,
-                const Window& window, Onlooker onlooker, const Memory& memory, View<const u8, 3> shown) {
-    auto intervals = Lookout(walls, lenses, rule, window, onlooker, shown).intervals();
+                const Window& window, Onlooker onlooker, const Memory& memory, View<const u64, 3> shown,
+                View<const i64> radii) {
+    auto intervals = Lookout(walls, lenses, rule, window, onlooker, shown, radii).intervals();
     return Watch(walls, lenses, errors, rule, window, onlooker, memory, std::move(intervals)).look();
 }
 

@@ -74,8 +74,10 @@ struct LookResult {
 // changes, one verdict does for all. Only the steps in them, and those at which something may become known
 // or be lost, are visited then, in order, each with its own draws.
 //
-// `shown` holds (cameras, users, steps) the points in view, where another method decides that; else it is empty.
+// `shown` holds (cameras, users, steps) the points in view, bit i for number i, where another method decides that;
+// else it is empty. `radii` are those of all bodies of the window, where they hide each other; else it is empty.
 LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule,
-                const Window& window, Onlooker onlooker, const Memory& memory, View<const u8, 3> shown);
+                const Window& window, Onlooker onlooker, const Memory& memory, View<const u64, 3> shown,
+                View<const i64> radii);
 
 }  // namespace fleet2d

@@ -205,9 +205,17 @@ def camera_pose(lenses: tuple[Any, ...], camera: int, x: int, y: int, heading: i
     Return where a camera is and where it looks; the offset is rounded to the lattice.
     """
 
+def hides(px: int, py: int, bx: int, by: int, radius: int) -> bool:
+    """
+    Return whether a body hides a point, both from the eye [lattice units].
+
+    The point of the sight line that is nearest to the body's centre lies between the ends, neither
+    included, and not farther from it than its radius.
+    """
+
 def points_in_view(walls: Mesh, lenses: tuple[Any, ...], camera: int, user: int, x: int, y: int, heading: int, dx: int, dy: int) -> int:
     """
-    Return how many points of a user's body are in view of a camera, the user's centre being at (dx, dy).
+    Return which points of a user's body are in view of a camera, bit i for number i; its centre is at (dx, dy).
     """
 
 @overload
@@ -928,7 +936,7 @@ USER_LOST: int = 0
 
 USER_SEEN: int = 1
 
-def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint8] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     Look at all others in the steps of a window, up to the first with an event that stops it.
 
@@ -941,8 +949,9 @@ def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tu
         body: Number of the body that has the cameras.
         first_other: Number of the first of the others, who are as many as the lenses' users.
         memory: What the body carries from span to span; updated.
-        shown: uint8 (cameras, users, steps), how many points of each are in view, where another method
-            decides that; None: lines of sight do.
+        shown: uint64 (cameras, users, steps), which points of each are in view, bit i for number i,
+            where another method decides that; None: lines of sight do.
+        radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
 
     Returns:
         The steps done (the stopping one included); what was perceived, int64 (n, SIGHTING), see

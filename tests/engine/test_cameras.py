@@ -9,8 +9,9 @@ from tests.scenes import OWN, everything, scenario
 
 import fleet2d
 from fleet2d.engine import phases
-from fleet2d.engine.cameras import Cameras, new_memory
+from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.phases import PHASES, Span
+from fleet2d.kernels.look import new_memory
 
 
 def test_a_robot_that_has_seen_nobody_remembers_nothing() -> None:

@@ -167,10 +167,10 @@ def test_own_method_that_fails_is_blamed(method: str, why: str) -> None:
 
 def seen_one_by_one(
     method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: Crowd, first: int
-) -> NDArray[np.uint8]:
+) -> NDArray[np.uint64]:
     """Return what `points_seen` does, asking about every body in every step."""
     cameras, bodies = lenses.widest.shape
-    seen = np.zeros((cameras, bodies, len(robot.x)), np.uint8)
+    seen = np.zeros((cameras, bodies, len(robot.x)), np.uint64)
     for c in range(cameras):
         reach = Reach(
             *(int(v[c]) for v in (lenses.near_squared, lenses.far_squared, lenses.half_angle))
@@ -184,7 +184,8 @@ def seen_one_by_one(
                 if not crowd.away[u, j]:
                     points = lenses.bodies[c, u, : int(lenses.points[c]) + 1]
                     points = points + np.array([crowd.x[u, j], crowd.y[u, j]])
-                    seen[c, u, j] = method.sees(home, *eye, reach, points).sum()
+                    in_view = method.sees(home, *eye, reach, points).tolist()
+                    seen[c, u, j] = sum(2**i for i, sees in enumerate(in_view) if sees)
     return seen
 
 

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
+from tests.reference import look as slow
 from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
 from tests.strategies import quick
 
-from fleet2d.kernels.lens import Lenses, camera_pose, in_wedge, near_wedge, points_in_view
+from fleet2d.kernels.lens import Lenses, camera_pose, hides, in_wedge, near_wedge, points_in_view
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.tables import stack_lenses
 
@@ -70,7 +71,7 @@ def test_no_body_that_reaches_into_a_wedge_is_left_out(
 def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
     found = lenses(range=[0, 5], body_points=8)
     shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
-    assert 9 == shown
+    assert 0b111111111 == shown
     behind = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, -2 * UNITS_PER_M, 0)
     assert 0 == behind
 
@@ -80,12 +81,65 @@ def test_points_beyond_the_range_are_not_in_view(far: float, expected: int) -> N
     """A body of 20 cm at 2 m: its nearest point, then half of it, then all."""
     found = lenses(range=[0, far], body_points=8)
     shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
-    assert expected == pytest.approx(shown, abs=2)
-    assert (far > 2.2) == (shown == 9)
+    assert expected == pytest.approx(shown.bit_count(), abs=2)
+    assert (far > 2.2) == (shown == 0b111111111)
 
 
 def test_a_pillar_hides_a_body_behind_it() -> None:
     walls, found = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
     x, y = (round(v * UNITS_PER_M) for v in (3.5, 1.2))
     assert 0 == points_in_view(walls, found, 0, 0, MIDDLE, MIDDLE, 0, x, y)
-    assert 9 == points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, x, y)
+    assert 9 == points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, x, y).bit_count()
+
+
+@pytest.mark.parametrize(
+    ("centre", "expected"),
+    [
+        ((50, 0), True),
+        ((50, 10), True),
+        ((50, -10), True),
+        ((50, 11), False),
+        ((1, 10), True),
+        ((0, 10), False),
+        ((0, 0), False),
+        ((-1, 0), False),
+        ((99, 10), True),
+        ((100, 0), False),
+        ((101, 0), False),
+    ],
+)
+def test_a_body_hides_a_point_whose_line_of_sight_it_touches(
+    centre: tuple[int, int], expected: bool
+) -> None:
+    """Of radius 10, before a point at (100, 0): one beside the eye or the point hides nothing."""
+    assert expected == hides(100, 0, *centre, 10)
+    assert expected == slow.hides((100, 0), centre, 10)
+
+
+def test_a_body_at_the_very_place_of_the_eye_is_hidden_by_nobody() -> None:
+    assert not hides(0, 0, 3, 0, 10)
+
+
+FAR = st.one_of(st.integers(-60, 60), st.integers(-(2**26), 2**26))
+
+
+@quick
+@given(FAR, FAR, FAR, FAR, st.one_of(st.integers(1, 60), st.integers(1, 2**17 - 1)))
+def test_what_a_body_hides_is_that_of_fractions(
+    px: int, py: int, bx: int, by: int, radius: int
+) -> None:
+    assert slow.hides((px, py), (bx, by), radius) == hides(px, py, bx, by, radius)
+
+
+@quick
+@given(FAR, FAR, st.integers(1, 63), st.integers(1, 2**17 - 1), st.integers(-2, 2))
+def test_what_a_body_hides_is_exact_at_its_rim(
+    px: int, py: int, part: int, radius: int, beside: int
+) -> None:
+    """Centres a radius away from the line, as nearly as the lattice has them."""
+    length = math.hypot(px, py) or 1
+    bx = round(px * part / 64 - py * radius / length) + beside
+    by = round(py * part / 64 + px * radius / length)
+    assume(max(abs(bx), abs(by)) <= 2**26)
+
+    assert slow.hides((px, py), (bx, by), radius) == hides(px, py, bx, by, radius)

@@ -16,10 +16,9 @@ from tests.reference import look as slow
 from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.engine.cameras import new_memory
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.lens import Lenses, in_wedge
-from fleet2d.kernels.look import USER_LOST, USER_SEEN, Memory, Rule, look
+from fleet2d.kernels.look import USER_LOST, USER_SEEN, Memory, Rule, look, new_memory
 from fleet2d.kernels.perception import MOST_GHOSTS, About, ErrorTables, UserDraw
 from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera import Camera, Lens
@@ -52,7 +51,9 @@ class Scene:
             users and robot, whom no camera of this robot looks for.
         is_first: Whether the robot comes before the users in the window.
         perceptions: How each camera errs; None for one that doesn't. Empty for none of them.
-        shown: uint8 (cameras, users, steps), what another method says; None: lines of sight do.
+        shown: uint64 (cameras, users, steps), what another method says; None: lines of sight do.
+        thickness: Of the bodies, which hide each other, the first one's radius, that of each more is
+            7 units larger [lattice units]; 0: nobody hides anybody.
     """
 
     robot: Int64
@@ -61,7 +62,8 @@ class Scene:
     strangers: int = 0
     is_first: bool = True
     perceptions: Sequence[Perception | None] = ()
-    shown: npt.NDArray[np.uint8] | None = None
+    shown: npt.NDArray[np.uint64] | None = None
+    thickness: int = 0
 
     def part(self, begin: int, end: int) -> "Scene":
         """Return some steps of it."""
@@ -77,14 +79,37 @@ class Scene:
         stranger = np.repeat(robot, self.strangers, axis=0)  # at the robot: in view if anybody is
         stranger[..., 2] = 0
         parts = [robot, stranger, self.users] if self.is_first else [self.users, stranger, robot]
-        x, y, away, heading, posture = np.concatenate([stranger, *parts, stranger]).transpose(
-            2, 0, 1
-        )
+        bodies = np.concatenate([stranger, *parts, stranger])
+        x, y, away, heading, posture = bodies.transpose(2, 0, 1)
         window = Window(first, x, y, heading, away.astype(np.uint8), posture.astype(np.int8))
         one, other = self.strangers, len(self.users)
         if self.is_first:
             return window, one, 2 * one + 1
         return window, 2 * one + other, one
+
+    def radii(self) -> Int64 | None:
+        """Return the radii of all bodies of the window, None if they don't hide each other."""
+        count = len(self.users) + 1 + 3 * self.strangers
+        return self.thickness + 7 * np.arange(count) if self.thickness else None
+
+    def obstacles(self) -> dict[int, slow.Obstacle] | None:
+        """Return what hides users, as the twin wants it."""
+        radii = self.radii()
+        if radii is None:
+            return None
+        _, robot, first_user = self.window(0)
+        here = [slow.Body(x, y, False) for x, y, *_ in self.robot.tolist()]
+        found = {}
+        for number, radius in enumerate(radii.tolist()):
+            user = number - first_user
+            if 0 <= user < len(self.users):
+                poses = [
+                    slow.Body(x, y, bool(away)) for x, y, away, *_ in self.users[user].tolist()
+                ]
+                found[user] = slow.Obstacle(poses, radius)
+            elif number != robot:
+                found[-1 - number] = slow.Obstacle(here, radius)
+        return found
 
 
 @dataclass
@@ -184,7 +209,7 @@ def looked(
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
     before = memory.about.copy()
     done, sightings, *events = look(
-        home.mesh, lenses, errors, rule, *scene.window(first), memory, scene.shown
+        home.mesh, lenses, errors, rule, *scene.window(first), memory, scene.shown, scene.radii()
     )
     counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]]
     return Seen(
@@ -224,6 +249,7 @@ def looked_slowly(
         stops,
         carried.errors,
         None if shown is None else lambda c, u, j: int(shown[c, u, j]),
+        scene.obstacles(),
     )
     known = carried.known
     return Seen(*found, [k.noticed for k in known], [int(k.seen) for k in known])
@@ -381,6 +407,7 @@ def test_look_of_several_cameras_is_that_of_the_twin(
 
 MOVES = st.sampled_from([0.05, 0.2, 0.5])
 LONG = 3 * STEPS
+THICKNESSES = st.sampled_from([0, 1, 30, 100])
 
 
 @quick
@@ -398,6 +425,46 @@ def test_look_at_bodies_that_mostly_rest_is_that_of_the_twin(
 
     assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
         home, cameras, scene, FIRST, stops
+    )
+
+
+@quick
+@given(
+    homes(),
+    st.lists(odd_eyes(), min_size=1, max_size=3),
+    seeds(),
+    st.sampled_from([0.05, 0.2, 1.0]),
+    stoppings,
+    st.sampled_from([1, 30, 100]),
+)
+def test_look_past_bodies_that_hide_each_other_is_that_of_the_twin(
+    polygons: list[Polygon],
+    cameras: list[slow.Eye],
+    seed: int,
+    moves: float,
+    stops: tuple[bool, bool],
+    thickness: int,
+) -> None:
+    home = home_of(polygons)
+    scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
+    scene = replace(scene, thickness=thickness)
+
+    assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
+        home, cameras, scene, FIRST, stops
+    )
+
+
+@pytest.mark.parametrize("moves", [0.1, 1.0])
+def test_look_past_bodies_in_one_room_is_that_of_the_twin(moves: float) -> None:
+    """Where bodies hide each other often, and parts of each other."""
+    eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
+    scene = scene_in(ROOM, np.random.default_rng(8), 6, 120, moves)
+    scene = replace(scene, thickness=60)
+    expected = looked_slowly(ROOM, eyes_, scene, FIRST)
+
+    assert expected == looked(ROOM, eyes_, scene, FIRST)
+    assert (
+        100 < len(expected.sightings) < len(looked(ROOM, eyes_, replace(scene, thickness=0), 0)[1])
     )
 
 
@@ -421,23 +488,26 @@ def test_look_of_cameras_that_err_is_that_of_the_twin(
 
 
 @quick
-@given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings)
+@given(
+    st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings, THICKNESSES
+)
 def test_look_by_another_method_is_that_of_the_twin(
     data: st.DataObject,
     cameras: list[slow.Eye],
     seed: int,
     moves: float,
     stops: tuple[bool, bool],
+    thickness: int,
 ) -> None:
     rng = np.random.default_rng(seed)
     home, errs = home_of(data.draw(homes())), data.draw(errors_of(cameras, 2))
     scene = scene_in(home, rng, 2, LONG, moves)
-    shown = np.zeros((len(cameras), 2, LONG), np.uint8)
+    shown = np.zeros((len(cameras), 2, LONG), np.uint64)
     for c, eye in enumerate(cameras):
-        points = rng.integers(0, eye.points + 2, (2, LONG))
+        points = rng.integers(0, 2 ** (eye.points + 1), (2, LONG), np.uint64)
         for u in range(2):
-            shown[c, u] = rested(rng, points[u] * (rng.random(LONG) < 0.7), moves)
-    scene = replace(scene, shown=shown, perceptions=errs)
+            shown[c, u] = rested(rng, np.where(rng.random(LONG) < 0.7, points[u], 0), moves)
+    scene = replace(scene, shown=shown, perceptions=errs, thickness=thickness)
 
     assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
         home, cameras, scene, FIRST, stops
@@ -451,7 +521,8 @@ def test_look_of_several_cameras_at_two_spans_is_that_at_one(
 ) -> None:
     home, rng = home_of(data.draw(homes())), np.random.default_rng(seed)
     scene = scene_in(home, rng, 3, LONG, data.draw(st.sampled_from([1.0, 0.2])))
-    scene = replace(scene, perceptions=data.draw(errors_of(cameras, 3)))
+    errs, thickness = data.draw(errors_of(cameras, 3)), data.draw(THICKNESSES)
+    scene = replace(scene, perceptions=errs, thickness=thickness)
     whole = looked(home, cameras, scene, 50)
 
     carried = nothing_known(cameras, scene)

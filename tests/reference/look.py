@@ -1,7 +1,7 @@
 """A slow, obvious twin of the look kernel: cosines to sixty digits, and a look at every wall."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -17,9 +17,10 @@ from tests.reference.sight import visible
 from fleet2d.kernels import perception
 
 Int64 = npt.NDArray[np.int64]
+Point = tuple[int, int]
 LOST, SEEN = 0, 1
 Method = Callable[[int, int, int], int]
-"""Camera, user and step, from the first one on, to points in view."""
+"""Camera, user and step, from the first one on, to points in view, bit i for number i."""
 
 
 class Eye(NamedTuple):
@@ -56,6 +57,13 @@ class Body(NamedTuple):
     away: bool
     heading: int = 0
     posture: int = 0
+
+
+class Obstacle(NamedTuple):
+    """A body that hides others: where it is in each step, and its radius."""
+
+    poses: list[Body]
+    radius: int
 
 
 class Ghost(NamedTuple):
@@ -260,6 +268,7 @@ def look(
     stops: tuple[bool, bool],
     errors: Sequence[Errors | None] = (),
     method: Method | None = None,
+    obstacles: Mapping[int, Obstacle] | None = None,
 ) -> Look:
     """Look at all users in each step, and tell what becomes known.
 
@@ -275,7 +284,8 @@ def look(
         known: What is carried along for each identity; updated.
         stops: Whether it ends when somebody is lost, and when somebody is seen.
         errors: How each camera errs; None for one that doesn't.
-        method: How many points of a user a camera has in view at a step, instead of lines of sight.
+        method: Which points of a user a camera has in view at a step, instead of lines of sight.
+        obstacles: The users by number, and others by negative ones, that hide each other.
     """
     sightings: list[tuple[int, ...]] = []
     events: list[tuple[int, int, int]] = []
@@ -292,10 +302,12 @@ def look(
             for u, user in enumerate(users):
                 if user[j].away:
                     continue
+                points = body_points(eye, radii[u])
+                in_view = {i for i in range(len(points)) if method and method(c, u, j) >> i & 1}
                 if method is None:
-                    shown = _points_in_view(walls, eye, at, towards, user[j], radii[u])
-                else:
-                    shown = method(c, u, j)
+                    in_view = _points_in_view(walls, eye, at, towards, user[j], points)
+                between = [body for number, body in (obstacles or {}).items() if number != u]
+                shown = _count_shown(at, user[j], [points[i] for i in in_view], between, j)
                 if shown == 0:
                     continue
                 counts[c][u][0] += 1
@@ -340,15 +352,41 @@ def _in_range(eye: Eye, dx: int, dy: int) -> bool:
     return eye.near**2 <= dx * dx + dy * dy <= eye.far**2
 
 
-def _points_in_view(walls: Int64, eye: Eye, at: Body, heading: int, user: Body, radius: int) -> int:
-    """Return how many points of a body are in range, in the wedge, and behind no wall."""
-    count = 0
-    for px, py in body_points(eye, radius):
+def hides(point: Point, centre: Point, radius: int) -> bool:
+    """Return whether the line from (0, 0) to a point passes a centre within a radius, between its ends."""
+    (px, py), (bx, by) = point, centre
+    if (px, py) == (0, 0):
+        return False
+    part = Fraction(px * bx + py * by, px * px + py * py)
+    away = (bx - part * px) ** 2 + (by - part * py) ** 2
+    return 0 < part < 1 and away <= radius**2
+
+
+def _count_shown(
+    at: Body, user: Body, points: Sequence[Point], between: Sequence[Obstacle], j: int
+) -> int:
+    """Return how many points of a user no body that is at home hides from a camera."""
+    bodies = [(body.poses[j], body.radius) for body in between if not body.poses[j].away]
+    return sum(
+        not any(
+            hides((user.x + x - at.x, user.y + y - at.y), (body.x - at.x, body.y - at.y), radius)
+            for body, radius in bodies
+        )
+        for x, y in points
+    )
+
+
+def _points_in_view(
+    walls: Int64, eye: Eye, at: Body, heading: int, user: Body, points: Sequence[Point]
+) -> set[int]:
+    """Return which points of a body are in range, in the wedge, and behind no wall."""
+    in_view = set()
+    for number, (px, py) in enumerate(points):
         dx, dy = user.x + px - at.x, user.y + py - at.y
         if (
             _in_range(eye, dx, dy)
             and in_wedge(heading, eye.half_angle, dx, dy)
             and visible(walls, np.array([at.x, at.y]), np.array([[at.x + dx, at.y + dy]]))[0]
         ):
-            count += 1
-    return count
+            in_view.add(number)
+    return in_view

@@ -10,9 +10,8 @@ import numpy.typing as npt
 import shapely
 from tests.homes import home_of
 
-from fleet2d.engine.cameras import new_memory
 from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.kernels.look import Memory, Rule, look
+from fleet2d.kernels.look import Memory, Rule, look, new_memory
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.perception import MOST_GHOSTS
 from fleet2d.kernels.timelines import Window

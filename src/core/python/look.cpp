@@ -1,5 +1,7 @@
 #include "../look.hpp"
 
+#include "../occlusion.hpp"
+
 #include <nanobind/stl/optional.h>
 
 #include <algorithm>
@@ -48,6 +50,20 @@ void check_moments(const Rule& rule, const Window& window, const Lenses& lenses)
     require(window.end < LATEST / rule.step_us, "steps must begin before 2**61 us");
     require(0 <= rule.start_us && rule.start_us < LATEST, "start_us must be in 0 to 2**61 - 1");
     require(all_in_range(lenses.pan_us, 0, LATEST), "pan_us must be in 0 to 2**61 - 1");
+}
+
+// No point may be in view that a body doesn't have.
+void check_shown(View<const u64, 3> shown, const Lenses& lenses, const Window& window) {
+    require(shown.shape == std::array{lenses.reach.shape[0], lenses.reach.shape[1], window.end - window.first},
+            "shown must be (cameras, users, steps)");
+    for (i64 camera = 0; camera < shown.size(); ++camera) {
+        const u64 points = (u64{1} << (lenses.points[camera] + 1)) - 1;
+        for (i64 user = 0; user < shown.shape[1]; ++user) {
+            for (const u64 bits : shown[camera][user]) {
+                require((bits & ~points) == 0, "shown must be of points that there are");
+            }
+        }
+    }
 }
 
 Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
@@ -112,7 +128,8 @@ is. X to POSTURE are as perceived.)")
     m.def(
         "look",
         [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
-           i64 body, i64 first_other, const Memory& memory, std::optional<View<const u8, 3>> shown) {
+           i64 body, i64 first_other, const Memory& memory, std::optional<View<const u64, 3>> shown,
+           std::optional<View<const i64>> radii) {
             check_lenses(lenses);
             const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
             require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
@@ -121,16 +138,17 @@ is. X to POSTURE are as perceived.)")
             check_window(window, {body, first_other}, users);
             check_moments(rule, window, lenses);
             check_memory(memory, lenses, errors, cameras, users);
-            const View<const u8, 3> given = shown.value_or(View<const u8, 3>());
-            if (shown) {
-                require(given.shape == std::array{cameras, users, window.end - window.first},
-                        "shown must be (cameras, users, steps)");
-                require(all_in_range(given, 0, MOST_SHOWN), "shown must be below MOST_SHOWN");
+            const View<const u64, 3> points = shown.value_or(View<const u64, 3>());
+            const View<const i64> widths = radii.value_or(View<const i64>());
+            if (shown) check_shown(points, lenses, window);
+            if (radii) {
+                require(widths.size() == window.bodies(), "radii must have one for each body");
+                require(all_in_range(widths, 1, FATTEST), "radii must be in 1 to 2**17 - 1");
             }
             LookResult result;
             {
                 const nb::gil_scoped_release unlocked;
-                result = look(walls, lenses, errors, rule, window, {body, first_other}, memory, given);
+                result = look(walls, lenses, errors, rule, window, {body, first_other}, memory, points, widths);
             }
             const i64 count = static_cast<i64>(result.events.size());
             auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});
@@ -143,7 +161,7 @@ is. X to POSTURE are as perceived.)")
                               std::move(kind));
         },
         "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
-        "shown"_a = nb::none(),
+        "shown"_a = nb::none(), "radii"_a = nb::none(),
         R"(Look at all others in the steps of a window, up to the first with an event that stops it.
 
 Args:
@@ -155,8 +173,9 @@ Args:
     body: Number of the body that has the cameras.
     first_other: Number of the first of the others, who are as many as the lenses' users.
     memory: What the body carries from span to span; updated.
-    shown: uint8 (cameras, users, steps), how many points of each are in view, where another method
-        decides that; None: lines of sight do.
+    shown: uint64 (cameras, users, steps), which points of each are in view, bit i for number i,
+        where another method decides that; None: lines of sight do.
+    radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
 
 Returns:
     The steps done (the stopping one included); what was perceived, int64 (n, SIGHTING), see

@@ -38,12 +38,14 @@ from fleet2d.kernels.look import (
     X,
     Y,
     look,
+    new_memory,
 )
 from fleet2d.kernels.perception import MOST_GHOSTS, About, GhostDraw, UserDraw
 from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
+from fleet2d.sight.settings import SightSettings
 from fleet2d.sight.tables import Scene, error_tables, is_perfect, stack_lenses
 from fleet2d.streams import stream_key
 
@@ -82,6 +84,7 @@ class Cameras:
         errs: Whether what is perceived can differ from the truth.
         activity_senses: How each camera tells activities.
         method: What tells who is in view; None: lines of sight.
+        radii: Of all bodies, which hide each other [lattice units]; None: they don't.
         memory: All that is carried along.
         drift: How wrong its owner is about where it is; None: it knows.
         perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
@@ -90,7 +93,12 @@ class Cameras:
     """
 
     def __init__(
-        self, row: int, actors: Sequence[Actor], users: int, method: FieldOfView | None = None
+        self,
+        row: int,
+        actors: Sequence[Actor],
+        users: int,
+        method: FieldOfView | None = None,
+        radii: I64 | None = None,
     ) -> None:
         """Switch on the cameras of one body.
 
@@ -99,6 +107,7 @@ class Cameras:
             actors: Everybody, users first.
             users: How many of them are users.
             method: What tells who is in view; None: lines of sight.
+            radii: Of all bodies, if they hide each other [lattice units].
 
         Raises:
             ScenarioError: A period is no multiple of the step, or somebody unknown is named.
@@ -106,6 +115,7 @@ class Cameras:
         self.owner, self.row = actors[row], row
         # Lines of sight are compiled into the look.
         self.method = None if isinstance(method, LineOfSight) else method
+        self.radii = radii
         is_robot = row >= users
         self.index = row - users if is_robot else row
         self._first = 0 if is_robot else users
@@ -326,13 +336,7 @@ class Cameras:
         if self.method is not None:
             block = bodies.block(self.taken, end)
             others = slice(self._first, self._first + len(self.others))
-            crowd = Crowd(
-                block.x[others],
-                block.y[others],
-                block.heading[others],
-                block.away[others],
-                block.posture[others],
-            )
+            crowd = Crowd._make(column[others] for column in block)
             poses = poses_of(block, self.row)
             step_us = self.owner.clock.step_us
             with blame("sight.method", self.taken):
@@ -349,6 +353,7 @@ class Cameras:
             self._first,
             self.memory,
             shown,
+            self.radii,
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
         return _Look(self.taken + done, sightings, events, before)
@@ -372,28 +377,20 @@ class _Look(NamedTuple):
 
 
 def open_cameras(
-    actors: Sequence[Actor], users: int, method: FieldOfView
+    actors: Sequence[Actor], users: int, sight: SightSettings
 ) -> tuple[list[Cameras], list[Cameras]]:
     """Return the cameras of users and those of robots, if there is anybody to be seen."""
     if not 0 < users < len(actors):
         return [], []
+    home, method, radii = actors[0].home, sight.method.model_copy(), None
     with blame("sight.method", None):
-        method.start(actors[0].home)
+        method.start(home)
+    if sight.people_occlude:
+        units = home.plan.lattice.units_per_m
+        radii = np.array([max(round(actor.entity.radius * units), 1) for actor in actors], np.int64)
     cameras = [
-        Cameras(row, actors, users, method) for row, actor in enumerate(actors) if actor.entity.eyes
+        Cameras(row, actors, users, method, radii)
+        for row, actor in enumerate(actors)
+        if actor.entity.eyes
     ]
     return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
-
-
-def new_memory(cameras: int, users: int, backlog: int) -> Memory:
-    """Return the memory of a robot that has seen nobody."""
-    never = -1
-    about = np.zeros((cameras, users, len(About)), np.int64)
-    about[..., [About.DRAW_STEP.value, About.TRACK_STEP.value]] = never
-    return Memory(
-        noticed=np.full(users + 1, never, np.int64),
-        seen=np.zeros(users + 1, np.int64),
-        about=about,
-        backlog=np.zeros((cameras, backlog, SIGHTING), np.int64),
-        waiting=np.zeros((cameras, 2), np.int64),
-    )

@@ -96,7 +96,7 @@ class InViewGauge(Gauge):
     def __init__(self, state: State, cameras: Cameras, body: str) -> None:
         super().__init__()
         actors, users = state.actors, state.bodies.users
-        self._cameras = PerfectCameras(cameras.row, actors, users, cameras.method)
+        self._cameras = PerfectCameras(cameras.row, actors, users, cameras.method, cameras.radii)
         self._cameras.taken = state.settled
         self._body, self._seen = body, False
 

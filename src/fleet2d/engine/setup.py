@@ -47,8 +47,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     for row, actor in enumerate(actors):
         bodies.hold(row, actor.state)
         actor.join(bodies, row)
-    method = scenario.sight.method.model_copy()
-    gazes, cameras = open_cameras(actors, len(users), method)
+    gazes, cameras = open_cameras(actors, len(users), scenario.sight)
     _check_reads(scenario, actors)
     for those in cameras:
         if any(makes_wrong(entry.act, those.owner.name) for entry in scenario.script):

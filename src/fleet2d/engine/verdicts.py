@@ -27,8 +27,8 @@ def points_seen(
     crowd: Crowd,
     first: int,
     step_us: int,
-) -> NDArray[np.uint8]:
-    """Return how many points of each body are in view of each camera at each step.
+) -> NDArray[np.uint64]:
+    """Return which points of each body are in view of each camera at each step.
 
     Args:
         method: What tells whether a point is in view.
@@ -40,7 +40,7 @@ def points_seen(
         step_us: Length of a step.
 
     Returns:
-        uint8 (cameras, bodies, n).
+        uint64 (cameras, bodies, n), bit i for point i.
 
     Raises:
         ComponentError: The method answers with something else than a bool for each point.
@@ -52,7 +52,7 @@ def points_seen(
     asked, number = questions(
         lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
     )
-    answers = np.zeros(len(asked) + 1, np.uint8)
+    answers = np.zeros(len(asked) + 1, np.uint64)
     moved = asked[1:, : EYE_HEADING + 1] != asked[:-1, : EYE_HEADING + 1]
     moved[:, BODY] = False
     begins = [0, *(np.flatnonzero(moved.any(axis=1)) + 1).tolist()] if len(asked) else []
@@ -63,8 +63,8 @@ def points_seen(
 
 def _answers(
     method: FieldOfView, home: Home, lenses: Lenses, asked: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Return how many points of each body are in view, for one pose of one camera."""
+) -> NDArray[np.uint64]:
+    """Return which points of each body are in view, for one pose of one camera."""
     camera, _, x, y, heading = asked[0, : EYE_HEADING + 1].tolist()
     reach = Reach(
         int(lenses.near_squared[camera]),
@@ -79,5 +79,6 @@ def _answers(
             f"{type(method).__name__} answered {found!r} for {len(points)} points: an array with a"
             " bool for each is wanted"
         )
-    seen: NDArray[np.int64] = found.reshape(len(asked), -1).sum(axis=1)
-    return seen
+    in_view = found.reshape(len(asked), -1)
+    bits: NDArray[np.uint64] = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
+    return in_view @ bits

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d._core import camera_pose, in_wedge, near_wedge, points_in_view
+from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
 
-__all__ = ["Lenses", "camera_pose", "in_wedge", "near_wedge", "points_in_view"]
+__all__ = ["Lenses", "camera_pose", "hides", "in_wedge", "near_wedge", "points_in_view"]
 
 I64 = NDArray[np.int64]
 

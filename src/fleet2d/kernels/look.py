@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d._core import USER_LOST, USER_SEEN, SightingColumn, look
+from fleet2d._core import USER_LOST, USER_SEEN, About, SightingColumn, look
 
 __all__ = [
     "CAMERA",
@@ -28,6 +28,7 @@ __all__ = [
     "X",
     "Y",
     "look",
+    "new_memory",
 ]
 
 I64 = NDArray[np.int64]
@@ -49,8 +50,6 @@ TRUE_HEADING = SightingColumn.TRUE_HEADING
 TRUE_POSTURE = SightingColumn.TRUE_POSTURE
 SIGHTING = len(SightingColumn)
 
-BY_LINES_OF_SIGHT = np.zeros((0, 0, 0), np.uint8)
-
 
 class Crowd(NamedTuple):
     """All users over the span: row u is user u, column j is step first + j."""
@@ -60,7 +59,6 @@ class Crowd(NamedTuple):
     heading: I64
     away: U8
     posture: NDArray[np.int8]
-    shown: U8 = BY_LINES_OF_SIGHT  # (cameras, users, steps): points in view by another method
 
 
 class Memory(NamedTuple):
@@ -93,3 +91,17 @@ class Rule(NamedTuple):
     burst: int  # most sightings that become known in one step
     stop_lost: bool  # whether an event ends the span
     stop_seen: bool
+
+
+def new_memory(cameras: int, users: int, backlog: int) -> Memory:
+    """Return the memory of a robot that has seen nobody."""
+    never = -1
+    about = np.zeros((cameras, users, len(About)), np.int64)
+    about[..., [About.DRAW_STEP.value, About.TRACK_STEP.value]] = never
+    return Memory(
+        noticed=np.full(users + 1, never, np.int64),
+        seen=np.zeros(users + 1, np.int64),
+        about=about,
+        backlog=np.zeros((cameras, backlog, SIGHTING), np.int64),
+        waiting=np.zeros((cameras, 2), np.int64),
+    )

@@ -18,6 +18,11 @@ class SightSettings(Settings):
         description="how it is told whether somebody is in view: line_of_sight,"
         " visibility_polygon, flashlight, or your own",
     )
+    people_occlude: bool = Field(
+        default=False,
+        description="whether bodies hide people from cameras: a line of sight ends at any body that"
+        " it passes nearer than that body's radius",
+    )
     seen_every: PositiveDuration | None = Field(
         default=None,
         description="how often the seen area is worked out, for the layers of what robots have seen"
