@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.engine import Outcome
+from fleet2d.studies.engine import VariantOutcome
 from fleet2d.studies.execution import Event, Executor, Finished, SerialExecutor
-from fleet2d.studies.jobs import Job, StudyJob
+from fleet2d.studies.jobs import StudyJob, WorkerJob
 from fleet2d.studies.local import LocalExecutor
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.record import record_of
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.schedule import TaskSchedule
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
 HOUR = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
@@ -35,12 +35,14 @@ class MadeUpExecutor:
 
     workers = 1
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
         """Yield a record of usual size for each task."""
         numbers = {f"metric_{i}.ana.value": 0.1 * i for i in range(30)}
         while (task := tasks.take(self)) is not None:
             if isinstance(job, StudyJob):
-                outcome = Outcome("complete", f"{task.number:064x}", numbers, {}, {"total": 0.03})
+                outcome = VariantOutcome(
+                    "complete", f"{task.number:064x}", numbers, {}, {"total": 0.03}
+                )
                 yield Finished(task, record_of(task, outcome).encode(), 1)
             else:  # set-ups
                 yield Finished(task, b"", 1)

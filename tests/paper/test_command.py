@@ -59,7 +59,7 @@ def test_without_matplotlib_numbers_are_still_written(
     assert {"ltp-gap.json", "studies"} == {path.name for path in Path("paper").iterdir()}
 
 
-def test_missing_matplotlib_is_said(
+def test_missing_matplotlib_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "fleet2d.view", None)
@@ -93,7 +93,7 @@ def test_sizes_below_one_are_refused(reproduce: Callable[..., Result], option: s
 
 
 def test_a_directory_that_is_a_file_is_refused_first(reproduce: Callable[..., Result]) -> None:
-    Path("taken").write_text("")
-    code, _, err = reproduce("ltp-gap", "--out", "taken")
+    Path("file").write_text("")
+    code, _, err = reproduce("ltp-gap", "--out", "file")
     assert 2 == code
     assert "--out" in err

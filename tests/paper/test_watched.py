@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.palette import ROBOT_COLORS, USER_COLORS
-from fleet2d.paper.watched import LiveView, Watching, watch
+from fleet2d.paper.watched import FrameSeries, LiveView, time_frames
 
 Frame = NDArray[np.uint8]
 
@@ -17,10 +17,10 @@ def at_hour(hour: int) -> Simulation:
     return simulation
 
 
-def shows(frame: Frame, color: str) -> int:
-    """Return how many pixels are nearly of a colour."""
-    wanted = np.array(to_rgb(color)) * 255
-    return int((np.abs(frame[..., :3] - wanted).max(axis=-1) < 6).sum())
+def count_pixels(frame: Frame, color: str) -> int:
+    """Return the number of pixels that have almost a colour."""
+    rgb = np.array(to_rgb(color)) * 255
+    return int((np.abs(frame[..., :3] - rgb).max(axis=-1) < 6).sum())
 
 
 def test_a_frame_shows_everybody_at_home_and_nobody_away() -> None:
@@ -28,11 +28,11 @@ def test_a_frame_shows_everybody_at_home_and_nobody_away() -> None:
     view = LiveView(simulation, width=800)
     night = view.frame().copy()
     assert not simulation.state["ana"]["away"]
-    assert shows(night, USER_COLORS[0]) > 20
-    assert shows(night, ROBOT_COLORS[0]) > 20
+    assert count_pixels(night, USER_COLORS[0]) > 20
+    assert count_pixels(night, ROBOT_COLORS[0]) > 20
     simulation.advance(8 * 3600)
     assert simulation.state["ana"]["away"]
-    assert 0 == shows(view.frame(), USER_COLORS[0])
+    assert 0 == count_pixels(view.frame(), USER_COLORS[0])
 
 
 def test_a_frame_is_the_same_as_one_drawn_afresh() -> None:
@@ -45,15 +45,15 @@ def test_a_frame_is_the_same_as_one_drawn_afresh() -> None:
 
 
 def test_watching_changes_nothing_in_the_run() -> None:
-    plain = Simulation("bundled:base", "simulation.duration=2 h", seed=4).run()
+    unwatched = Simulation("bundled:base", "simulation.duration=2 h", seed=4).run()
     simulation = Simulation("bundled:base", "simulation.duration=2 h", seed=4)
     view = LiveView(simulation, width=200)
     while not simulation.done:
         simulation.advance(60)
         view.frame()
-    assert plain.digest == simulation.finish().digest
+    assert unwatched.digest == simulation.finish().digest
 
 
 def test_watching_counts_simulated_time_from_the_first_frame() -> None:
-    found = watch(Watching("minute", 60, 10, from_hour=1))
-    assert 600 == round(found["speedup"] * found["seconds"])
+    timing = time_frames(FrameSeries("minute", 60, 10, from_hour=1))
+    assert 600 == round(timing["speedup"] * timing["seconds"])

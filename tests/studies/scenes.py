@@ -17,7 +17,7 @@ SPEED = "robots.astro.speed"
 
 
 def base(duration: str = "2 min", **sections: Any) -> dict[str, Any]:
-    """A person and a robot who wander about."""
+    """A scenario of a person who meanders and a robot that patrols."""
     robots = {"astro": {"type": "patrol", "camera": {"range": [0, 4]}}}
     return scenario(
         duration,
@@ -45,8 +45,8 @@ def run(
 
 def digests(study: Study) -> list[str]:
     """The digests of all variants, in order."""
-    found: list[str] = study.arrow_variants.column("digest").to_pylist()
-    return found
+    column: list[str] = study.arrow_variants.column("digest").to_pylist()
+    return column
 
 
 def optional(name: str) -> Any:

@@ -62,7 +62,7 @@ def test_missing_variants_leave_out_their_pairs_only() -> None:
     assert (56, 7) == (row["pairs"], row["n_home"])
 
 
-def test_too_few_replicates_are_told_with_how_many_would_do() -> None:
+def test_too_few_replicates_are_named_with_how_many_are_needed() -> None:
     (row,) = compare(variants(homes=3, effect=0.05, noise=0.4))
     assert "too few replicates to tell" in row["verdict"]
     assert "values of home (now 3)" in row["verdict"]
@@ -73,7 +73,7 @@ def test_one_pair_tells_nothing() -> None:
     assert "one pair only" in row["verdict"]
 
 
-def test_no_difference_at_all_is_told() -> None:
+def test_equal_values_are_called_the_same() -> None:
     (row,) = compare(variants(effect=0, noise=0))
     assert "the same as old in every pair" == row["verdict"]
 
@@ -94,9 +94,9 @@ def test_without_pairs_there_is_no_answer() -> None:
 
 def test_main_effects_are_those_that_were_put_in() -> None:
     table = effects(variants(), ("method", "robot"), "score", ("home", "seed"))
-    found = {(row["axis"], row["value"]): row for row in table.to_dicts()}
-    assert 0.25 == pytest.approx(found["method", "new"]["effect"], abs=0.05)
-    assert found["robot", "patrol"]["low"] < 0 < found["robot", "patrol"]["high"]
+    rows = {(row["axis"], row["value"]): row for row in table.to_dicts()}
+    assert 0.25 == pytest.approx(rows["method", "new"]["effect"], abs=0.05)
+    assert rows["robot", "patrol"]["low"] < 0 < rows["robot", "patrol"]["high"]
 
 
 def test_shares_of_the_variance_name_what_matters() -> None:
@@ -146,6 +146,6 @@ def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path:
         on, off = (
             frame.filter(frame["robot"] == name)[metric].to_numpy() for name in ("on", "off")
         )
-        others = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
+        unpaired = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
         assert 18 == row["pairs"] == len(on)
-        assert others.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)
+        assert unpaired.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)

@@ -19,12 +19,12 @@ def axis(**keys: Any) -> Axis:
     return TypeAdapter(AnyAxis).validate_python(keys)
 
 
-def labels(one: Axis, name: str = "x") -> list[Any]:
-    return [tuple(choice.labels.values()) for choice in one.choices(name)]
+def labels(x_axis: Axis, name: str = "x") -> list[Any]:
+    return [tuple(choice.labels.values()) for choice in x_axis.choices(name)]
 
 
-def values(one: Axis, name: str = "x") -> list[Any]:
-    return [choice.changes[0][1] for choice in one.choices(name)]
+def values(x_axis: Axis, name: str = "x") -> list[Any]:
+    return [choice.changes[0][1] for choice in x_axis.choices(name)]
 
 
 def test_values_are_their_own_labels() -> None:
@@ -63,18 +63,18 @@ def test_range(keys: dict[str, Any], expected: list[Any]) -> None:
 
 
 def test_options_change_several_keys_each() -> None:
-    one = axis(options={"slow": {SPEED: 0.2}, "fast": {SPEED: 0.9, "robots.astro.radius": 0.1}})
-    assert [("slow",), ("fast",)] == labels(one)
-    assert [1, 2] == [len(choice.changes) for choice in one.choices("x")]
+    x_axis = axis(options={"slow": {SPEED: 0.2}, "fast": {SPEED: 0.9, "robots.astro.radius": 0.1}})
+    assert [("slow",), ("fast",)] == labels(x_axis)
+    assert [1, 2] == [len(choice.changes) for choice in x_axis.choices("x")]
 
 
 def test_floor_plans_of_a_folder_are_called_by_their_files(tmp_path: Path) -> None:
     for name in ("b", "a"):
         (tmp_path / f"{name}.json").write_text(json.dumps(flat_document()))
     (tmp_path / "notes.txt").write_text("not a plan")
-    one = axis(floorplans=str(tmp_path), settings={"furnish": True})
-    assert [("a",), ("b",)] == labels(one)
-    section = values(one)[0]
+    x_axis = axis(floorplans=str(tmp_path), settings={"furnish": True})
+    assert [("a",), ("b",)] == labels(x_axis)
+    section = values(x_axis)[0]
     assert ("native", str(tmp_path / "a.json"), True) == tuple(
         section[k] for k in ("type", "path", "furnish")
     )
@@ -92,9 +92,9 @@ def test_synthetic_homes_are_called_by_their_seeds() -> None:
 
 
 def test_all_personas_are_those_that_come_with_fleet2d() -> None:
-    found = labels(axis(personas="all", user="ana"))
-    assert ("retired",) in found
-    assert 6 == len(found)
+    axis_labels = labels(axis(personas="all", user="ana"))
+    assert ("retired",) in axis_labels
+    assert 6 == len(axis_labels)
 
 
 @pytest.mark.parametrize("method", ["random", "latin_hypercube"])
@@ -104,18 +104,18 @@ def test_samples_are_the_same_at_each_call_and_within_range(method: str) -> None
         "dwell": {"key": "robots.astro.dwell", "low": 1, "high": 60, "log": True, "unit": "min"},
         "order": {"key": "robots.astro.order", "choices": ["fixed", "random"]},
     }
-    one = axis(sample=parameters, count=8, method=method, seed=3)
-    assert ("speed", "dwell", "order") == one.columns("x")
-    found = labels(one)
-    assert found == labels(one)
-    assert all(0.2 <= speed <= 1.0 and 1 <= dwell <= 60 for speed, dwell, _ in found)
-    assert {"fixed", "random"} == {order for *_, order in found}
-    assert one.choices("x")[0].changes[1][1].endswith(" min")
+    x_axis = axis(sample=parameters, count=8, method=method, seed=3)
+    assert ("speed", "dwell", "order") == x_axis.columns("x")
+    axis_labels = labels(x_axis)
+    assert axis_labels == labels(x_axis)
+    assert all(0.2 <= speed <= 1.0 and 1 <= dwell <= 60 for speed, dwell, _ in axis_labels)
+    assert {"fixed", "random"} == {order for *_, order in axis_labels}
+    assert x_axis.choices("x")[0].changes[1][1].endswith(" min")
 
 
 def test_a_latin_hypercube_fills_every_eighth_of_a_range_once() -> None:
-    one = axis(sample={"speed": {"key": SPEED, "low": 0, "high": 8}}, count=8)
-    assert list(range(8)) == sorted(int(speed) for (speed,) in labels(one))
+    x_axis = axis(sample={"speed": {"key": SPEED, "low": 0, "high": 8}}, count=8)
+    assert list(range(8)) == sorted(int(speed) for (speed,) in labels(x_axis))
 
 
 def test_whole_numbers_reach_both_ends() -> None:
@@ -124,20 +124,22 @@ def test_whole_numbers_reach_both_ends() -> None:
 
 
 def test_a_zip_pairs_values() -> None:
-    one = axis(zip={"speed": {"key": SPEED, "values": [0.3, 0.6]}, "home": {"synthetic": 2}})
-    assert [(0.3, 0), (0.6, 1)] == labels(one)
-    assert ("home",) == one.populations("x")
+    x_axis = axis(zip={"speed": {"key": SPEED, "values": [0.3, 0.6]}, "home": {"synthetic": 2}})
+    assert [(0.3, 0), (0.6, 1)] == labels(x_axis)
+    assert ("home",) == x_axis.populations("x")
 
 
 def test_a_zip_of_unequal_lengths_is_refused() -> None:
-    one = axis(zip={"speed": {"key": SPEED, "values": [0.3]}, "home": {"synthetic": 2}})
+    x_axis = axis(zip={"speed": {"key": SPEED, "values": [0.3]}, "home": {"synthetic": 2}})
     with pytest.raises(ScenarioError, match="speed has 1, home has 2"):
-        one.choices("x")
+        x_axis.choices("x")
 
 
 def test_a_grid_within_an_axis_combines_all() -> None:
-    one = axis(grid={"a": {"key": "a.b", "values": [1, 2]}, "c": {"key": "c.d", "values": [3, 4]}})
-    assert [(1, 3), (1, 4), (2, 3), (2, 4)] == labels(one)
+    x_axis = axis(
+        grid={"a": {"key": "a.b", "values": [1, 2]}, "c": {"key": "c.d", "values": [3, 4]}}
+    )
+    assert [(1, 3), (1, 4), (2, 3), (2, 4)] == labels(x_axis)
 
 
 @pytest.mark.parametrize(

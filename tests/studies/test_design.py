@@ -18,14 +18,16 @@ def design(**keys: Any) -> Design:
     return build_design(read_specification(small(**keys)))
 
 
-def labels(one: Design, *columns: str) -> list[tuple[Any, ...]]:
-    return [tuple(one.parameters(i)[c] for c in columns) for i in range(len(one))]
+def labels(study_design: Design, *columns: str) -> list[tuple[Any, ...]]:
+    return [tuple(study_design.parameters(i)[c] for c in columns) for i in range(len(study_design))]
 
 
 def test_every_value_meets_every_other_and_every_seed() -> None:
-    one = design(axes={SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}, replicates=2)
-    assert (8, (SPEED, RADIUS, "seed")) == (len(one), one.columns)
-    assert [(0.3, 0.1, 0), (0.3, 0.1, 1), (0.3, 0.2, 0)] == labels(one, SPEED, RADIUS, "seed")[:3]
+    study_design = design(axes={SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}, replicates=2)
+    assert (8, (SPEED, RADIUS, "seed")) == (len(study_design), study_design.columns)
+    assert [(0.3, 0.1, 0), (0.3, 0.1, 1), (0.3, 0.2, 0)] == labels(
+        study_design, SPEED, RADIUS, "seed"
+    )[:3]
 
 
 def test_scenarios_have_their_values_and_their_seed() -> None:
@@ -34,8 +36,8 @@ def test_scenarios_have_their_values_and_their_seed() -> None:
 
 
 def test_without_replicates_the_seed_is_that_of_the_base() -> None:
-    one = build_design(read_specification({"base": base()}))
-    assert ([(4,)], 1) == (labels(one, "seed"), len(one))
+    study_design = build_design(read_specification({"base": base()}))
+    assert ([(4,)], 1) == (labels(study_design, "seed"), len(study_design))
 
 
 def test_tables_that_are_not_kept_are_not_made() -> None:
@@ -43,8 +45,11 @@ def test_tables_that_are_not_kept_are_not_made() -> None:
     assert ("off", False, False) == (
         artifacts.trajectories, artifacts.observations, artifacts.key_frames,
     )  # fmt: skip
-    kept = design(keep={"tables": ["observations", "trajectories"]}).scenario(0).artifacts
-    assert (60.0, True) == (kept.trajectories.total_seconds(), kept.observations)  # type: ignore[union-attr]
+    kept_artifacts = design(keep={"tables": ["observations", "trajectories"]}).scenario(0).artifacts
+    assert (60.0, True) == (
+        kept_artifacts.trajectories.total_seconds(),
+        kept_artifacts.observations,
+    )  # type: ignore[union-attr]
 
 
 def test_an_axis_with_a_condition_applies_there_only() -> None:
@@ -52,21 +57,21 @@ def test_an_axis_with_a_condition_applies_there_only() -> None:
         "robot": {"key": "robots.astro.order", "values": ["fixed", "random"]},
         "dwell": {"key": "robots.astro.dwell", "values": [60, 90], "when": {"robot": "random"}},
     }
-    one = design(axes=axes, replicates=1)
+    study_design = design(axes=axes, replicates=1)
     expected = [("fixed", None), ("random", 60), ("random", 90)]
-    assert expected == labels(one, "robot", "dwell")
+    assert expected == labels(study_design, "robot", "dwell")
 
 
 def test_rules_change_the_variants_that_they_name() -> None:
     rules = [{"when": {SPEED: [0.6]}, "set": {RADIUS: 0.11}}]
-    one = design(rules=rules, replicates=1)
-    assert [0.15, 0.11] == [one.scenario(i).robots["astro"].radius for i in range(2)]
+    study_design = design(rules=rules, replicates=1)
+    assert [0.15, 0.11] == [study_design.scenario(i).robots["astro"].radius for i in range(2)]
 
 
 def test_excluded_combinations_are_left_out() -> None:
     axes = {SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}
-    one = design(axes=axes, replicates=1, exclude=[{SPEED: 0.3, RADIUS: 0.2}])
-    assert [(0.3, 0.1), (0.6, 0.1), (0.6, 0.2)] == labels(one, SPEED, RADIUS)
+    study_design = design(axes=axes, replicates=1, exclude=[{SPEED: 0.3, RADIUS: 0.2}])
+    assert [(0.3, 0.1), (0.6, 0.1), (0.6, 0.2)] == labels(study_design, SPEED, RADIUS)
 
 
 def test_a_design_without_variants_is_refused() -> None:
@@ -94,9 +99,9 @@ def test_conditions_that_never_hold_are_refused(keys: dict[str, Any], message: s
 
 
 def test_an_error_in_a_scenario_names_axis_and_value() -> None:
-    one = design(axes={"pace": {"key": SPEED, "values": [0.3, "quick"]}})
+    study_design = design(axes={"pace": {"key": SPEED, "values": [0.3, "quick"]}})
     with pytest.raises(ScenarioError, match=r"variant 3 \(pace = quick, seed = 0\).*axis 'pace'"):
-        one.scenario(3)
+        study_design.scenario(3)
 
 
 def test_an_error_in_a_study_file_names_its_line(tmp_path: Path) -> None:
@@ -107,6 +112,6 @@ def test_an_error_in_a_study_file_names_its_line(tmp_path: Path) -> None:
 
 
 def test_a_design_can_be_sent_to_another_process() -> None:
-    one = design()
-    again = pickle.loads(pickle.dumps(one))
-    assert one.scenario(5).resolved() == again.scenario(5).resolved()
+    study_design = design()
+    again = pickle.loads(pickle.dumps(study_design))
+    assert study_design.scenario(5).resolved() == again.scenario(5).resolved()

@@ -13,9 +13,10 @@ from tests.studies.scenes import SPEED, base, digests, run, small
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
 from fleet2d.studies import catalogue, driver, identity, jobs
 from fleet2d.studies.execution import Event, SerialExecutor
-from fleet2d.studies.jobs import Job
+from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.local import LocalExecutor
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.reader import open_study
+from fleet2d.studies.schedule import TaskSchedule
 
 ROWS = {"keep": {"tables": ["room_share"]}}
 BROKEN = """from fleet2d import Algorithm
@@ -29,30 +30,30 @@ class Fails(Algorithm):
 
 
 class CountingExecutor(SerialExecutor):
-    """Runs tasks in this process, in the order that is wanted, up to a number of them."""
+    """Runs up to a number of tasks in this process, in the order of their numbers or backwards."""
 
     def __init__(self, most: int = 1000, *, backwards: bool = False) -> None:
         self.most, self.backwards = most, backwards
         self.ran: list[int] = []
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
-        waiting = Schedule([])
-        listed = []
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        single = TaskSchedule([])
+        pending = []
         while (task := tasks.take("all")) is not None:
-            listed.append(task)
-        for task in sorted(listed, key=lambda t: t.number, reverse=self.backwards):
+            pending.append(task)
+        for task in sorted(pending, key=lambda t: t.number, reverse=self.backwards):
             if len(self.ran) == self.most:
                 raise KeyboardInterrupt
-            waiting.put_back(task)
+            single.put_back(task)
             self.ran.append(task.number)
-            yield from super().run(job, waiting)
+            yield from super().run(job, single)
 
 
-class CollectingObserver(driver.SilentObserver):
+class CollectingObserver(driver.Observer):
     def __init__(self) -> None:
         self.notes: list[str] = []
 
-    def note(self, text: str) -> None:
+    def on_note(self, text: str) -> None:
         self.notes.append(text)
 
 
@@ -102,15 +103,9 @@ def test_it_goes_on_where_it_was_interrupted(whole: Path, tmp_path: Path, backwa
 def test_an_interrupted_study_can_be_read(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         run(small(**ROWS), tmp_path / "study", CountingExecutor(2))
-    study = driver_open(tmp_path / "study")
+    study = open_study(tmp_path / "study")
     assert ["complete"] * 2 + ["missing"] * 4 == study.variants["status"].to_list()
     assert 2 == len(study.arrow("room_share").to_table().column("variant").unique())
-
-
-def driver_open(folder: Path) -> Any:
-    from fleet2d.studies.reader import open_study
-
-    return open_study(folder)
 
 
 @pytest.mark.parametrize("file", ["results/000001.parquet", "tables/room_share/000001.parquet"])
@@ -127,7 +122,7 @@ def test_what_is_damaged_is_run_again(copied: Path, whole: Path, file: str, harm
     counts, study = run(small(**ROWS), copied, executor, observer=observer)
     assert (6, 6) == (counts.complete, len(executor.ran))
     assert file in observer.notes[0]
-    assert digests(driver_open(whole)) == digests(study)
+    assert digests(open_study(whole)) == digests(study)
 
 
 @pytest.mark.parametrize("file", ["variants.parquet", "lock"])
@@ -157,7 +152,7 @@ def test_a_journal_that_grows_large_becomes_a_part(
     monkeypatch.setattr(driver, "PART_BYTES", 2500)
     _, study = run(small(**ROWS), tmp_path / "study")
     assert len(list((tmp_path / "study/parts").iterdir())) > 1
-    assert digests(driver_open(whole)) == digests(study)
+    assert digests(open_study(whole)) == digests(study)
     rows = study.polars("room_share").collect()
     assert 6 == rows["variant"].n_unique()
 
@@ -179,7 +174,7 @@ def test_a_full_disk_ends_it_and_the_same_command_goes_on(
     executor = CountingExecutor()
     _, study = run(small(**ROWS), tmp_path / "study", executor)
     assert 0 < len(executor.ran) < 6
-    assert digests(driver_open(whole)) == digests(study)
+    assert digests(open_study(whole)) == digests(study)
 
 
 def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path) -> None:
@@ -189,8 +184,7 @@ def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path)
     assert (12, 6) == (counts.complete, len(executor.ran))
     assert ["6 variants are new in " + str(copied)] == observer.notes
     assert [0.1] * 4 + [0.3] * 4 + [0.6] * 4 == study.variants[SPEED].to_list()
-    before = driver_open(copied)
-    assert set(digests(before)) == set(digests(study))
+    assert set(digests(open_study(copied))) == set(digests(study))
 
 
 def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path) -> None:
@@ -232,7 +226,7 @@ def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
 
 def test_two_processes_can_not_run_the_same_study(tmp_path: Path) -> None:
     class Nested(SerialExecutor):
-        def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+        def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
             with pytest.raises(RunDirectoryError, match="another process is running"):
                 run(small(), tmp_path / "study")
             yield from super().run(job, tasks)
@@ -279,7 +273,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
     failing: dict[str, Any], tmp_path: Path
 ) -> None:
     class Meddling(SerialExecutor):
-        def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+        def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
             with (tmp_path / "broken.py").open("a") as file:
                 file.write("# changed\n")
             yield from super().run(job, tasks)
@@ -295,6 +289,6 @@ def test_results_are_the_same_with_any_number_of_workers(
 ) -> None:
     counts, study = run(small(**ROWS), tmp_path / "study", LocalExecutor(workers))
     assert 6 == counts.complete
-    assert digests(driver_open(whole)) == digests(study)
-    undisturbed = driver_open(whole)
+    assert digests(open_study(whole)) == digests(study)
+    undisturbed = open_study(whole)
     assert undisturbed.arrow("room_share").to_table() == study.arrow("room_share").to_table()

@@ -9,20 +9,20 @@ import pyarrow as pa
 import pytest
 
 from fleet2d.errors import ArtifactError
-from fleet2d.studies.engine import Outcome
+from fleet2d.studies.engine import VariantOutcome
 from fleet2d.studies.journal import Journal, read_journal
 from fleet2d.studies.parts import tables_of
-from fleet2d.studies.record import Record, Task, record_of
+from fleet2d.studies.record import VariantRecord, WorkerTask, record_of
 
 
-def record(number: int, status: Any = "complete") -> Record:
+def record(number: int, status: Any = "complete") -> VariantRecord:
     rows = pa.table({"step": [1, 2, 3], "value": [0.5, None, number]})
-    outcome = Outcome(status, "d" * 8, {"a.b": 0.25}, {"rows": rows}, {"total": 1.0})
-    return record_of(Task(number, number, f"id{number}"), outcome)
+    outcome = VariantOutcome(status, "d" * 8, {"a.b": 0.25}, {"rows": rows}, {"total": 1.0})
+    return record_of(WorkerTask(number, number, f"id{number}"), outcome)
 
 
 def numbers(path: Path) -> list[int]:
-    return [one.number for one in read_journal(path)]
+    return [entry.number for entry in read_journal(path)]
 
 
 @pytest.fixture
@@ -33,10 +33,10 @@ def path(tmp_path: Path) -> Path:
 def test_records_come_back_as_they_were(path: Path) -> None:
     journal = Journal(path)
     journal.append(record(7))
-    (found,) = read_journal(path)
-    assert record(7).header == dict(found.header)
-    assert [1, 2, 3] == tables_of(found)["rows"].column("step").to_pylist()
-    assert found == journal.read(7)
+    (stored,) = read_journal(path)
+    assert record(7).header == dict(stored.header)
+    assert [1, 2, 3] == tables_of(stored)["rows"].column("step").to_pylist()
+    assert stored == journal.read(7)
 
 
 def test_the_newest_record_of_a_variant_counts(path: Path) -> None:
@@ -70,11 +70,11 @@ def test_what_was_cut_off_is_dropped_and_the_rest_stays(path: Path, lost: int) -
 def test_what_was_damaged_is_dropped(path: Path) -> None:
     journal = Journal(path)
     journal.append(record(0))
-    whole = journal.size
+    end_of_first = journal.size
     journal.append(record(1))
     journal.close()
     content = bytearray(path.read_bytes())
-    content[whole + 60] ^= 1
+    content[end_of_first + 60] ^= 1
     path.write_bytes(content)
     assert [0] == numbers(path)
 

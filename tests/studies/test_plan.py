@@ -12,13 +12,13 @@ from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import build_design
 from fleet2d.studies.execution import SerialExecutor
 from fleet2d.studies.identity import FileHashes, code_version, input_hash
-from fleet2d.studies.plan import Plan, check_setups, make_plan, setups_to_check
+from fleet2d.studies.plan import StudyPlan, check_setups, make_plan, setups_to_check
 from fleet2d.studies.specification import read_specification
 
 ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
 
 
-def plan(**keys: Any) -> Plan:
+def plan(**keys: Any) -> StudyPlan:
     specification = read_specification(small(**keys))
     return make_plan(build_design(specification), specification.file.keep.tables)
 
@@ -52,9 +52,9 @@ def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
     scenario = load_scenario(
         base(algorithms={"own": {"type": f"{tmp_path.as_posix()}/mine:Nothing"}})
     )
-    before = input_hash(scenario, FileHashes())
+    first_hash = input_hash(scenario, FileHashes())
     module.write_text(text + "# another\n")
-    assert before != input_hash(scenario, FileHashes())
+    assert first_hash != input_hash(scenario, FileHashes())
 
 
 def test_the_code_has_a_version() -> None:
@@ -83,11 +83,11 @@ def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
         SPEED: [0.1, 0.2, 0.3, 0.4],
         "robots.astro.radius": [0.1, 0.12, 0.14, 0.16],
     }
-    one = plan(axes=axes, replicates=2)
-    chosen = [one.parameters(variant) for variant in setups_to_check(one)]
-    assert 8 == len(chosen)  # of 32 combinations
+    study_plan = plan(axes=axes, replicates=2)
+    setups = [study_plan.parameters(variant) for variant in setups_to_check(study_plan)]
+    assert 8 == len(setups)  # of 32 combinations
     for column in (SPEED, "robots.astro.radius"):
-        assert 8 == len({(row["home"], row[column]) for row in chosen})
+        assert 8 == len({(row["home"], row[column]) for row in setups})
 
 
 def test_two_variants_with_the_same_scenario_are_refused() -> None:
@@ -110,8 +110,8 @@ def test_a_table_that_no_variant_has_is_refused() -> None:
 def test_variants_that_share_a_home_have_its_key() -> None:
     homes = {"home": {"synthetic": 2}}
     users = {"users": {"ana": {"type": "meander"}}}
-    found = plan(axes=homes, base=base() | users, replicates=2)
-    keys = [variant.home_key for variant in found.variants]
+    study_plan = plan(axes=homes, base=base() | users, replicates=2)
+    keys = [variant.home_key for variant in study_plan.variants]
     assert keys[0] == keys[1] != keys[2] == keys[3]
 
 

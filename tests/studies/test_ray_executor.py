@@ -8,8 +8,8 @@ import pytest
 from tests.studies.scenes import base, digests, optional, run, small
 
 from fleet2d.studies import api
-from fleet2d.studies.driver import SilentObserver
-from fleet2d.studies.record import Record
+from fleet2d.studies.driver import Observer
+from fleet2d.studies.record import VariantRecord
 
 ray = optional("ray")
 pytestmark = [
@@ -22,23 +22,23 @@ def cluster() -> Iterator[Any]:
     """A cluster of a head without cores and two nodes with one each."""
     from ray.cluster_utils import Cluster
 
-    found = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
     try:
-        found.nodes_to_kill = [found.add_node(num_cpus=1) for _ in range(2)]
-        found.wait_for_nodes()
-        yield found
+        cluster.nodes_to_kill = [cluster.add_node(num_cpus=1) for _ in range(2)]
+        cluster.wait_for_nodes()
+        yield cluster
     finally:
         ray.shutdown()
-        found.shutdown()
+        cluster.shutdown()
 
 
-class KillsANode(SilentObserver):
+class KillsANode(Observer):
     """Kills a node of a cluster as soon as workers on both nodes are at work."""
 
     def __init__(self, cluster: Any, executor: Any) -> None:
         self.cluster, self.executor, self.has_killed = cluster, executor, False
 
-    def ended(self, record: Record) -> None:
+    def on_result(self, record: VariantRecord) -> None:
         at_work = sum(bool(actor.tasks) for actor in self.executor._crew)
         if at_work == 2 and not self.has_killed:
             self.has_killed = True

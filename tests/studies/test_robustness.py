@@ -14,10 +14,10 @@ from tests.studies.scenes import SPEED, base, digests, run, small
 from tests.thorough import THOROUGH
 
 from fleet2d.studies.directory import StudyDirectory
-from fleet2d.studies.driver import SilentObserver
+from fleet2d.studies.driver import Observer
 from fleet2d.studies.execution import cores
 from fleet2d.studies.reader import open_study
-from fleet2d.studies.record import Record
+from fleet2d.studies.record import VariantRecord
 from fleet2d.studies.results import count
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "15"))
@@ -27,15 +27,15 @@ SEEDS = KILLS * MOST // 4 + 1
 LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=SEEDS, keep={"tables": ["room_share"]})
 
 
-class Dies(SilentObserver):
+class Dies(Observer):
     """Kills its own process after some variants."""
 
     def __init__(self, variants: int) -> None:
-        self.left = variants
+        self.remaining = variants
 
-    def ended(self, record: Record) -> None:
-        self.left -= 1
-        if not self.left:
+    def on_result(self, record: VariantRecord) -> None:
+        self.remaining -= 1
+        if not self.remaining:
             os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -50,8 +50,8 @@ def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None
             os._exit(1)
     deadline = time.monotonic() + after_s
     while time.monotonic() < deadline:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
             assert os.WTERMSIG(status) == signal.SIGKILL
             return
         time.sleep(0.005)
@@ -64,16 +64,16 @@ def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None
 def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     _, undisturbed = run(LARGE, tmp_path / "undisturbed")
     chance = random.Random(16)
-    folder, before = tmp_path / "killed", 0
+    folder, complete_before = tmp_path / "killed", 0
     for _ in range(KILLS):  # while it begins, runs or writes
         run_in_a_child_and_kill(folder, chance.uniform(0.0, 0.12), chance.randint(1, MOST))
         if (folder / "study.json").exists():
-            now = count(StudyDirectory(folder)).complete
-            assert now >= before  # nothing that was there is lost
-            before = now
+            complete = count(StudyDirectory(folder)).complete
+            assert complete >= complete_before
+            complete_before = complete
     _, study = run(LARGE, folder)
     assert digests(undisturbed) == digests(study)
-    tables = [one.arrow("room_share").to_table() for one in (undisturbed, study)]
+    tables = [each.arrow("room_share").to_table() for each in (undisturbed, study)]
     assert tables[0].sort_by("variant") == tables[1].sort_by("variant")
     columns = [SPEED, "seed", *undisturbed.metrics]
     assert undisturbed.variants.select(columns).equals(study.variants.select(columns))
@@ -122,14 +122,14 @@ def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
     wait_for_results(tmp_path, process)
     workers = workers_of(process)
     assert 2 == len(workers)
-    began = time.monotonic()
+    start_s = time.monotonic()
     os.kill(process.pid, sign)
     _, err = process.communicate(timeout=30)
-    took = time.monotonic() - began
+    duration_s = time.monotonic() - start_s
     code = -9 if sign == signal.SIGKILL else 130
-    patience = max(1.0, os.getloadavg()[0] / cores())  # where others compute, too, all takes longer
-    assert (code, True) == (process.returncode, took < patience)
-    deadline = time.monotonic() + patience
+    patience_s = max(1.0, os.getloadavg()[0] / cores())  # a busy machine takes longer
+    assert (code, True) == (process.returncode, duration_s < patience_s)
+    deadline = time.monotonic() + patience_s
     while any(map(is_running, workers)) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not any(map(is_running, workers))

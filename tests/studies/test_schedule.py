@@ -1,41 +1,41 @@
-"""Schedules: variants of one home go to one worker, and everybody is busy to the end."""
+"""Schedules: variants of tasks home go to tasks worker, and everybody is busy to the end."""
 
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
-
-
-def schedule(homes: str) -> Schedule:
-    return Schedule(Task(i, i, "", home) for i, home in enumerate(homes))
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 
 
-def taken(one: Schedule, *workers: str) -> list[str]:
-    found = []
+def schedule(homes: str) -> TaskSchedule:
+    return TaskSchedule(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
+
+
+def homes_of(tasks: TaskSchedule, *workers: str) -> list[str]:
+    homes = []
     for worker in workers:
-        task = one.take(worker)
-        found.append("-" if task is None else task.home)
-    return found
+        task = tasks.take(worker)
+        homes.append("-" if task is None else task.home)
+    return homes
 
 
 def test_a_worker_stays_with_a_home() -> None:
-    assert ["a", "b", "a", "b", "a"] == taken(schedule("ababab"), "x", "y", "x", "y", "x")
+    assert ["a", "b", "a", "b", "a"] == homes_of(schedule("ababab"), "x", "y", "x", "y", "x")
 
 
 def test_a_worker_without_a_home_helps_with_the_largest() -> None:
-    assert ["a", "a", "a", "-"] == taken(schedule("aaa"), "x", "y", "x", "y")
+    assert ["a", "a", "a", "-"] == homes_of(schedule("aaa"), "x", "y", "x", "y")
 
 
 def test_what_a_dead_worker_held_is_next() -> None:
-    one = schedule("ab")
-    task = one.take("x")
+    tasks = schedule("ab")
+    task = tasks.take("x")
     assert task is not None
-    one.leave("x")
-    one.put_back(task)
-    assert 2 == len(one)
-    assert ["a", "b", "-"] == taken(one, "y", "y", "y")
+    tasks.leave("x")
+    tasks.put_back(task)
+    assert 2 == len(tasks)
+    assert ["a", "b", "-"] == homes_of(tasks, "y", "y", "y")
 
 
 def test_an_empty_schedule_is_false() -> None:
-    one = schedule("a")
-    assert one
-    taken(one, "x")
-    assert not one
+    tasks = schedule("a")
+    assert tasks
+    homes_of(tasks, "x")
+    assert not tasks

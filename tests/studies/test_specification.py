@@ -37,13 +37,13 @@ def test_a_base_is_found_beside_the_study(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_a_base_can_be_a_scenario_in_python() -> None:
     scenario = load_scenario(base())
-    found = load_scenario(read_specification({"base": scenario}).base.data)
-    assert scenario.resolved() == found.resolved()
+    specification = load_scenario(read_specification({"base": scenario}).base.data)
+    assert scenario.resolved() == specification.resolved()
 
 
 def test_a_bare_list_is_an_axis_called_by_its_key(tmp_path: Path) -> None:
-    found = read(f"axes: {{{SPEED}: [0.3, 0.6]}}\n", tmp_path)
-    assert (SPEED,) == found.file.columns
+    specification = read(f"axes: {{{SPEED}: [0.3, 0.6]}}\n", tmp_path)
+    assert (SPEED,) == specification.file.columns
 
 
 def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:

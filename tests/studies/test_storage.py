@@ -13,9 +13,9 @@ from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.studies import driver
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.execution import Event, SerialExecutor
-from fleet2d.studies.jobs import Job
+from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.reader import open_study
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.studies.storage import Storage
 
 ROWS = small(keep={"tables": ["room_share"]})
@@ -24,7 +24,7 @@ ROWS = small(keep={"tables": ["room_share"]})
 class Interrupted(SerialExecutor):
     """Ends after two tasks."""
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
         for number, event in enumerate(super().run(job, tasks)):
             if number == 2:
                 raise KeyboardInterrupt

@@ -9,14 +9,14 @@ from tests.studies.scenes import SPEED, base, small
 
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.studies.driver import check_study
-from fleet2d.studies.engine import Prefix
+from fleet2d.studies.engine import StagedRun
 from fleet2d.studies.execution import Event, SerialExecutor
-from fleet2d.studies.jobs import Job
+from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.local import LocalExecutor
 from fleet2d.studies.sampling import Parameter
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.studies.trials import TrialJob, TrialSchedule, TrialTask
-from fleet2d.studies.tune import Tuned, tune
+from fleet2d.studies.tune import TuneResult, tune
 
 pytest.importorskip("optuna")
 pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
@@ -28,7 +28,7 @@ class Spy(SerialExecutor):
     def __init__(self, most: int = 1000) -> None:
         self.most, self.tasks = most, list[Any]()
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
         for event in super().run(job, tasks):
             if len(self.tasks) == self.most:
                 raise KeyboardInterrupt
@@ -57,12 +57,12 @@ def search(**keys: Any) -> dict[str, Any]:
     )
 
 
-def found(tmp_path: Path, executor: Any = None, **keys: Any) -> Tuned:
+def tuned(tmp_path: Path, executor: Any = None, **keys: Any) -> TuneResult:
     return tune(search(**keys), tmp_path / "tune", executor or SerialExecutor())
 
 
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
-    result = found(tmp_path)
+    result = tuned(tmp_path)
     assert 0.2 <= result.settings["tuned"][SPEED] <= 1.0
     (row,) = result.held_out.paired("distance.astro", {"setting": "as it was"}).to_dicts()
     assert row["difference"] > 0
@@ -71,44 +71,44 @@ def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> Non
 
 def test_it_runs_on_training_homes_only(tmp_path: Path) -> None:
     spy = Spy()
-    found(tmp_path, spy)
+    tuned(tmp_path, spy)
     assert {0, 1} == {task.index for task in spy.trials}
     assert 6 == len({task.trial for task in spy.trials})
 
 
 def test_it_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
-        found(tmp_path, Spy(5))
+        tuned(tmp_path, Spy(5))
     spy = Spy()
-    result = found(tmp_path, spy)
+    result = tuned(tmp_path, spy)
     assert 6 == result.trials["complete"]
     assert 4 == len({task.trial for task in spy.trials})  # two were complete
     again = Spy()
-    assert found(tmp_path, again).settings == result.settings
+    assert tuned(tmp_path, again).settings == result.settings
     assert [] == again.trials
 
 
 def test_what_does_badly_is_given_up_at_simulated_times(tmp_path: Path) -> None:
     spy = Spy()
-    result = found(tmp_path, spy, trials=12, prune_at=["1 min", "2 min"])
+    result = tuned(tmp_path, spy, trials=12, prune_at=["1 min", "2 min"])
     assert result.trials["pruned"] > 0
     assert 12 == result.trials["pruned"] + result.trials["complete"]
     assert {60.0, 120.0, None} == {task.until_s for task in spy.trials}
 
 
 def test_what_goes_on_is_not_begun_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun = []
+    starts = []
 
-    class Counted(Prefix):
+    class Counted(StagedRun):
         def __init__(self, scenario: Any) -> None:
-            begun.append(scenario)
+            starts.append(scenario)
             super().__init__(scenario)
 
-    monkeypatch.setattr("fleet2d.studies.trials.Prefix", Counted)
+    monkeypatch.setattr("fleet2d.studies.trials.StagedRun", Counted)
     spy = Spy()
-    found(tmp_path, spy, trials=8, prune_at=["1 min", "2 min"])
+    tuned(tmp_path, spy, trials=8, prune_at=["1 min", "2 min"])
     runs = {(task.trial, task.index) for task in spy.trials}
-    assert len(runs) == len(begun) < len(spy.trials)
+    assert len(runs) == len(starts) < len(spy.trials)
 
 
 def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
@@ -120,10 +120,10 @@ def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
         job = TrialJob(checked.plan.design, parameters, objectives)
         return [job(TrialTask(0, 0, "", "", 0, {"speed": 0.5}, stage)) for stage in stages]
 
-    early, later, end = answers(60.0, 120.0, None)
-    assert [later] == answers(120.0)
+    minute_1, minute_2, end = answers(60.0, 120.0, None)
+    assert [minute_2] == answers(120.0)
     assert [end] == answers(None)
-    assert early != later
+    assert minute_1 != minute_2
 
 
 def test_a_variant_goes_on_with_the_worker_that_keeps_it() -> None:
@@ -132,30 +132,30 @@ def test_a_variant_goes_on_with_the_worker_that_keeps_it() -> None:
     variants = [(0, "home"), (1, "home")]
     parameters = {"speed": Parameter(key=SPEED, low=0.2, high=1.0)}
     schedule = TrialSchedule(study, parameters, variants, (60.0, None), 1)
-    first, second = schedule.take("one"), schedule.take("two")
-    assert isinstance(first, TrialTask)
-    assert isinstance(second, TrialTask)
+    task_a, task_b = schedule.take("one"), schedule.take("two")
+    assert isinstance(task_a, TrialTask)
+    assert isinstance(task_b, TrialTask)
     assert schedule.take("one") is None
-    schedule.finished(first, [1.0], None)
-    schedule.finished(second, [1.0], None)
-    taken = schedule.take("two"), schedule.take("one")
-    assert [second.index, first.index] == [task.index for task in taken if task]
-    schedule.put_back(taken[1])  # type: ignore[arg-type]
+    schedule.finish(task_a, [1.0], None)
+    schedule.finish(task_b, [1.0], None)
+    next_tasks = schedule.take("two"), schedule.take("one")
+    assert [task_b.index, task_a.index] == [task.index for task in next_tasks if task]
+    schedule.put_back(next_tasks[1])  # type: ignore[arg-type]
     schedule.leave("one")
-    left = schedule.take("two")
-    assert left is not None
-    assert first.index == left.index
+    task = schedule.take("two")
+    assert task is not None
+    assert task_a.index == task.index
 
 
 def test_several_objectives_end_in_several_settings(tmp_path: Path) -> None:
     objectives = {"distance.astro": "maximize", "sightings.ana": "maximize"}
-    result = found(tmp_path, objectives=objectives)
+    result = tuned(tmp_path, objectives=objectives)
     assert all(name.startswith("trial ") for name in result.settings)
     assert all(len(values) == 2 for values in result.values.values())
 
 
 def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
-    assert 3 == found(tmp_path, LocalExecutor(2), trials=3).trials["complete"]
+    assert 3 == tuned(tmp_path, LocalExecutor(2), trials=3).trials["complete"]
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
 )
 def test_wrong_searches_are_refused(tmp_path: Path, keys: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        found(tmp_path, **keys)
+        tuned(tmp_path, **keys)
 
 
 def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
@@ -182,6 +182,6 @@ def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
         tune(small(), tmp_path, SerialExecutor())
 
 
-def test_an_objective_that_no_run_comes_to_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no trial succeeded.*no number 'happiness'"):
-        found(tmp_path, objectives={"happiness": "maximize"}, trials=1)
+def test_an_objective_that_no_run_has_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no trial succeeded.*no metric 'happiness'"):
+        tuned(tmp_path, objectives={"happiness": "maximize"}, trials=1)

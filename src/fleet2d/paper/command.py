@@ -1,10 +1,10 @@
-"""The command that measures the paper's results anew: `fleet2d reproduce-paper`."""
+"""The command that repeats the measurements of the paper: `fleet2d reproduce-paper`."""
 
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,18 +12,18 @@ from fleet2d.errors import InputError
 from fleet2d.paper.result import PAPER_COLUMN
 
 if TYPE_CHECKING:
-    from fleet2d.paper.months import Tell
+    from fleet2d.paper.months import OnProgress
     from fleet2d.paper.result import Result
 
-
-WIDTH = 200
+WIDTH = 200  # of lines in a file [characters]
 
 
 def reproduce_paper(
     results: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[speed|ltp-gap|rtp-gap|feedback]...", help="Which; left out: all four."
+            metavar="[speed|ltp-gap|rtp-gap|feedback]...",
+            help="Results to measure; left out: all four.",
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Directory for numbers and pictures.")] = Path("paper"),
@@ -43,31 +43,31 @@ def reproduce_paper(
         typer.Option("--map", help="A real home, for speed: a ROS map's YAML file, or a vacuum's."),
     ] = None,
 ) -> None:
-    """Measure the paper's results anew, beside its figures."""
-    from fleet2d.paper.months import Request
+    """Repeat the measurements of the paper, and print them beside its figures."""
+    from fleet2d.paper.months import PaperOptions
     from fleet2d.paper.result import make_directory
-    from fleet2d.paper.results import chosen, reproduce
+    from fleet2d.paper.results import check_names, reproduce
     from fleet2d.studies.execution import cores
 
-    names = chosen(results or [])
-    request = Request(quick, seeds, days, workers or cores(), real_map, out / "studies")
-    make_directory(out)  # before hours of work
-    pictures = _can_draw()
+    names = check_names(results or [])
+    options = PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")
+    make_directory(out)  # an error is shown before hours of work
+    can_draw = _can_draw()
     for name in names:
-        with _progress(name, show=sys.stderr.isatty()) as tell:
-            found = reproduce(name, request, tell)
-        _print(found)
-        typer.echo(found.save(out))
-        if pictures:
+        with _progress(name, show=sys.stderr.isatty()) as on_progress:
+            result = reproduce(name, options, on_progress)
+        _print(result)
+        typer.echo(result.save(out))
+        if can_draw:
             from fleet2d.paper.pictures import draw
 
             target = out / f"{name}.png"
-            draw(found, target)
+            draw(result, target)
             typer.echo(target)
 
 
 def _can_draw() -> bool:
-    """Tell whether pictures can be drawn; if not, say what is missing."""
+    """Return whether pictures can be drawn; if not, print what is missing."""
     try:
         import fleet2d.view  # noqa: F401
     except InputError as error:
@@ -77,12 +77,12 @@ def _can_draw() -> bool:
 
 
 @contextmanager
-def _progress(name: str, *, show: bool) -> "Iterator[Tell]":
-    """Show how far a result is, on a terminal."""
-    from fleet2d.paper.months import silent
+def _progress(name: str, *, show: bool) -> "Iterator[OnProgress]":
+    """Yield a function that shows progress as a bar if `show`, else does nothing."""
+    from fleet2d.paper.months import ignore_progress
 
     if not show:
-        yield silent
+        yield ignore_progress
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -91,10 +91,10 @@ def _progress(name: str, *, show: bool) -> "Iterator[Tell]":
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(name, total=None)
 
-        def tell(what: str, done: int, of: int) -> None:
-            progress.update(task, completed=done, total=of, description=f"{name}: {what}")
+        def update(phase: str, done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total, description=f"{name}: {phase}")
 
-        yield tell
+        yield update
 
 
 def _print(result: "Result") -> None:
@@ -103,19 +103,18 @@ def _print(result: "Result") -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    # In a file, lines are as long as they need to be.
     console = Console(soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
     console.print(f"\n{escape(result.title)}", highlight=False)
     for table in result.tables:
-        shown = Table(
+        grid = Table(
             title=escape(table.title), title_justify="left", title_style="", show_edge=False
         )
         for number, head in enumerate(table.columns):
-            told = head == PAPER_COLUMN
-            left = told or not number
-            shown.add_column(escape(head), justify="left" if left else "right", no_wrap=not told)
+            is_text = head == PAPER_COLUMN
+            justify: Literal["left", "right"] = "left" if is_text or not number else "right"
+            grid.add_column(escape(head), justify=justify, no_wrap=not is_text)
         for row in table.rows:
-            shown.add_row(*map(escape, row))
-        console.print(shown)
+            grid.add_row(*map(escape, row))
+        console.print(grid)
         for note in table.notes:
             console.print(f"note: {note}", highlight=False, markup=False)

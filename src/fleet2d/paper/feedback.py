@@ -1,17 +1,17 @@
-"""The feedback loop: what becomes of what a robot learns when it acts on what it learned.
+"""The feedback loop: the error of estimators when the robot acts on their estimates.
 
-Every estimator of long-term presence under every policy of the robot, over paired seeds: total
-variation between the estimate at the end and where the person really was, given at home; mean and
-95 % bootstrap interval over seeds, and the same of each seed's difference to the naive estimator.
-Where the robot hangs out, it goes by the estimator of the column; elsewhere all estimators watch
-the same robot.
+Every estimator of long-term presence is measured under every policy of the robot with the same
+seeds. The error is the total variation between the estimate at the end and the true shares of time
+at home: mean and 95 % bootstrap interval over seeds, and the same of the difference to the naive
+estimator with each seed. A robot that hangs out uses the estimator of the column; with other
+policies all estimators watch the same robot.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.paper.months import USER, Request, Tell, interval, month, run_study
+from fleet2d.paper.months import USER, OnProgress, PaperOptions, interval, month, run_study
 from fleet2d.paper.result import Result, Table, counted
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ TITLE = "The feedback loop: error of long-term presence by what the robot does"
 NAIVE = "sighting_share"
 ESTIMATORS = (NAIVE, "exposure_ratio", "audit_only", "likelihood", "fremen")
 PAPER = ("the paper has no such table: it is what its figures of learning robots stand on",)
-# Rounds by the clock: 12 min of each 2 h, a tenth of the time; they are what audits see.
+# Rounds at fixed times, 12 min of each 2 h, for the estimator that uses audits only.
 AUDIT_EVERY_H, AUDIT_MIN = 2, 12
 AUDITS = [f"{hour:02}:00-{hour:02}:{AUDIT_MIN}" for hour in range(0, 24, AUDIT_EVERY_H)]
 ROUNDS = {"type": "patrol", "order": "random", "dwell": "30 s", "when": AUDITS}
@@ -32,18 +32,18 @@ HANGOUT = {"type": "hangout", "near": "room"}
 
 @dataclass(frozen=True)
 class Policy:
-    """What a robot does.
+    """A policy of the robot.
 
     Attributes:
-        behaviors: As in a scenario, the most important first.
-        acts: Whether it goes by an estimator.
+        behaviors: The behaviors of the scenario, the most important first.
+        uses_estimator: Whether a behavior uses the estimates.
     """
 
     behaviors: tuple[Mapping[str, Any], ...]
-    acts: bool = False
+    uses_estimator: bool = False
 
     def robot(self, estimator: str) -> dict[str, Any]:
-        """Return the robot, which goes by an estimator if it goes by any."""
+        """Return the settings of the robot; hangouts use the estimator."""
         return {
             "behaviors": [
                 {**behavior, "source": estimator} if behavior["type"] == "hangout" else behavior
@@ -54,29 +54,32 @@ class Policy:
 
 POLICIES = {
     "independent patrol": Policy((PATROL,)),
-    "hangout, 10 % of moves at random": Policy(({**HANGOUT, "explore": 0.1},), acts=True),
-    "hangout, 10 % rounds by the clock": Policy((ROUNDS, {**HANGOUT, "explore": 0}), acts=True),
+    "hangout, 10 % of moves at random": Policy(({**HANGOUT, "explore": 0.1},), uses_estimator=True),
+    "hangout, 10 % rounds by the clock": Policy(
+        (ROUNDS, {**HANGOUT, "explore": 0}), uses_estimator=True
+    ),
     "follow, else patrol": Policy(({"type": "follow"}, PATROL)),
     "opportunistic, else patrol": Policy(({"type": "opportunistic"}, PATROL)),
 }
 
-Errors = dict[str, dict[str, list[float]]]  # by policy and estimator, of each seed
+Errors = dict[str, dict[str, list[float]]]
+"""The errors of all seeds, by policy and estimator."""
 
 
 def study_of(seeds: int, days: int) -> dict[str, Any]:
-    """Return the study: all estimators watch a robot that heeds none.
+    """Return the study: all estimators together watch a robot that uses none of them.
 
-    Of robots that act on an estimator there is one for each, and the others don't run.
+    Policies that use an estimator run once with each, without the other estimators.
     """
-    acting = [policy for policy, does in POLICIES.items() if does.acts]
+    dependent = [name for name, policy in POLICIES.items() if policy.uses_estimator]
     rules = [
         {
-            "when": {"robot": acting, "estimator": estimator},
+            "when": {"robot": dependent, "estimator": estimator},
             "set": {
-                f"{section}.{prefix}{other}": None
+                f"{section}.{prefix}{absent}": None
                 for section, prefix in (("algorithms", ""), ("metrics", "error_"))
-                for other in ESTIMATORS
-                if other != estimator
+                for absent in ESTIMATORS
+                if absent != estimator
             },
         }
         for estimator in ESTIMATORS
@@ -86,12 +89,12 @@ def study_of(seeds: int, days: int) -> dict[str, Any]:
             "when": {"robot": policy, "estimator": estimator},
             "set": {"robots.astro.behaviors": POLICIES[policy].robot(estimator)["behaviors"]},
         }
-        for policy in acting
+        for policy in dependent
         for estimator in ESTIMATORS
     ]
     robots = {
-        policy: {"robots.astro.behaviors": does.robot(NAIVE)["behaviors"]}
-        for policy, does in POLICIES.items()
+        name: {"robots.astro.behaviors": policy.robot(NAIVE)["behaviors"]}
+        for name, policy in POLICIES.items()
     }
     return {
         "base": month(
@@ -102,7 +105,7 @@ def study_of(seeds: int, days: int) -> dict[str, Any]:
         ),
         "axes": {
             "robot": {"options": robots},
-            "estimator": {"options": {e: {} for e in ESTIMATORS}, "when": {"robot": acting}},
+            "estimator": {"options": {e: {} for e in ESTIMATORS}, "when": {"robot": dependent}},
         },
         "rules": rules,
         "replicates": seeds,
@@ -111,10 +114,10 @@ def study_of(seeds: int, days: int) -> dict[str, Any]:
 
 
 def _algorithm(estimator: str) -> dict[str, Any]:
-    chosen: dict[str, Any] = {"type": estimator}
+    settings: dict[str, Any] = {"type": estimator}
     if estimator == "audit_only":
-        chosen |= {"every": f"{AUDIT_EVERY_H} h", "length": f"{AUDIT_MIN} min"}
-    return {"type": "long_term_presence", "estimator": chosen}
+        settings |= {"every": f"{AUDIT_EVERY_H} h", "length": f"{AUDIT_MIN} min"}
+    return {"type": "long_term_presence", "estimator": settings}
 
 
 def errors(study: "Study") -> Errors:
@@ -128,10 +131,10 @@ def errors(study: "Study") -> Errors:
     return tv
 
 
-def reproduce(request: Request, tell: Tell) -> Result:
+def reproduce(options: PaperOptions, on_progress: OnProgress) -> Result:
     """Run all months; return the tables of errors and of differences to the naive estimator."""
-    seeds, days = request.size(30, 30, 2, 3)
-    tv = errors(run_study(NAME, study_of(seeds, days), request, tell))
+    seeds, days = options.size(30, 30, 2, 3)
+    tv = errors(run_study(NAME, study_of(seeds, days), options, on_progress))
     size = f"{counted(seeds, 'paired seed')} of {counted(days, 'day')}"
     tables = (
         _table(
@@ -148,10 +151,10 @@ def reproduce(request: Request, tell: Tell) -> Result:
 
 
 def differences(tv: Errors) -> Errors:
-    """Return the errors less that of the naive estimator under the same policy and seed."""
+    """Return the errors minus that of the naive estimator under the same policy and seed."""
     return {
         policy: {
-            estimator: [mine - naive for mine, naive in zip(values, by[NAIVE], strict=True)]
+            estimator: [error - naive for error, naive in zip(values, by[NAIVE], strict=True)]
             for estimator, values in by.items()
             if estimator != NAIVE
         }
@@ -165,12 +168,12 @@ def _table(
     return Table(
         title,
         ("robot", *map(_words, estimators)),
-        tuple((policy, *(_shown(by[e]) for e in estimators)) for policy, by in values.items()),
+        tuple((policy, *(_cell(by[e]) for e in estimators)) for policy, by in values.items()),
         notes,
     )
 
 
-def _shown(values: list[float]) -> str:
+def _cell(values: list[float]) -> str:
     mean, low, high = interval(values)
     return f"{mean:.3f} ({low:.3f} to {high:.3f})"
 

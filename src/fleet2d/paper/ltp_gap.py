@@ -1,9 +1,9 @@
-"""Fig. 7 left: how the long-term presence of each room comes near the truth by days.
+"""Fig. 7 left: how the estimate of long-term presence converges over the days.
 
-One person, one home, many robots: patrols of several kinds and hangouts that go by what they
-learned, each with draws of its own, while the person lives the same month with each. The gap of a
-room is that of the share of time at home between the estimate and where the person really was so
-far; mean over robots, and the band that holds 80 % of them.
+One person, one home, many robots: patrols of several kinds, and hangouts that use what they
+learned. Each robot has random draws of its own, and the person lives the same month with each. The
+gap of a room is the difference between its estimated and its true share of time at home so far. The
+result is the mean over robots, and the band that contains 80 % of them.
 """
 
 import time
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.paper.months import CAMERA, USER, Request, Tell, month, run_study
+from fleet2d.paper.months import CAMERA, USER, OnProgress, PaperOptions, month, run_study
 from fleet2d.paper.result import Result, Table, counted
 
 if TYPE_CHECKING:
@@ -37,12 +37,13 @@ KINDS: tuple[dict[str, Any], ...] = (
 )
 
 Gaps = dict[str, list[float]]
+"""The gap of each room after each day, by room."""
 
 
 def study_of(robots: int, days: int) -> dict[str, Any]:
-    """Return the study: robots of even numbers on patrol, of odd ones hanging out.
+    """Return the study: robots of even numbers patrol, robots of odd numbers hang out.
 
-    Each has a name of its own, and so draws of its own.
+    Each has a name of its own, and so random draws of its own.
     """
     base = month(
         algorithms={"ltp": {"type": "long_term_presence", "estimator": ESTIMATOR, "period": "4 h"}},
@@ -63,39 +64,44 @@ def gaps(study: "Study") -> list[Gaps]:
     rows = study.pandas("gap", columns=["variant", "step", "user", "room", "gap"])
     rows = rows[rows["user"] == USER].sort_values(["variant", "step"], kind="stable")
     return [
-        {room: one["gap"].tolist() for room, one in of_robot.groupby("room", sort=False)}
-        for _, of_robot in rows.groupby("variant")
+        {room: group["gap"].tolist() for room, group in robot_rows.groupby("room", sort=False)}
+        for _, robot_rows in rows.groupby("variant")
     ]
 
 
-def reproduce(request: Request, tell: Tell) -> Result:
+def reproduce(options: PaperOptions, on_progress: OnProgress) -> Result:
     """Run all months; return the table of mean gaps."""
-    robots, days = request.size(100, 30, 4, 3)
-    began = time.perf_counter()
-    found = gaps(run_study(NAME, study_of(robots, days), request, tell))
-    took = time.perf_counter() - began
-    by_room = {room: np.array([one[room] for one in found]) for room in found[0]}
-    means = {room: values.mean(axis=0) for room, values in by_room.items()}
-    every = np.mean(list(by_room.values()), axis=0)
-    low, high = np.quantile(every, BAND, axis=0)
-    shown = [day for day in SHOWN_DAYS if day <= days]
-    lines = {**means, "all rooms": every.mean(axis=0), "  band, low": low, "  band, high": high}
+    robots, days = options.size(100, 30, 4, 3)
+    start_s = time.perf_counter()
+    robot_gaps = gaps(run_study(NAME, study_of(robots, days), options, on_progress))
+    duration_s = time.perf_counter() - start_s
+    rooms = {room: np.array([each[room] for each in robot_gaps]) for room in robot_gaps[0]}
+    means = {room: values.mean(axis=0) for room, values in rooms.items()}
+    overall = np.mean(list(rooms.values()), axis=0)
+    low, high = np.quantile(overall, BAND, axis=0)
+    listed_days = [day for day in SHOWN_DAYS if day <= days]
+    lines = {**means, "all rooms": overall.mean(axis=0), "  band, low": low, "  band, high": high}
     table = Table(
         f"mean |estimated - true| share of time at home; {counted(robots, 'robot')},"
         f" {counted(days, 'day')}, {ESTIMATOR}",
-        ("room", *(f"day {day}" for day in shown)),
-        tuple((name, *(f"{line[day - 1]:.3f}" for day in shown)) for name, line in lines.items()),
-        (*PAPER, f"{robots * days} days of one home in {took:.1f} s, {request.workers} at a time"),
+        ("room", *(f"day {day}" for day in listed_days)),
+        tuple(
+            (name, *(f"{line[day - 1]:.3f}" for day in listed_days)) for name, line in lines.items()
+        ),
+        (
+            *PAPER,
+            f"{robots * days} days of one home in {duration_s:.1f} s, {options.workers} at a time",
+        ),
     )
     numbers = {
         "robots": robots,
         "days": days,
         "estimator": ESTIMATOR,
-        "seconds": took,
+        "seconds": duration_s,
         "mean": {room: line.tolist() for room, line in means.items()},
         "all_rooms": {
-            "mean": every.mean(axis=0).tolist(), "low": low.tolist(), "high": high.tolist(),
+            "mean": overall.mean(axis=0).tolist(), "low": low.tolist(), "high": high.tolist(),
         },
-        "gaps": found,
+        "gaps": robot_gaps,
     }  # fmt: skip
     return Result(NAME, TITLE, (table,), numbers)

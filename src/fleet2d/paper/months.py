@@ -1,20 +1,21 @@
-"""What the results share: the month that is lived, studies of months, and intervals."""
+"""Code shared by the results: the scenario of a month, studies of months, and intervals."""
 
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fleet2d.errors import ComponentError
+from fleet2d.studies import driver
+from fleet2d.studies.intervals import estimate
+from fleet2d.studies.local import LocalExecutor
+from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.record import VariantRecord
+from fleet2d.studies.results import Counts
 
-if TYPE_CHECKING:
-    from fleet2d.studies.reader import Study
-    from fleet2d.studies.record import Record
-    from fleet2d.studies.results import Counts
-
-# What is told of progress: what is being done, how much of it is done, and of how much.
-Tell = Callable[[str, int, int], None]
+OnProgress = Callable[[str, int, int], None]
+"""A function that receives progress: the name of the phase, the finished steps, and all steps."""
 
 CAMERA = {"range": [0.3, 4.5], "angle_deg": 108, "detection": 0.95}
 USER = "ana"
@@ -23,17 +24,17 @@ SEED = 4
 
 
 @dataclass(frozen=True)
-class Request:
-    """How large the results shall be.
+class PaperOptions:
+    """The size of the results.
 
     Attributes:
-        quick: Whether small versions will do, to see that everything works.
-        seeds: How many months of each kind (runs of each row of the speed table); None: as many as
-            the result wants.
-        days: Days of a month; None: 30, or a few of a quick one.
-        workers: Processes at a time; results don't depend on it.
-        map: A map of a real home, for the table of speed.
-        folder: Where the studies of months are kept; None: in a temporary folder.
+        quick: Whether to make small versions, to see that everything works.
+        seeds: The number of months of each kind (runs of each row of the speed table); None: the
+            default of the result.
+        days: The days of a month; None: 30, or a few if `quick`.
+        workers: The number of worker processes; results don't depend on it.
+        map: The map of a real home, for the speed table.
+        folder: The folder of the studies; None: a temporary folder.
     """
 
     quick: bool = False
@@ -44,14 +45,15 @@ class Request:
     folder: Path | None = None
 
     def size(self, seeds: int, days: int, quick_seeds: int, quick_days: int) -> tuple[int, int]:
-        """Return how many months and of how many days, asked for or else usual.
+        """Return the number of months and their days: as requested, else the defaults.
 
         Example:
-            >>> Request(quick=True, days=3).size(30, 30, 2, 5)
+            >>> PaperOptions(quick=True, days=3).size(30, 30, 2, 5)
             (2, 3)
         """
-        usual = (quick_seeds, quick_days) if self.quick else (seeds, days)
-        return self.seeds or usual[0], self.days or usual[1]
+        if self.quick:
+            seeds, days = quick_seeds, quick_days
+        return self.seeds or seeds, self.days or days
 
 
 def month(
@@ -61,13 +63,13 @@ def month(
     metrics: Mapping[str, Any],
     days: int = 30,
 ) -> dict[str, Any]:
-    """Return the scenario of a month in the bundled home: one person, who works outside.
+    """Return the scenario of a month in the bundled home with one person, who works outside.
 
     Args:
-        robot: What the robot astro does; None: there is no robot.
-        algorithms: What learns.
-        metrics: What measures.
-        days: How long it lasts.
+        robot: The settings of the robot astro; None: there is no robot.
+        algorithms: The section `algorithms`.
+        metrics: The section `metrics`.
+        days: The duration [days].
     """
     return {
         "simulation": {"start": START, "duration": {"days": days}, "seed": SEED},
@@ -79,68 +81,62 @@ def month(
     }
 
 
-def run_study(name: str, content: Mapping[str, Any], request: Request, tell: Tell) -> "Study":
-    """Run a study of months and open it; where results are kept, it goes on where it stopped.
+def run_study(
+    name: str, content: Mapping[str, Any], options: PaperOptions, on_progress: OnProgress
+) -> Study:
+    """Run a study of months and open it; an interrupted study in a folder continues.
 
     Args:
-        name: What the study is called.
-        content: The study, as a study file has it.
-        request: How many processes, and where to keep it.
-        tell: Told of progress.
+        name: The name of the study.
+        content: The content of the study file.
+        options: The number of processes, and the folder.
+        on_progress: Receives the progress.
 
     Raises:
         InputError: The folder holds results of other code; or polars or scipy is missing.
     """
-    from fleet2d.studies.driver import RunOptions, check_study, run_study
-    from fleet2d.studies.local import LocalExecutor
-    from fleet2d.studies.reader import open_study
-
-    checked = check_study({"name": name, **content})
-    options = RunOptions(fail_fast=True, changed="redo", observer=_Progress(tell))
-    folder = request.folder or Path(tempfile.mkdtemp(prefix="fleet2d-paper-"))
-    counts = run_study(checked, folder / name, LocalExecutor(request.workers), options)
+    checked = driver.check_study({"name": name, **content})
+    observer = _ProgressObserver(on_progress)
+    run_options = driver.RunOptions(fail_fast=True, changed="redo", observer=observer)
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="fleet2d-paper-"))
+    counts = driver.run_study(checked, folder / name, LocalExecutor(options.workers), run_options)
     study = open_study(folder / name)
     if counts.failed:
         raise ComponentError(f"a month failed: {study.failures['error'][0]}")
     return study
 
 
-class _Progress:
-    """Passes on how a study goes on."""
+class _ProgressObserver(driver.Observer):
+    """Reports the progress of a study: its homes, then its months."""
 
-    def __init__(self, tell: Tell) -> None:
-        self._tell, self._done, self._total = tell, 0, 0
+    def __init__(self, on_progress: OnProgress) -> None:
+        self._report, self._finished, self._total = on_progress, 0, 0
 
-    def note(self, text: str) -> None:
-        """Pass on nothing."""
+    def on_check(self, done: int, total: int) -> None:
+        """Report the number of checked homes."""
+        self._report("homes", done, total)
 
-    def checked(self, done: int, total: int) -> None:
-        """Pass on how many homes are checked."""
-        self._tell("homes", done, total)
+    def on_start(self, counts: Counts, workers: int) -> None:
+        """Report the number of months that are complete."""
+        self._finished, self._total = counts.complete, counts.total
+        self._report("months", self._finished, self._total)
 
-    def began(self, counts: "Counts", workers: int) -> None:
-        """Pass on how many months there are."""
-        self._done, self._total = counts.complete, counts.total
-        self._tell("months", self._done, self._total)
-
-    def ended(self, record: "Record") -> None:
-        """Pass on one more month."""
-        self._done += 1
-        self._tell("months", self._done, self._total)
+    def on_result(self, record: VariantRecord) -> None:
+        """Report one more month."""
+        self._finished += 1
+        self._report("months", self._finished, self._total)
 
 
-def silent(what: str, done: int, of: int) -> None:
-    """Be told of progress, and tell nobody."""
+def ignore_progress(phase: str, done: int, total: int) -> None:
+    """Receive progress and do nothing."""
 
 
 def interval(values: Iterable[float]) -> tuple[float, float, float]:
-    """Return the mean, and the ends of its 95 % interval over months; the same at each call.
+    """Return the mean of values and the ends of its 95 % interval.
 
     Example:
         >>> interval([0.5, 0.5, 0.5])
         (0.5, 0.5, 0.5)
     """
-    from fleet2d.studies.intervals import estimate
-
-    found = estimate(list(values))
-    return found.mean, found.low, found.high
+    mean = estimate(list(values))
+    return mean.mean, mean.low, mean.high

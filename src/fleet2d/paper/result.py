@@ -1,4 +1,4 @@
-"""A result: tables to print, and the numbers behind them to keep."""
+"""A result: tables to print, and all numbers behind them."""
 
 import json
 from collections.abc import Mapping
@@ -8,18 +8,18 @@ from typing import Any
 
 from fleet2d.errors import InputError
 
-PAPER_COLUMN = "the paper's"  # the head of what others measured
+PAPER_COLUMN = "the paper's"  # heading of the column of the paper's own figures
 
 
 @dataclass(frozen=True)
 class Table:
-    """One table, its cells as they are printed.
+    """One table, with its cells as text.
 
     Attributes:
-        title: What it shows, with units.
-        columns: Heads of the columns.
-        rows: The cells.
-        notes: What is to be said below it.
+        title: Its title, with units.
+        columns: The headings of its columns.
+        rows: Its cells.
+        notes: Notes to print below it.
     """
 
     title: str
@@ -30,13 +30,13 @@ class Table:
 
 @dataclass(frozen=True)
 class Result:
-    """One result of the paper, measured anew.
+    """One result of the paper, measured again.
 
     Attributes:
-        name: As on the command line.
-        title: What it is.
-        tables: To print.
-        numbers: All of it, of each single run; JSON.
+        name: Its name on the command line.
+        title: Its title.
+        tables: Its tables.
+        numbers: The numbers of every single run, as JSON data.
     """
 
     name: str
@@ -45,10 +45,10 @@ class Result:
     numbers: Mapping[str, Any] = field(default_factory=dict)
 
     def save(self, directory: Path) -> Path:
-        """Write the numbers to `NAME.json` in a directory; return the file.
+        """Write the numbers to `NAME.json` in a directory; return the path.
 
         Raises:
-            InputError: It can't be written.
+            InputError: The file can't be written.
         """
         from fleet2d.version import __version__
 
@@ -64,21 +64,21 @@ class Result:
 
 
 def make_directory(directory: Path) -> None:
-    """Make the directory for results, if there is none.
+    """Create the directory for results, if there is none.
 
     Raises:
-        InputError: It can't be made.
+        InputError: It can't be created.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{directory} can't be made: {error.strerror}; name another directory by --out"
+            f"{directory} can't be created: {error.strerror}; name another directory by --out"
         ) from error
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number of things in words.
+    """Return a number with its noun.
 
     Example:
         >>> counted(1, "day"), counted(30, "day")

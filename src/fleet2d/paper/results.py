@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 
 from fleet2d.errors import InputError
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
-from fleet2d.paper.months import Request, Tell
+from fleet2d.paper.months import OnProgress, PaperOptions
 from fleet2d.paper.result import Result
 from fleet2d.problems import did_you_mean
 
-RESULTS: dict[str, Callable[[Request, Tell], Result]] = {
+RESULTS: dict[str, Callable[[PaperOptions, OnProgress], Result]] = {
     speed.NAME: speed.reproduce,
     ltp_gap.NAME: ltp_gap.reproduce,
     rtp_gap.NAME: rtp_gap.reproduce,
@@ -16,14 +16,14 @@ RESULTS: dict[str, Callable[[Request, Tell], Result]] = {
 }
 
 
-def chosen(names: Sequence[str]) -> list[str]:
-    """Return the names of results that are asked for, in the order of the paper; none: all.
+def check_names(names: Sequence[str]) -> list[str]:
+    """Return the names of results in the order of the paper; all of them if `names` is empty.
 
     Raises:
         InputError: There is no such result.
 
     Example:
-        >>> chosen(["feedback", "speed"])
+        >>> check_names(["feedback", "speed"])
         ['speed', 'feedback']
     """
     for name in names:
@@ -35,15 +35,15 @@ def chosen(names: Sequence[str]) -> list[str]:
     return [name for name in RESULTS if name in names or not names]
 
 
-def reproduce(name: str, request: Request, tell: Tell) -> Result:
-    """Measure one result anew.
+def reproduce(name: str, options: PaperOptions, on_progress: OnProgress) -> Result:
+    """Repeat the measurements of one result.
 
     Args:
-        name: One of `RESULTS`.
-        request: How large.
-        tell: Told of progress.
+        name: A key of `RESULTS`.
+        options: The size.
+        on_progress: Receives the progress.
 
     Raises:
-        InputError: The map can't be read, or matplotlib is missing for what is watched.
+        InputError: The map can't be read, or matplotlib is missing, which drawing frames needs.
     """
-    return RESULTS[name](request, tell)
+    return RESULTS[name](options, on_progress)

@@ -1,15 +1,16 @@
-"""Fig. 7 right: how often the room is told right, by how long ago the user was seen.
+"""Fig. 7 right: how often the room of a user is right, by the time since the last sighting.
 
-Real-time presence by several models and by the naive guess (the room of the last sighting), scored
-every minute by bin of last-seen gap: share told right, and log loss, which is a proper score. Mean
-over seeds, each a month of another life with a robot on patrol, and its bootstrap interval.
+Real-time presence by several models and by the naive guess (the room of the last sighting) is
+scored every minute: the share of right rooms, and the log loss, which is a proper score. The result
+is the mean over seeds with its bootstrap interval; each seed is a month of another life with a
+robot on patrol.
 """
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.metrics.presence.rtp_score import ALL, GAPS
-from fleet2d.paper.months import USER, Request, Tell, interval, month, run_study
+from fleet2d.paper.months import USER, OnProgress, PaperOptions, interval, month, run_study
 from fleet2d.paper.result import Result, Table, counted
 
 if TYPE_CHECKING:
@@ -26,12 +27,13 @@ PAPER = (
 )
 
 Scores = dict[str, dict[str, dict[str, float]]]
-# By score, model and gap: mean, and ends of the interval; missing where no month has such a gap.
+"""Scores of one life: by model, gap and name of the score."""
 Means = dict[str, dict[str, dict[str, tuple[float, float, float]]]]
+"""Means with the ends of their intervals: by name of the score, model and gap."""
 
 
 def study_of(seeds: int, days: int) -> dict[str, Any]:
-    """Return the study: lives by seed, all models in each: a robot on patrol heeds none."""
+    """Return the study: one life for each seed, with all models; the patrol uses none of them."""
     base = month(
         {"type": "patrol", "order": "random", "dwell": "5 min"},
         algorithms={
@@ -53,26 +55,26 @@ def scores(study: "Study") -> list[Scores]:
 
 
 def _scores_of(row: Mapping[str, Any]) -> Scores:
-    found: Scores = {name: {} for name in (*MODELS, NAIVE)}
+    of_model: Scores = {name: {} for name in (*MODELS, NAIVE)}
     for model in MODELS:
         for gap in (*GAPS, ALL):
             prefix = f"score_{model}.{USER}.{gap}"
             if row.get(f"{prefix}.top_1") is not None:
-                found[model][gap] = {score: row[f"{prefix}.{score}"] for score in SCORES}
-    for gap in found[MODELS[0]]:
+                of_model[model][gap] = {score: row[f"{prefix}.{score}"] for score in SCORES}
+    for gap in of_model[MODELS[0]]:
         prefix = f"score_{MODELS[0]}.{USER}.{gap}"
-        found[NAIVE][gap] = {score: row[f"{prefix}.naive_{score}"] for score in SCORES}
-    return found
+        of_model[NAIVE][gap] = {score: row[f"{prefix}.naive_{score}"] for score in SCORES}
+    return of_model
 
 
-def means(found: list[Scores]) -> Means:
+def means(lives: list[Scores]) -> Means:
     """Return the mean of each score over seeds, with its interval."""
     return {
         score: {
             name: {
-                gap: interval(one[name][gap][score] for one in found if gap in one[name])
+                gap: interval(life[name][gap][score] for life in lives if gap in life[name])
                 for gap in (*GAPS, ALL)
-                if any(gap in one[name] for one in found)
+                if any(gap in life[name] for life in lives)
             }
             for name in (*MODELS, NAIVE)
         }
@@ -80,26 +82,26 @@ def means(found: list[Scores]) -> Means:
     }
 
 
-def reproduce(request: Request, tell: Tell) -> Result:
+def reproduce(options: PaperOptions, on_progress: OnProgress) -> Result:
     """Run all months; return the tables of scores."""
-    seeds, days = request.size(10, 30, 2, 3)
-    found = scores(run_study(NAME, study_of(seeds, days), request, tell))
-    by_score = means(found)
+    seeds, days = options.size(10, 30, 2, 3)
+    lives = scores(run_study(NAME, study_of(seeds, days), options, on_progress))
+    by_score = means(lives)
     tables = tuple(
         Table(
-            f"{words}; {counted(seeds, 'seed')} of {counted(days, 'day')}",
+            f"{title}; {counted(seeds, 'seed')} of {counted(days, 'day')}",
             ("model", *GAPS, ALL),
             tuple(
-                (name.replace("_", " "), *(_shown(by_gap.get(gap)) for gap in (*GAPS, ALL)))
+                (name.replace("_", " "), *(_cell(by_gap.get(gap)) for gap in (*GAPS, ALL)))
                 for name, by_gap in by_score[score].items()
             ),
             PAPER if score == "top_1" else (),
         )
-        for score, words in SCORES.items()
+        for score, title in SCORES.items()
     )
-    numbers = {"seeds": seeds, "days": days, "means": by_score, "scores": found}
+    numbers = {"seeds": seeds, "days": days, "means": by_score, "scores": lives}
     return Result(NAME, TITLE, tables, numbers)
 
 
-def _shown(value: tuple[float, float, float] | None) -> str:
+def _cell(value: tuple[float, float, float] | None) -> str:
     return "" if value is None else f"{value[0]:.3f}"

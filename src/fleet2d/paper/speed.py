@@ -1,9 +1,8 @@
-"""Section V.A: how long the paper's scenarios take, beside its own figures.
+"""Section V.A: the time of the paper's scenarios, beside its own figures.
 
-Every row is a process of its own on one core, `fleet2d run …`, that
-stores the run, and builds whatever it needs of the home itself: set-up, simulating and saving
-count. Rows that are watched are a process of their own, too. The paper's figures are from its
-authors' machine: they tell the order of magnitude.
+Every row is measured in a process of its own on one core, `fleet2d run …`, which prepares the home,
+simulates and stores the run; all of that counts. Rows that draw frames are processes of their own,
+too. The paper's figures are from its authors' machine, and show the order of magnitude only.
 """
 
 import json
@@ -21,61 +20,61 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fleet2d.errors import InputError
-from fleet2d.paper.months import Request, Tell
+from fleet2d.paper.months import OnProgress, PaperOptions
 from fleet2d.paper.result import PAPER_COLUMN, Result, Table, counted
-from fleet2d.paper.watched import FRAMES, Watching, watch
+from fleet2d.paper.watched import FRAMES, FrameSeries, time_frames
 
 NAME = "speed"
 TITLE = "Section V.A: time of the base scenario and its variants"
 PHASES = ("setup", "simulate", "save")
 CROWDS = (2, 5, 10, 20, 50)
-SOME_CROWDS = (2, 5)  # of a quick one
-NOT_TOLD = "–"
+QUICK_CROWDS = (2, 5)
+NO_FIGURE = "–"
 NOTES = (
     "the paper builds a cache of visibility once per home, 1 h for a HouseExpo plan and 6 h for a"
     " real one; here nothing is built beforehand",
-    f"{NOT_TOLD}: no figure of the paper is known",
+    f"{NO_FIGURE}: the paper has no figure",
 )
 
 
-class Told(NamedTuple):
-    """A figure of the paper, in words and as times real time, if that is known."""
+class PaperFigure(NamedTuple):
+    """A figure of the paper as text, and as simulated time over wall time if it is known."""
 
-    words: str
+    text: str
     speedup: float | None = None
 
 
-UNKNOWN = Told(NOT_TOLD)
-PAPER_BASE = Told("194 s: 45 load a prebuilt cache, 127 simulate; 13,000 x", 13_000)
-PAPER_CROWDS = {50: Told("28 min, and all memory", 30 * 86_400 / (28 * 60))}
-PAPER_WATCHED = Told("8 to 12 x", 10)
-PAPER_CACHE = Told("6 h to build the cache")
+UNKNOWN = PaperFigure(NO_FIGURE)
+PAPER_BASE = PaperFigure("194 s: 45 load a prebuilt cache, 127 simulate; 13,000 x", 13_000)
+PAPER_CROWDS = {50: PaperFigure("28 min, and all memory", 30 * 86_400 / (28 * 60))}
+PAPER_WATCHED = PaperFigure("8 to 12 x", 10)
+PAPER_CACHE = PaperFigure("6 h to build the cache")
 
 
 @dataclass(frozen=True)
-class Row:
+class SpeedRow:
     """A row of the table.
 
     Attributes:
-        case: What runs.
-        overrides: Changes to the bundled base scenario.
+        case: The name of the scenario.
+        overrides: Changes of the bundled base scenario.
         paper: The paper's figure.
-        watched: Simulated time between two frames; None: nobody watches.
+        frames: The frames to draw; None: none.
     """
 
     case: str
     overrides: tuple[str, ...] = ()
-    paper: Told = UNKNOWN
-    watched: Watching | None = None
+    paper: PaperFigure = UNKNOWN
+    frames: FrameSeries | None = None
 
 
-def rows(request: Request, days: int) -> list[Row]:
-    """Return the rows; without a real map, its row is missing."""
+def rows(options: PaperOptions, days: int) -> list[SpeedRow]:
+    """Return the rows of the table; the row of a real map is there if `options` name a map."""
     span = f"simulation.duration.days={days}"
-    found = [
-        Row("base: routine, presence, hangout", (span,), PAPER_BASE),
-        Row(f"{2 * days} days", (f"simulation.duration.days={2 * days}",)),
-        Row(
+    cases = [
+        SpeedRow("base: routine, presence, hangout", (span,), PAPER_BASE),
+        SpeedRow(f"{2 * days} days", (f"simulation.duration.days={2 * days}",)),
+        SpeedRow(
             "without robot algorithms",
             (
                 span,
@@ -84,21 +83,20 @@ def rows(request: Request, days: int) -> list[Row]:
                 "robots.astro.behaviors=[{type: patrol, dwell: 10 min}]",
             ),
         ),
-        Row("Flashlight", (span, "sight.method=flashlight")),
-        Row("visibility polygons", (span, "sight.method=visibility_polygon"), PAPER_BASE),
+        SpeedRow("Flashlight", (span, "sight.method=flashlight")),
+        SpeedRow("visibility polygons", (span, "sight.method=visibility_polygon"), PAPER_BASE),
     ]
-    found += [
-        Row(f"{count} users", (span, _people(count)), PAPER_CROWDS.get(count, UNKNOWN))
-        for count in (SOME_CROWDS if request.quick else CROWDS)
+    cases += [
+        SpeedRow(f"{count} users", (span, _people(count)), PAPER_CROWDS.get(count, UNKNOWN))
+        for count in (QUICK_CROWDS if options.quick else CROWDS)
     ]
-    if request.map is not None:
-        found.append(Row("real-world map", (span, *_home(request.map)), PAPER_CACHE))
-    for watching in FRAMES:
-        case = f"watched: a frame each {watching.words}"
-        found.append(
-            Row(case, (), PAPER_WATCHED, watching.shorter() if request.quick else watching)
-        )
-    return found
+    if options.map is not None:
+        cases.append(SpeedRow("real-world map", (span, *_home(options.map)), PAPER_CACHE))
+    for series in FRAMES:
+        case = f"watched: a frame each {series.unit}"
+        frames = series.shorter() if options.quick else series
+        cases.append(SpeedRow(case, (), PAPER_WATCHED, frames))
+    return cases
 
 
 def _people(count: int) -> str:
@@ -107,37 +105,37 @@ def _people(count: int) -> str:
 
 
 def _home(path: Path) -> tuple[str, ...]:
-    """Return the overrides by which a map is lived in.
+    """Return the overrides that set a map as the floor plan.
 
     Raises:
-        FloorPlanError: It can't be read.
+        FloorPlanError: The map can't be read.
     """
     from fleet2d.floorplan.load import load_floorplan
 
-    load_floorplan(path)  # or says what is wrong with it
+    load_floorplan(path)  # raises an error before any row is measured
     kind = "ros" if path.suffix.lower() in (".yaml", ".yml") else "valetudo"
     return f"floorplan.type={kind}", f"floorplan.path={path.absolute()}"
 
 
-def reproduce(request: Request, tell: Tell) -> Result:
+def reproduce(options: PaperOptions, on_progress: OnProgress) -> Result:
     """Measure all rows, one process at a time."""
-    runs, days = request.size(3, 30, 1, 2)
-    cases, measured = rows(request, days), []
+    runs, days = options.size(3, 30, 1, 2)
+    cases, results = rows(options, days), []
     with one_core():
         for number, row in enumerate(cases):
-            tell(row.case, number, len(cases))
-            measured.append(measure(row, runs))
-        tell("rows", len(cases), len(cases))
+            on_progress(row.case, number, len(cases))
+            results.append(measure(row, runs))
+        on_progress("rows", len(cases), len(cases))
     notes: tuple[str, ...] = NOTES
-    if request.quick:
+    if options.quick:
         notes += ("quick: short runs are mostly set-up",)
-    if request.map is None:
+    if options.map is None:
         notes += ("a real-world map is left out: name one by --map (a ROS or a vacuum's map)",)
     table = Table(
-        f"{counted(days, 'day')} with 1 user unless said otherwise; one core, median of"
+        f"{counted(days, 'day')} with 1 user, if not stated otherwise; one core, median of"
         f" {counted(runs, 'run')}",
         ("scenario", "ours [s]", "process [s]", "x real time", "memory", PAPER_COLUMN),
-        tuple(_cells(row, found) for row, found in zip(cases, measured, strict=True)),
+        tuple(_cells(row, result) for row, result in zip(cases, results, strict=True)),
         notes,
     )
     numbers = {
@@ -146,28 +144,28 @@ def reproduce(request: Request, tell: Tell) -> Result:
         "rows": [
             {
                 "case": row.case,
-                "paper": row.paper.words,
+                "paper": row.paper.text,
                 "paper_speedup": row.paper.speedup,
                 "overrides": list(row.overrides),
-                **found,
+                **result,
             }
-            for row, found in zip(cases, measured, strict=True)
+            for row, result in zip(cases, results, strict=True)
         ],
     }
     return Result(NAME, TITLE, (table,), numbers)
 
 
-def measure(row: Row, runs: int) -> dict[str, Any]:
-    """Return what a row takes: seconds of each run, times of real time, and memory."""
-    if row.watched is not None:
+def measure(row: SpeedRow, runs: int) -> dict[str, Any]:
+    """Measure a row: the seconds of each run, simulated over wall time, and memory [MB]."""
+    if row.frames is not None:
         try:
-            seen = [_watch_once(row.watched) for _ in range(runs)]
+            timings = [_draw_once(row.frames) for _ in range(runs)]
         except InputError as error:
             return {"failed": str(error)}
         return {
-            "frames": row.watched.frames,
-            "seconds": [one["seconds"] for one in seen],
-            "speedup": statistics.median(one["speedup"] for one in seen),
+            "frames": row.frames.count,
+            "seconds": [timing["seconds"] for timing in timings],
+            "speedup": statistics.median(timing["speedup"] for timing in timings),
         }
     results = [run_once(row.overrides) for _ in range(runs)]
     failed = next((result["failed"] for result in results if "failed" in result), None)
@@ -184,52 +182,52 @@ def measure(row: Row, runs: int) -> dict[str, Any]:
 
 
 def run_once(overrides: tuple[str, ...]) -> dict[str, Any]:
-    """Run the base scenario with some changes in a process of its own; return what it says."""
+    """Run the base scenario with changes in a process of its own; return its summary."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "fleet2d.cli", "run", *overrides, "--json", "--quiet"]
-        done = subprocess.run(  # noqa: S603 - our own command
+        process = subprocess.run(  # noqa: S603 - our own command
             [*command, "--out", str(Path(folder) / "run")],
             capture_output=True,
             text=True,
             check=False,
         )
-    if done.returncode:
-        return {"failed": done.stderr.strip().removeprefix("error: ")}
-    result: dict[str, Any] = json.loads(done.stdout)
+    if process.returncode:
+        return {"failed": process.stderr.strip().removeprefix("error: ")}
+    result: dict[str, Any] = json.loads(process.stdout)
     return result
 
 
-def _watch_once(watching: Watching) -> dict[str, float]:
-    """Watch in a process of its own."""
+def _draw_once(series: FrameSeries) -> dict[str, float]:
+    """Time the frames in a process of its own."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(watch, watching).result()
+        return pool.submit(time_frames, series).result()
 
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep this process, and those that it starts, on one core; where that can be asked for."""
+    """Pin this process and its children to one core, on systems that can."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(before)})
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
     try:
         yield
     finally:
-        os.sched_setaffinity(0, before)
+        os.sched_setaffinity(0, cores)
 
 
-def _cells(row: Row, found: dict[str, Any]) -> tuple[str, ...]:
-    if "failed" in found:
-        return row.case, "failed", "", "", "", found["failed"]
-    times, process, peak = found["seconds"], found.get("process_s"), found.get("peak_mb")
+def _cells(row: SpeedRow, result: dict[str, Any]) -> tuple[str, ...]:
+    if "failed" in result:
+        return row.case, "failed", "", "", "", result["failed"]
+    times, process, peak = result["seconds"], result.get("process_s"), result.get("peak_mb")
     middle = f"{statistics.median(times):.2f}"
     spread = f" ({min(times):.2f} to {max(times):.2f})" if len(times) > 1 else ""
     return (
         row.case,
-        f"{found['frames']} frames in {middle}" if row.watched else middle + spread,
+        f"{result['frames']} frames in {middle}" if row.frames else middle + spread,
         "" if process is None else f"{process:.2f}",
-        f"{found['speedup']:,.0f}",
+        f"{result['speedup']:,.0f}",
         "" if peak is None else f"{peak:,.0f} MB",
-        row.paper.words,
+        row.paper.text,
     )

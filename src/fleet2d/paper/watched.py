@@ -1,7 +1,7 @@
-"""Watching a run live: the simulation goes on by a frame, and the scene is drawn anew.
+"""Drawing frames of a running simulation, without a window: a frame is an array of pixels.
 
-The floor plan is drawn once and kept as pixels; a frame copies it, and draws bodies and what robots
-see on it. Nothing needs a window: a frame is an array of pixels.
+The floor plan is drawn once and stored as pixels. A frame copies it, and draws the bodies and the
+regions that robots see on it.
 """
 
 import time
@@ -21,32 +21,32 @@ SECONDS_PER_HOUR = 3600
 
 
 @dataclass(frozen=True)
-class Watching:
-    """Which frames of the bundled base scenario are drawn.
+class FrameSeries:
+    """The frames of the bundled base scenario to draw.
 
     Attributes:
-        words: Simulated time from frame to frame, in words.
-        every_s: The same [s].
-        frames: How many.
-        from_hour: The hour of the first day at which watching begins.
+        unit: The simulated time between two frames, as a noun.
+        period_s: The same [s].
+        count: The number of frames.
+        from_hour: The hour of the first day at which they start.
     """
 
-    words: str
-    every_s: int
-    frames: int
+    unit: str
+    period_s: int
+    count: int
     from_hour: int = 0
 
-    def shorter(self) -> "Watching":
-        """Return the same of few frames."""
-        return replace(self, frames=100)
+    def shorter(self) -> "FrameSeries":
+        """Return the series with 100 frames."""
+        return replace(self, count=100)
 
 
 # An evening hour, second by second; and two days, minute by minute.
-FRAMES = (Watching("second", 1, 3600, from_hour=18), Watching("minute", 60, 2880))
+FRAMES = (FrameSeries("second", 1, 3600, from_hour=18), FrameSeries("minute", 60, 2880))
 
 
 class LiveView:
-    """The home with everybody in it, redrawn as a simulation goes on.
+    """Pictures of the home with everybody in it, at the current step of a simulation.
 
     Example:
         >>> from fleet2d.engine.simulation import Simulation
@@ -58,11 +58,11 @@ class LiveView:
     """
 
     def __init__(self, simulation: "Simulation", width: int = 960) -> None:
-        """Draw what stands still.
+        """Draw the floor plan.
 
         Args:
-            simulation: What is watched.
-            width: Of the picture [pixels].
+            simulation: The simulation to draw.
+            width: The width of the picture [pixels].
 
         Raises:
             InputError: matplotlib is missing.
@@ -71,18 +71,18 @@ class LiveView:
             from matplotlib.backends.backend_agg import FigureCanvasAgg
             from matplotlib.figure import Figure
         except ImportError:
-            raise InputError('watching needs matplotlib: pip install "fleet2d[viz]"') from None
+            raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"') from None
         from fleet2d.view.floorplan import figure_size, floorplan_axes
 
         self.simulation = simulation
         plan = simulation.home.plan
-        wide, high = figure_size(plan)
-        figure = Figure(figsize=(wide, high), dpi=width / wide)
+        size = figure_size(plan)
+        figure = Figure(figsize=size, dpi=width / size[0])
         self._canvas: Any = FigureCanvasAgg(figure)
         self._axes: Any = figure.add_axes((0, 0, 1, 1))
         floorplan_axes(plan, self._axes, title=False)
         self._canvas.draw()
-        self._ground = self._canvas.copy_from_bbox(figure.bbox)
+        self._background = self._canvas.copy_from_bbox(figure.bbox)
         self._add_bodies()
 
     def _add_bodies(self) -> None:
@@ -103,19 +103,19 @@ class LiveView:
         for artist in (*self._views.values(), *self._bodies.values()):
             artist.set_animated(True)
             self._axes.add_patch(artist)
-        self._posed: dict[str, tuple[float, float, float]] = {}
+        self._poses: dict[str, tuple[float, float, float]] = {}
 
     def frame(self) -> "NDArray[np.uint8]":
-        """Return the picture of the present step: uint8 (height, width, 4), red to opacity."""
-        self._canvas.restore_region(self._ground)
+        """Return the picture of the current step: RGBA, uint8 (height, width, 4)."""
+        self._canvas.restore_region(self._background)
         state = self.simulation.state
         for name, view in self._views.items():
-            now = state[name]
-            pose = (now["x"], now["y"], now["heading"])
-            if self._posed.get(name) != pose:  # what stands sees the same
-                self._posed[name] = pose
+            robot = state[name]
+            pose = (robot["x"], robot["y"], robot["heading"])
+            if self._poses.get(name) != pose:  # the region changes with the pose only
+                self._poses[name] = pose
                 view.set_xy(self._outline(name, *pose))
-            if not now["away"]:
+            if not robot["away"]:
                 self._axes.draw_artist(view)
         for name, body in self._bodies.items():
             if not state[name]["away"]:
@@ -125,7 +125,7 @@ class LiveView:
         return pixels
 
     def _outline(self, name: str, x: float, y: float, heading: float) -> "NDArray[np.float64]":
-        """Return the largest piece of what a robot's camera sees: float64 (n, 2) [m]."""
+        """Return the outline of the largest visible part, float64 (n, 2) [m]."""
         import shapely
 
         from fleet2d.view.life import field_of_view
@@ -134,38 +134,38 @@ class LiveView:
         camera = self.simulation.scenario.robots[name].camera
         assert camera is not None
         lens = {"range": camera.range, "angle_deg": camera.angle_deg}
-        seen = field_of_view(_Standing(home), np.array([x, y]), heading, lens)
-        pieces = shapely.get_parts(seen).tolist()
-        if not pieces:
+        region = field_of_view(_SightHome(home), np.array([x, y]), heading, lens)
+        parts = shapely.get_parts(region).tolist()
+        if not parts:
             return np.zeros((3, 2))
-        largest = max(pieces, key=lambda piece: float(piece.area))
+        largest = max(parts, key=lambda part: float(part.area))
         outline: NDArray[np.float64] = shapely.get_coordinates(largest.exterior)
         return outline
 
 
-class _Standing:
-    """A home as sight meets it: shut doors and tall furniture count as walls."""
+class _SightHome:
+    """The walls that block sight in a home, with shut doors and tall furniture."""
 
     def __init__(self, home: Any) -> None:
         self.mesh, self.lattice = home.walls, home.plan.lattice
 
 
-def watch(watching: Watching) -> dict[str, float]:
-    """Watch the base scenario; return the seconds it took and how many times real time that is.
+def time_frames(series: FrameSeries) -> dict[str, float]:
+    """Draw frames of the base scenario; return the wall time and simulated over wall time.
 
-    Set-up and what comes before the first frame don't count.
+    Set-up and simulated time before the first frame don't count.
     """
     from fleet2d.engine.simulation import Simulation
 
-    lasts = watching.from_hour * SECONDS_PER_HOUR + watching.frames * watching.every_s
-    simulation = Simulation("bundled:base", f"simulation.duration={max(lasts, 60)} s", seed=4)
-    simulation.advance(watching.from_hour * SECONDS_PER_HOUR)
+    duration_s = series.from_hour * SECONDS_PER_HOUR + series.count * series.period_s
+    simulation = Simulation("bundled:base", f"simulation.duration={max(duration_s, 60)} s", seed=4)
+    simulation.advance(series.from_hour * SECONDS_PER_HOUR)
     view = LiveView(simulation)
     view.frame()
-    began = time.perf_counter()
-    for _ in range(watching.frames):
-        simulation.advance(watching.every_s)
+    start_s = time.perf_counter()
+    for _ in range(series.count):
+        simulation.advance(series.period_s)
         view.frame()
-    seconds = time.perf_counter() - began
+    seconds = time.perf_counter() - start_s
     simulation.finish("interrupted")
-    return {"seconds": seconds, "speedup": watching.frames * watching.every_s / seconds}
+    return {"seconds": seconds, "speedup": series.count * series.period_s / seconds}

@@ -1,21 +1,35 @@
-"""Answers from the variants of a study: paired comparisons, means, effects, shares of variance."""
+"""Statistics of the variants of a study: paired comparisons, means, effects, variance shares."""
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fleet2d.errors import InputError
 from fleet2d.problems import did_you_mean
-from fleet2d.studies.intervals import Estimate, estimate
+from fleet2d.studies.intervals import MeanEstimate, estimate
 from fleet2d.studies.parts import VARIANT
 
 if TYPE_CHECKING:
     import polars as pl
 
-FEW_UNITS = 5
+FEW_UNITS = 5  # below which intervals are called uncertain
+
+
+def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
+    """Check that a study has axes.
+
+    Raises:
+        InputError: It has no such axis.
+    """
+    for axis in axes:
+        if axis not in columns:
+            raise InputError(
+                f"the study has no axis {axis!r}{did_you_mean(axis, columns)} It has:"
+                f" {', '.join(columns)}"
+            )
 
 
 def paired(
@@ -34,7 +48,7 @@ def paired(
         metric: The number to compare.
         against: The axis and its reference value.
         by: The columns of the units: homes, people, seeds.
-        within: Axes for whose values comparisons are made one by one.
+        within: Axes with a comparison for each of their values.
 
     Raises:
         InputError: There is no such axis or value, or no pair.
@@ -42,22 +56,18 @@ def paired(
     import polars as pl
 
     ((axis, reference),) = against.items()
-    for column in (axis, *within):
-        if column not in columns:
-            raise InputError(
-                f"the study has no axis {column!r}{did_you_mean(column, columns)} It has:"
-                f" {', '.join(columns)}"
-            )
+    check_axes((axis, *within), columns)
     values = frame.get_column(axis).unique(maintain_order=True).drop_nulls().to_list()
     if reference not in values:
         raise InputError(
             f"no variant with {metric} has {axis} = {reference!r}{did_you_mean(reference, values)}"
             f" There are: {', '.join(map(str, values))}"
         )
-    base = frame.filter(pl.col(axis) == reference)
+    references = frame.filter(pl.col(axis) == reference)
     rows = []
     for value in (value for value in values if value != reference):
-        pairs = match_pairs(frame.filter(pl.col(axis) == value), base, columns, axis, metric)
+        group_of_value = frame.filter(pl.col(axis) == value)
+        pairs = match_pairs(group_of_value, references, columns, axis, metric)
         groups = pairs.partition_by(list(within), as_dict=True) if within else {(): pairs}
         for key, group in groups.items():
             if len(group):
@@ -66,48 +76,48 @@ def paired(
     if not rows:
         raise InputError(
             f"no two variants differ by {axis} alone, one of them with {axis} = {reference!r}:"
-            " a paired comparison wants the same homes and seeds on both sides"
+            " a paired comparison needs the same homes and seeds on both sides"
         )
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
 def match_pairs(
-    mine: "pl.DataFrame",
-    base: "pl.DataFrame",
+    values: "pl.DataFrame",
+    references: "pl.DataFrame",
     columns: Sequence[str],
     axis: str,
     metric: str,
 ) -> "pl.DataFrame":
-    """Return pairs of variants that differ by an axis alone: `mine`, `base`, `difference`.
+    """Return the pairs of variants that differ by an axis alone.
 
-    An axis that applies to one side only can't be matched; its values are all paired.
+    The columns are the other axes, `metric`, `reference_metric` and `difference`. An axis that
+    applies to one side only is not matched: all of its values form pairs.
     """
     import polars as pl
 
-    others = [c for c in columns if c != axis]
-    shared = [c for c in others if mine.get_column(c).null_count() < len(mine)]
-    shared = [c for c in shared if base.get_column(c).null_count() < len(base)]
-    left = mine.select(*others, pl.col(metric).alias("mine"))
-    right = base.select(*shared, pl.col(metric).alias("base"))
-    pairs = left.join(right, on=shared, how="inner", nulls_equal=True)
-    return pairs.with_columns(difference=pl.col("mine") - pl.col("base"))
+    other_axes = [c for c in columns if c != axis]
+    keys = [c for c in other_axes if all(f[c].null_count() < len(f) for f in (values, references))]
+    pairs = values.select(*other_axes, metric=metric).join(
+        references.select(*keys, reference_metric=metric), on=keys, how="inner", nulls_equal=True
+    )
+    return pairs.with_columns(difference=pl.col("metric") - pl.col("reference_metric"))
 
 
 def _difference(pairs: "pl.DataFrame", by: Sequence[str], reference: Any) -> dict[str, Any]:
     """Return the columns of a comparison."""
-    units = by_units(pairs, by, ("mine", "base", "difference"))
-    found = estimate(units["difference"].to_numpy(), {c: units[c].to_list() for c in by})
-    mine, base = units["mine"].to_numpy(), units["base"].to_numpy()
+    units = by_units(pairs, by, ("metric", "reference_metric", "difference"))
+    difference = estimate(units["difference"].to_numpy(), {c: units[c].to_list() for c in by})
+    values, references = units["metric"].to_numpy(), units["reference_metric"].to_numpy()
     return {
-        "mean": float(mine.mean()),
-        "reference": float(base.mean()),
-        "difference": found.mean,
-        "low": found.low,
-        "high": found.high,
+        "mean": float(values.mean()),
+        "reference": float(references.mean()),
+        "difference": difference.mean,
+        "low": difference.low,
+        "high": difference.high,
         "pairs": len(pairs),
         **{f"n_{column}": units[column].n_unique() for column in by},
-        "variance_ratio": variance_ratio(mine, base),
-        "verdict": verdict(found, str(reference)),
+        "variance_ratio": variance_ratio(values, references),
+        "verdict": verdict(difference, str(reference)),
     }
 
 
@@ -121,38 +131,40 @@ def by_units(frame: "pl.DataFrame", by: Sequence[str], columns: Sequence[str]) -
     return frame.group_by(list(by), maintain_order=True).agg(means)
 
 
-def variance_ratio(mine: Any, base: Any) -> float:
-    """Return how many times the variance of a difference is less because it is taken in pairs.
+def variance_ratio(values: Any, references: Any) -> float:
+    """Return the variance of unpaired differences over that of paired differences.
 
     >>> variance_ratio([1.0, 2.0, 4.0], [1.1, 2.2, 4.0]) > 10
     True
     """
-    left, right = np.asarray(mine, np.float64), np.asarray(base, np.float64)
-    if len(left) < 2:
+    first, second = np.asarray(values, np.float64), np.asarray(references, np.float64)
+    if len(first) < 2:
         return math.nan
-    unpaired = float(left.var(ddof=1) + right.var(ddof=1))
-    differences = float((left - right).var(ddof=1))
+    unpaired = float(first.var(ddof=1) + second.var(ddof=1))
+    differences = float((first - second).var(ddof=1))
     return unpaired / differences if differences > 0 else math.inf
 
 
-def verdict(found: Estimate, reference: str) -> str:
-    """Return in words what a difference shows, and how many replicates would show more."""
-    units = found.spread.units
-    if math.isnan(found.low):
-        return "one pair only: nothing can be told; run it with more seeds and homes"
+def verdict(difference: MeanEstimate, reference: str) -> str:
+    """Return in words what a difference shows, or how many more replicates are needed."""
+    units = difference.spread.units
+    if math.isnan(difference.low):
+        return "one pair only: no interval; run the study with more seeds and homes"
     few = [f"{n} values of {level}" for level, n in units.items() if n < FEW_UNITS]
     caution = f"; few replicates: {', '.join(few)}" if few else ""
-    if found.low == found.high == 0:
+    if difference.low == difference.high == 0:
         return f"the same as {reference} in every pair"
-    if found.is_clear:
-        way = "above" if found.mean > 0 else "below"
-        return f"{way} {reference}{caution}"
-    needed = found.needed()
-    ways = [f"{n} values of {level} (now {units[level]})" for level, n in needed.items()]
-    if not ways:
-        ways = ["many more of " + " and of ".join(units)]
+    if difference.is_clear:
+        side = "above" if difference.mean > 0 else "below"
+        return f"{side} {reference}{caution}"
+    needed = [
+        f"{n} values of {level} (now {units[level]})" for level, n in difference.needed().items()
+    ]
+    if not needed:
+        needed = ["many more of " + " and of ".join(units)]
     return (
-        f"too few replicates to tell: a difference of this size would show with {' or '.join(ways)}"
+        "too few replicates to tell: a difference of this size would show with"
+        f" {' or '.join(needed)}"
     )
 
 
@@ -166,19 +178,17 @@ def summary(
     """
     import polars as pl
 
-    for axis in axes:
-        if axis not in frame.columns:
-            raise InputError(f"the study has no axis {axis!r}{did_you_mean(axis, frame.columns)}")
+    check_axes(axes, frame.columns)
     units = [column for column in by if column not in axes]
     groups = frame.partition_by(list(axes), as_dict=True) if axes else {(): frame}
     rows = []
     for key, group in groups.items():
         means = by_units(group, units, (metric,))
-        found = estimate(means[metric].to_numpy(), {c: means[c].to_list() for c in units})
+        mean = estimate(means[metric].to_numpy(), {c: means[c].to_list() for c in units})
         labels = dict(zip(axes, key, strict=True))
         spread = float(group[metric].std() or 0.0)
         rows.append(
-            {**labels, "mean": found.mean, "low": found.low, "high": found.high,
+            {**labels, "mean": mean.mean, "low": mean.low, "high": mean.high,
              "deviation": spread, "variants": len(group)}
         )  # fmt: skip
     return pl.DataFrame(rows, infer_schema_length=None)
@@ -187,27 +197,27 @@ def summary(
 def effects(
     frame: "pl.DataFrame", axes: Sequence[str], metric: str, by: Sequence[str]
 ) -> "pl.DataFrame":
-    """Return for each value of each axis how far its mean is from the mean of all values.
+    """Return for each value of each axis the difference of its mean to the mean of all values.
 
-    The difference is taken within each unit, so that what homes and lives have in common is out.
+    Differences are taken within units, so that differences between homes and lives don't count.
     """
     import polars as pl
 
     rows = []
     for axis in axes:
-        known = frame.filter(pl.col(axis).is_not_null())
-        labels = known.get_column(axis).unique(maintain_order=True).to_list()
+        applicable = frame.filter(pl.col(axis).is_not_null())
+        labels = applicable.get_column(axis).unique(maintain_order=True).to_list()
         if len(labels) < 2:
             continue
-        cells = by_units(known, [*by, axis], (metric,))
-        over = list(by) or [pl.lit(0)]
-        cells = cells.with_columns(pl.col(metric) - pl.col(metric).mean().over(over))
+        cells = by_units(applicable, [*by, axis], (metric,))
+        unit = list(by) or [pl.lit(0)]
+        cells = cells.with_columns(pl.col(metric) - pl.col(metric).mean().over(unit))
         for label in labels:
-            mine = cells.filter(pl.col(axis) == label)
-            found = estimate(mine[metric].to_numpy(), {c: mine[c].to_list() for c in by})
+            units = cells.filter(pl.col(axis) == label)
+            effect = estimate(units[metric].to_numpy(), {c: units[c].to_list() for c in by})
             rows.append(
-                {"axis": axis, "value": str(label), "effect": found.mean, "low": found.low,
-                 "high": found.high}
+                {"axis": axis, "value": str(label), "effect": effect.mean, "low": effect.low,
+                 "high": effect.high}
             )  # fmt: skip
     schema = {"axis": pl.String, "value": pl.String}
     floats = dict.fromkeys(("effect", "low", "high"), pl.Float64)
@@ -215,9 +225,9 @@ def effects(
 
 
 def variance_shares(frame: "pl.DataFrame", columns: Sequence[str], metric: str) -> "pl.DataFrame":
-    """Return how much of a metric's variance goes with each axis, and with pairs beyond both.
+    """Return the share of a metric's variance by axis, and by the interaction of two axes.
 
-    The largest first. Of designs that are not balanced the shares may overlap.
+    The largest share comes first. In designs that are not balanced the shares may overlap.
     """
     import polars as pl
 
@@ -226,21 +236,21 @@ def variance_shares(frame: "pl.DataFrame", columns: Sequence[str], metric: str) 
     varying = [c for c in columns if frame[c].n_unique() > 1]
     rows: list[dict[str, Any]] = []
     if total > 0:
-        alone = {column: _between(frame, [column], metric) for column in varying}
-        rows += [{"source": c, "share": square / total} for c, square in alone.items()]
-        for one, other in itertools.combinations(varying, 2):
-            both = _between(frame, [one, other], metric) - alone[one] - alone[other]
-            cells = frame.select(one, other).n_unique()
-            if cells < len(frame):  # else it is what is left over, not an interaction
-                rows.append({"source": f"{one} × {other}", "share": max(both, 0.0) / total})
+        squares = {column: _between(frame, [column], metric) for column in varying}
+        rows += [{"source": c, "share": square / total} for c, square in squares.items()]
+        for a, b in itertools.combinations(varying, 2):
+            joint = _between(frame, [a, b], metric) - squares[a] - squares[b]
+            cells = frame.select(a, b).n_unique()
+            if cells < len(frame):  # with one variant a cell it is the residual, no interaction
+                rows.append({"source": f"{a} × {b}", "share": max(joint, 0.0) / total})
     table = pl.DataFrame(rows, schema={"source": pl.String, "share": pl.Float64})
     return table.sort("share", descending=True)
 
 
 def _between(frame: "pl.DataFrame", columns: Sequence[str], metric: str) -> float:
-    """Return the sum of squares between the cells of columns."""
+    """Return the sum of squares between the groups of equal values of columns."""
     import polars as pl
 
     cells = frame.group_by(list(columns)).agg(pl.col(metric).mean(), pl.len().alias(VARIANT))
-    grand = float(frame[metric].mean())
-    return float((cells[VARIANT] * (cells[metric] - grand) ** 2).sum())
+    mean = float(frame[metric].mean())
+    return float((cells[VARIANT] * (cells[metric] - mean) ** 2).sum())

@@ -14,8 +14,8 @@ from fleet2d.studies.jobs import FunctionJob
 from fleet2d.studies.local import LocalExecutor
 from fleet2d.studies.progress import observing
 from fleet2d.studies.reader import Study, open_study
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.studies.specification import read_specification
 
 if TYPE_CHECKING:
@@ -35,20 +35,21 @@ def study(
     fail_fast: bool = False,
     changed: Changed | None = None,
 ) -> Study:
-    """Run a study, or what is missing of it, and open it.
+    """Run the variants of a study that have no results yet, and open the study.
 
     Args:
         source: A study file, or the same as a mapping.
         out: A folder, or a location like s3://bucket/study; None: studies/NAME.
-        workers: Processes at a time; None: one per core.
-        executor: Where they run: `local`, `ray`, `serial` (in this process), or one of your own.
+        workers: The number of worker processes; None: one per core.
+        executor: Where they run: `local`, `ray`, `serial` (in this process), or an executor of your
+            own.
         fail_fast: End with the first variant that fails.
-        changed: What to do with results of other code or scenarios: `redo` or `keep`; None
-            refuses to mix them.
+        changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
+            to continue.
 
     Raises:
-        InputError: Something is wrong, or the folder holds results that don't belong.
-        ArtifactError: Results can't be written; what is finished is kept.
+        InputError: The study is wrong, or the folder holds results of another study.
+        ArtifactError: Results can't be written; stored results are kept.
 
     Example:
         >>> import fleet2d
@@ -72,33 +73,33 @@ def map_runs(
     workers: int | None = None,
     executor: ExecutorName | Executor = "local",
 ) -> list[Result]:
-    """Run scenarios in processes of their own, and return what a function makes of each run.
+    """Run scenarios in worker processes, and return the result of a function for each run.
 
     Args:
-        function: Called with each run where it was run; what it returns is sent back. A function
-            of a script or a notebook, or a lambda, wants the package cloudpickle.
+        function: Called with each run in its worker process; its result is sent back. A lambda or a
+            function of a script or notebook needs the package cloudpickle.
         scenarios: The scenarios, as `fleet2d.run` takes them, each with a seed.
-        workers: Processes at a time; None: one per core.
-        executor: Where they run.
+        workers: The number of worker processes; None: one per core.
+        executor: Where they run, as for `study`.
 
     Returns:
         The results in the order of the scenarios.
 
     Raises:
-        InputError: A scenario is wrong, or the function can't be sent.
-        Exception: What the function raises.
+        InputError: A scenario is wrong, or the function can't be sent to a worker.
+        Exception: The exception of the function, if it raises one.
 
     Example:
         >>> import fleet2d, operator
         >>> hours = [fleet2d.load_scenario("simulation.duration=1 h", seed=s) for s in range(2)]
         >>> digests = fleet2d.map_runs(operator.attrgetter("digest"), hours)  # doctest: +SKIP
     """
-    listed = tuple(_portable(scenario) for scenario in scenarios)
-    tasks = Schedule(Task(i, i, "", "") for i in range(len(listed)))
-    results: dict[int, Result] = {}
-    if not listed:
+    resolved = tuple(_resolve(scenario) for scenario in scenarios)
+    if not resolved:
         return []
-    job = FunctionJob(pickled(function), listed)
+    tasks = TaskSchedule(WorkerTask(i, i, "", "") for i in range(len(resolved)))
+    job = FunctionJob(pickled(function), resolved)
+    results: dict[int, Result] = {}
     events = make_executor(executor, workers).run(job, tasks)
     try:
         for event in events:
@@ -111,14 +112,14 @@ def map_runs(
             results[event.task.index] = value
     finally:
         events.close()
-    return [results[i] for i in range(len(listed))]
+    return [results[i] for i in range(len(resolved))]
 
 
 def make_executor(executor: ExecutorName | Executor, workers: int | None = None) -> Executor:
     """Return an executor by its name.
 
     Raises:
-        InputError: There is none of that name, or its package is missing.
+        InputError: There is no executor of that name, or its package is missing.
     """
     if not isinstance(executor, str):
         return executor
@@ -134,16 +135,16 @@ def make_executor(executor: ExecutorName | Executor, workers: int | None = None)
 
 
 def default_location(name: str) -> str:
-    """Return where a study of a name is stored: studies/NAME."""
-    plain = "".join(c if c.isalnum() or c in "_-." else "-" for c in name).strip(".-")
-    return str(Path("studies") / (plain or "study"))
+    """Return the default folder of a study: studies/NAME."""
+    stem = "".join(c if c.isalnum() or c in "_-." else "-" for c in name).strip(".-")
+    return str(Path("studies") / (stem or "study"))
 
 
 def pickled(function: Callable[..., Any]) -> bytes:
-    """Return a function as bytes that another process can read.
+    """Return a function as bytes for another process.
 
     Raises:
-        InputError: It can't be sent.
+        InputError: It can't be pickled.
     """
     is_importable = getattr(function, "__module__", "__main__") != "__main__"
     try:
@@ -162,8 +163,8 @@ def pickled(function: Callable[..., Any]) -> bytes:
     return data
 
 
-def _portable(scenario: Any) -> Any:
-    """Return a scenario as plain data, which any process reads alike."""
+def _resolve(scenario: Any) -> Any:
+    """Return a scenario as plain data, which means the same in any process."""
     from fleet2d.scenario.model import load_scenario
 
     return load_scenario(scenario).resolved()

@@ -1,4 +1,4 @@
-"""The kinds of axes of a study; each turns its keys into choices."""
+"""The kinds of axes of a study. Each turns its keys into choices."""
 
 import itertools
 import math
@@ -19,7 +19,7 @@ FLOORPLAN_SUFFIXES = (".json", ".geojson", ".yaml", ".yml")
 
 
 def _texts(value: Any) -> tuple[Any, ...]:
-    """Return one text or a list of them as a tuple; each keeps the folder it was written in."""
+    """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
     texts = (value,) if isinstance(value, str | Path) else value
     if not isinstance(texts, list | tuple) or not all(isinstance(t, str | Path) for t in texts):
         raise problem(f"found {value!r}; a text, or a list of texts, is wanted")
@@ -30,11 +30,11 @@ Texts = Annotated[Any, BeforeValidator(_texts)]
 
 
 class Axis(Settings):
-    """Base of the axes.
+    """Base class of axes.
 
     Attributes:
-        is_population: Whether its values stand for a population (homes, people), over which
-            answers take their intervals.
+        is_population: Whether its values are a sample of a population (homes, people); the
+            intervals of answers hold over populations.
     """
 
     is_population: ClassVar[bool] = False
@@ -46,18 +46,18 @@ class Axis(Settings):
     )
 
     def columns(self, name: str) -> tuple[str, ...]:
-        """Return the columns that it fills."""
+        """Return the columns of its labels."""
         return (name,)
 
     def populations(self, name: str) -> tuple[str, ...]:
-        """Return those of its columns whose values stand for a population."""
+        """Return its columns whose values are a sample of a population."""
         return self.columns(name) if self.is_population else ()
 
     def choices(self, name: str) -> list[Choice]:
-        """Return its points in order.
+        """Return its choices in order.
 
         Raises:
-            InputError: Files are missing, or a package.
+            InputError: A file or a package is missing.
         """
         raise NotImplementedError
 
@@ -87,7 +87,7 @@ class ValuesAxis(Axis):
 
 
 class RangeAxis(Axis):
-    """Numbers from one to another, by a step or so many."""
+    """Evenly spaced numbers of a range, by their step or their count."""
 
     key: str = Field(description="the key path")
     range: tuple[float, float] = Field(description="first and last number")
@@ -102,13 +102,13 @@ class RangeAxis(Axis):
         if (self.step is None) == (self.count is None):
             raise problem("give step, or count")
         if not first < last:
-            raise problem(f"found {first:g} to {last:g}; the first is to be below the last")
+            raise problem(f"found {first:g} to {last:g}; the first must be below the last")
         if self.log and (first <= 0 or self.count is None):
-            raise problem("log wants a count, and numbers above 0")
+            raise problem("log needs a count, and numbers above 0")
         return self
 
     def numbers(self) -> list[float]:
-        """Return the numbers, without the noise of binary fractions.
+        """Return the numbers, rounded so that 0.1 + 0.2 is 0.3.
 
         >>> RangeAxis(key="a.b", range=(0.1, 0.5), step=0.2).numbers()
         [0.1, 0.3, 0.5]
@@ -126,8 +126,8 @@ class RangeAxis(Axis):
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each number; whole numbers stay whole."""
         numbers = self.numbers()
-        whole = all(number.is_integer() for number in numbers)
-        values: list[Any] = [int(number) if whole else number for number in numbers]
+        are_whole = all(number.is_integer() for number in numbers)
+        values: list[Any] = [int(number) if are_whole else number for number in numbers]
         path = key_path(self.key)
         return [
             Choice({name: value}, ((path, f"{value!r} {self.unit}" if self.unit else value),))
@@ -146,7 +146,7 @@ class OptionsAxis(Axis):
     )
 
     def populations(self, name: str) -> tuple[str, ...]:
-        """Return its column if its options stand for a population."""
+        """Return its column if its options are a sample of a population."""
         return (name,) if self.population else ()
 
     def choices(self, name: str) -> list[Choice]:
@@ -168,7 +168,7 @@ class FloorplansAxis(Axis):
     )
 
     def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each floor plan, called by its file's name.
+        """Return a choice for each floor plan; its label is the name of its file.
 
         Raises:
             ScenarioError: There is no such file, or one is no floor plan.
@@ -186,8 +186,8 @@ class FloorplansAxis(Axis):
         files: list[Path] = []
         for pattern in self.floorplans:
             path = folder_of(pattern) / Path(pattern).expanduser()
-            found = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
-            plans = sorted(p for p in found if p.suffix.lower() in FLOORPLAN_SUFFIXES)
+            candidates = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
+            plans = sorted(p for p in candidates if p.suffix.lower() in FLOORPLAN_SUFFIXES)
             if not plans:
                 raise ScenarioError(
                     f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"
@@ -216,7 +216,7 @@ class SyntheticAxis(Axis):
     )
 
     def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each home, called by its seed."""
+        """Return a choice for each home; its label is its seed."""
         seeds = self.synthetic
         if isinstance(seeds, int):
             seeds = tuple(range(self.first, self.first + seeds))
@@ -268,7 +268,7 @@ class SampleAxis(Axis):
         """Return a choice for each sample.
 
         Raises:
-            InputError: scipy is missing, which draws Latin hypercubes.
+            InputError: scipy is missing, which Latin hypercubes need.
         """
         choices = []
         labels = {
@@ -276,19 +276,19 @@ class SampleAxis(Axis):
             for column, p in self.sample.items()
         }
         for values in draw(self.sample, self.method, self.count, self.seed):
-            shown: dict[str, Label] = {
+            names: dict[str, Label] = {
                 column: labels[column].get(repr(value), value) for column, value in values.items()
             }
             changes = tuple(
-                (key_path(self.sample[column].key), self.sample[column].written(value))
+                (key_path(self.sample[column].key), self.sample[column].with_unit(value))
                 for column, value in values.items()
             )
-            choices.append(Choice(shown, changes))
+            choices.append(Choice(names, changes))
         return choices
 
 
 class _GroupAxis(Axis):
-    """Axes within an axis."""
+    """Base class of axes that consist of other axes."""
 
     def axes(self) -> "dict[str, Axis]":
         """Return the axes of the group."""
@@ -296,24 +296,27 @@ class _GroupAxis(Axis):
 
     def columns(self, name: str) -> tuple[str, ...]:
         """Return the columns of all of its axes."""
-        return tuple(c for inner, axis in self.axes().items() for c in axis.columns(inner))
+        return tuple(c for axis_name, axis in self.axes().items() for c in axis.columns(axis_name))
 
     def populations(self, name: str) -> tuple[str, ...]:
-        """Return the columns of its axes whose values stand for a population."""
-        return tuple(c for inner, axis in self.axes().items() for c in axis.populations(inner))
+        """Return the columns of its axes whose values are a sample of a population."""
+        return tuple(
+            c for axis_name, axis in self.axes().items() for c in axis.populations(axis_name)
+        )
 
     def _join(self, rows: Iterator[tuple[Choice, ...]]) -> list[Choice]:
+        """Return a choice for each row: the labels and changes of all its parts."""
         return [
             Choice(
-                {column: label for one in row for column, label in one.labels.items()},
-                tuple(change for one in row for change in one.changes),
+                {column: label for part in row for column, label in part.labels.items()},
+                tuple(change for part in row for change in part.changes),
             )
             for row in rows
         ]
 
 
 class ZipAxis(_GroupAxis):
-    """Axes of equal length that go hand in hand: the first with the first, and so on."""
+    """Axes of equal length in step: the first choices together, the second ones, and so on."""
 
     zip: "dict[str, AnyAxis]" = Field(min_length=1, description="the axes, by name")
 
@@ -322,20 +325,22 @@ class ZipAxis(_GroupAxis):
         return self.zip
 
     def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each place in the lists.
+        """Return a choice for each position of the axes.
 
         Raises:
             ScenarioError: The axes differ in length.
         """
-        lists = {inner: axis.choices(inner) for inner, axis in self.zip.items()}
+        lists = {axis_name: axis.choices(axis_name) for axis_name, axis in self.zip.items()}
         if len({len(choices) for choices in lists.values()}) > 1:
-            lengths = ", ".join(f"{inner} has {len(choices)}" for inner, choices in lists.items())
-            raise ScenarioError(f"the axes of a zip are to have equally many values: {lengths}")
+            lengths = ", ".join(
+                f"{axis_name} has {len(choices)}" for axis_name, choices in lists.items()
+            )
+            raise ScenarioError(f"the axes of a zip must have equally many values: {lengths}")
         return self._join(zip(*lists.values(), strict=True))
 
 
 class GridAxis(_GroupAxis):
-    """Axes of which every value meets every value; what the axes of a study do anyway."""
+    """All combinations of the values of axes, as of the axes of a study itself."""
 
     grid: "dict[str, AnyAxis]" = Field(min_length=1, description="the axes, by name")
 
@@ -345,7 +350,7 @@ class GridAxis(_GroupAxis):
 
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each combination; the last axis changes fastest."""
-        lists = (axis.choices(inner) for inner, axis in self.grid.items())
+        lists = (axis.choices(axis_name) for axis_name, axis in self.grid.items())
         return self._join(itertools.product(*lists))
 
 
@@ -360,7 +365,7 @@ KINDS: dict[str, type[Axis]] = {
     "zip": ZipAxis,
     "grid": GridAxis,
 }
-"""The axes by the key that tells them apart."""
+"""The kinds of axes by the key that only they have."""
 
 
 def _axis_of(value: Any) -> Any:
@@ -373,8 +378,8 @@ def _axis_of(value: Any) -> Any:
     if len(kinds) != 1:
         unknown = next((key for key in value if key not in ("key", "when")), "")
         hint = did_you_mean(unknown, KINDS) if not kinds else "."
-        found = " and ".join(kinds) or ", ".join(map(repr, value)) or "nothing"
-        raise problem(f"found {found}; exactly one of {', '.join(KINDS)} is wanted{hint}")
+        keys = " and ".join(kinds) or ", ".join(map(repr, value)) or "nothing"
+        raise problem(f"found {keys}; exactly one of {', '.join(KINDS)} is wanted{hint}")
     return KINDS[kinds[0]].model_validate(value)
 
 

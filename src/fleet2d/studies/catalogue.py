@@ -1,4 +1,4 @@
-"""The plan of a study on the disk: its variants by number, and their scenarios."""
+"""The stored plan of a study: its variants by number, and their scenarios."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -9,7 +9,7 @@ from fleet2d.errors import RunDirectoryError
 from fleet2d.studies.choice import Label
 from fleet2d.studies.directory import PLAN, SCENARIOS, StudyDirectory
 from fleet2d.studies.parts import VARIANT
-from fleet2d.studies.plan import Plan, PlannedVariant
+from fleet2d.studies.plan import PlannedVariant, StudyPlan
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -23,23 +23,23 @@ class ScenarioFile:
     """Collects the scenarios of combinations as a compressed Parquet file in memory."""
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Create an empty file."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         self._schema = pa.schema([("template", pa.string()), ("scenario", pa.string())])
         self._sink = pa.BufferOutputStream()
         self._writer = pq.ParquetWriter(self._sink, self._schema, compression="zstd")
-        self._rows: list[tuple[str, str]] = []
+        self._rows: list[dict[str, str]] = []
 
     def add(self, template: str, content: Mapping[str, Any]) -> None:
-        """Add a scenario; its seed does not count."""
-        self._rows.append((template, json.dumps(content)))
+        """Add the scenario of a combination, with any of its seeds."""
+        self._rows.append({"template": template, "scenario": json.dumps(content)})
         if len(self._rows) == BATCH:
             self._flush()
 
     def content(self) -> bytes:
-        """Return the file."""
+        """Close the file and return its bytes."""
         self._flush()
         self._writer.close()
         return bytes(self._sink.getvalue())
@@ -47,80 +47,79 @@ class ScenarioFile:
     def _flush(self) -> None:
         import pyarrow as pa
 
-        templates, scenarios = [row[0] for row in self._rows], [row[1] for row in self._rows]
-        self._writer.write_table(pa.table([templates, scenarios], schema=self._schema))
+        self._writer.write_table(pa.Table.from_pylist(self._rows, self._schema))
         self._rows = []
 
 
 @dataclass(frozen=True)
 class Reconciled:
-    """A plan brought together with what a study holds already.
+    """A plan matched with the stored variants of a study.
 
     Attributes:
-        plan: The plan, with the numbers that results go by.
-        new: How many variants the study didn't have.
-        set_aside: How many variants with results no longer belong to it.
+        plan: The plan, with the numbers of stored variants.
+        new: The number of variants that the study didn't have.
+        set_aside: The number of stored results that no longer belong to it.
     """
 
-    plan: Plan
+    plan: StudyPlan
     new: int
     set_aside: int
 
 
 def reconcile(
-    plan: Plan,
+    plan: StudyPlan,
     directory: StudyDirectory,
     finished: Iterable[int],
     changed: Changed | None,
 ) -> Reconciled:
-    """Give variants the numbers that they have in a study already.
+    """Number the variants of a plan as in the stored study; new variants get new numbers.
 
     Args:
-        plan: The plan as it is now.
+        plan: The current plan.
         directory: The study.
         finished: Numbers of the variants with results.
         changed: What to do with results of other code, inputs or scenarios.
 
     Raises:
-        RunDirectoryError: There are such results, and nobody said what to do.
+        RunDirectoryError: There are such results, and `changed` is None.
     """
     try:
-        old = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
+        stored = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
     except FileNotFoundError:
         return Reconciled(plan, len(plan.variants), 0)
-    numbers = {row["identity"]: row[VARIANT] for row in old}
+    numbers = {row["identity"]: row[VARIANT] for row in stored}
     present = {variant.identity for variant in plan.variants}
     with_results = set(finished)
     stale = {
         row["scenario"]: row
-        for row in old
+        for row in stored
         if row["identity"] not in present and row[VARIANT] in with_results
     }
     recomputed = [v for v in plan.variants if v.identity not in numbers and v.scenario in stale]
     if stale and changed is None:
         raise RunDirectoryError(_refusal(directory.location, len(recomputed), len(stale)))
-    following = max(numbers.values(), default=-1) + 1
+    next_number = max(numbers.values(), default=-1) + 1
     variants: list[PlannedVariant] = []
-    kept = 0
+    reused = 0
     for variant in plan.variants:
         if variant.identity in numbers:
             variants.append(replace(variant, number=numbers[variant.identity]))
         elif changed == "keep" and variant.scenario in stale:
             row = stale[variant.scenario]
             variants.append(replace(variant, number=row[VARIANT], identity=row["identity"]))
-            kept += 1
+            reused += 1
         else:
-            variants.append(replace(variant, number=following))
-            following += 1
+            variants.append(replace(variant, number=next_number))
+            next_number += 1
     new = sum(variant.identity not in numbers for variant in variants)
-    return Reconciled(Plan(plan.design, tuple(variants)), new, len(stale) - kept)
+    return Reconciled(StudyPlan(plan.design, tuple(variants)), new, len(stale) - reused)
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:
-    other = stale - recomputed
+    removed = stale - recomputed
     causes = [
         f"{recomputed} of the same scenarios, by other code or input files" * bool(recomputed),
-        f"{other} of scenarios that the study no longer has" * bool(other),
+        f"{removed} of scenarios that the study no longer has" * bool(removed),
     ]
     keep = ", --changed keep leaves those of other code as they are" if recomputed else ""
     return (
@@ -130,7 +129,7 @@ def _refusal(location: str, recomputed: int, stale: int) -> str:
     )
 
 
-def plan_table(plan: Plan) -> "pa.Table":
+def plan_table(plan: StudyPlan) -> "pa.Table":
     """Return a plan as a table: a row per variant, in the order of the design."""
     import pyarrow as pa
 
@@ -146,7 +145,7 @@ def plan_table(plan: Plan) -> "pa.Table":
 
 
 def label_array(labels: list[Label]) -> "pa.Array":
-    """Return labels as a column: numbers or truth values where all are, else text.
+    """Return labels as a column: numbers or booleans if all labels are, else text.
 
     >>> label_array([1, 2.5]).type, label_array([1, "a"]).to_pylist()
     (DataType(double), ['1', 'a'])
@@ -161,7 +160,9 @@ def label_array(labels: list[Label]) -> "pa.Array":
     return pa.array([None if label is None else str(label) for label in labels], pa.string())
 
 
-def write_catalogue(directory: StudyDirectory, plan: Plan, scenarios: Callable[[], bytes]) -> None:
+def write_catalogue(
+    directory: StudyDirectory, plan: StudyPlan, scenarios: Callable[[], bytes]
+) -> None:
     """Write the plan and the scenarios of a study."""
     directory.storage.write(SCENARIOS, scenarios())
     directory.write_table(PLAN, plan_table(plan))

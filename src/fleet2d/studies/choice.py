@@ -1,4 +1,4 @@
-"""What an axis offers: choices, each with its label by column and what it changes."""
+"""The choices of an axis: the labels of each, and its changes of the scenario."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,16 +8,16 @@ from fleet2d.document import Keys
 from fleet2d.errors import ScenarioError
 
 Label = str | int | float | bool | None
-"""What a variant is called along one axis; None where the axis does not apply."""
+"""The name of a choice in tables and messages; None where the axis does not apply."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One point of an axis.
+    """One value of an axis.
 
     Attributes:
-        labels: Its label by column; an axis has a column of its name, a group one for each axis.
-        changes: What it sets in the scenario, (key path, value).
+        labels: Its label by column; an axis has one column, a group one for each of its axes.
+        changes: (key path, value) pairs that it sets in the scenario.
     """
 
     labels: Mapping[str, Label]
@@ -25,7 +25,7 @@ class Choice:
 
     @property
     def words(self) -> str:
-        """Return the choice as messages write it.
+        """The choice as messages name it.
 
         >>> Choice({"speed": 0.3, "robot": "slow"}).words
         'speed = 0.3, robot = slow'
@@ -52,8 +52,7 @@ def label_values(values: Sequence[Any]) -> list[Label]:
     ([0.3, 'fast'], ['patrol', 'hangout'])
     """
     labels = [_own_label(value) for value in values]
-    named = [label for label in labels if label is not None]
-    if len(named) == len(values) and len({repr(label) for label in named}) == len(values):
+    if None not in labels and len({repr(label) for label in labels}) == len(values):
         return labels
     if all(value is None or isinstance(value, str | int | float) for value in values):
         return ["none" if label is None else label for label in labels]

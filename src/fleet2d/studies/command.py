@@ -15,7 +15,7 @@ from fleet2d.errors import InputError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
 
 if TYPE_CHECKING:
-    from fleet2d.studies.driver import Checked
+    from fleet2d.studies.driver import CheckedStudy
     from fleet2d.studies.reader import Study
 
 studying = typer.Typer(
@@ -26,9 +26,9 @@ Workers = Annotated[
     int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
-SHOWN = 10
+MOST_LINES = 10  # of a list that is printed
 IDENTITY_START = 6
-"""Characters of an identity that name a variant; fewer digits are its number."""
+"""The fewest characters of an identity that name a variant."""
 
 
 @studying.command()
@@ -57,7 +57,7 @@ def run(  # noqa: PLR0913 - options of the command line
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Run a study, or what is missing of it."""
+    """Run the variants of a study that have no results yet."""
     from fleet2d.studies.api import default_location, make_executor
     from fleet2d.studies.driver import RunOptions, check_study, run_study
     from fleet2d.studies.progress import observing
@@ -68,7 +68,7 @@ def run(  # noqa: PLR0913 - options of the command line
             _print_plan(checked, workers)
             return
     location = out or default_location(checked.specification.name)
-    gc.freeze()  # what is loaded lives to the end, which comes at once then
+    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     with _terminated_as_interrupted(), restricting(trust, trust_dir):
         try:
             with observing(show=sys.stderr.isatty() and not quiet) as observer:
@@ -95,7 +95,7 @@ def status(
     location: Where,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Print how far a study is, also while it is being run."""
+    """Print the progress of a study, even while it is being run."""
     from fleet2d.studies.directory import StudyDirectory
     from fleet2d.studies.results import count
 
@@ -123,25 +123,25 @@ def rerun(
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Run one variant again, and compare it with what is stored."""
+    """Run one variant again, and compare its digest with the stored one."""
     from fleet2d.studies.reader import open_study
 
     study = open_study(location)
     number = _number_of(study, variant)
     rows = study.arrow_variants.select(["variant", "digest", *study.columns]).to_pylist()
-    stored = next(row for row in rows if row["variant"] == number)
-    words = ", ".join(f"{c} = {stored[c]}" for c in study.columns if stored[c] is not None)
-    typer.echo(f"variant {number}: {words}")
+    row = next(row for row in rows if row["variant"] == number)
+    labels = ", ".join(f"{c} = {row[c]}" for c in study.columns if row[c] is not None)
+    typer.echo(f"variant {number}: {labels}")
     with restricting(trust, trust_dir):
-        found = study.rerun(number, out)
+        repeated = study.rerun(number, out)
     if out is not None:
         typer.echo(f"stored in {out}")
-    if stored["digest"] is None:
-        typer.echo(f"digest {found.digest}; the study has none of it")
-    elif found.digest == stored["digest"]:
-        typer.echo(f"reproduced: digest {found.digest}")
+    if row["digest"] is None:
+        typer.echo(f"digest {repeated.digest}; the study has no digest of this variant")
+    elif repeated.digest == row["digest"]:
+        typer.echo(f"reproduced: digest {repeated.digest}")
     else:
-        typer.echo(f"not reproduced: {found.digest} instead of {stored['digest']}", err=True)
+        typer.echo(f"not reproduced: {repeated.digest} instead of {row['digest']}", err=True)
         raise typer.Exit(1)
 
 
@@ -157,12 +157,14 @@ def report(
     from fleet2d.studies.report import write_report
 
     if out is None and "://" in location:
-        raise InputError("a study in a store wants --out for its report: a local folder")
+        raise InputError(
+            "give --out, a local folder for the report: the study is in a remote store"
+        )
     typer.echo(write_report(open_study(location), out or Path(location) / "report"))
 
 
-def _print_plan(checked: "Checked", workers: int | None) -> None:
-    """Print the axes, the first variants, and what they will take."""
+def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
+    """Print the axes, the first variants, and the time that all will take."""
     from fleet2d.studies.execution import cores
     from fleet2d.studies.forecast import forecast
     from fleet2d.studies.local import LocalExecutor
@@ -173,14 +175,14 @@ def _print_plan(checked: "Checked", workers: int | None) -> None:
     count = workers or cores()
     check_setups(plan, LocalExecutor(count))
     for column, labels in plan.design.labels.items():
-        shown = ", ".join(map(str, labels[:SHOWN]))
-        more = f", … {len(labels)} in all" if len(labels) > SHOWN else ""
-        typer.echo(f"{column}: {shown}{more}")
+        values = ", ".join(map(str, labels[:MOST_LINES]))
+        more = f", … {len(labels)} in all" if len(labels) > MOST_LINES else ""
+        typer.echo(f"{column}: {values}{more}")
     typer.echo("")
-    for variant in plan.variants[:SHOWN]:
+    for variant in plan.variants[:MOST_LINES]:
         typer.echo(f"  {plan.design.describe(variant.index)}")
-    if len(plan.variants) > SHOWN:
-        typer.echo(f"  … {len(plan.variants) - SHOWN} more")
+    if len(plan.variants) > MOST_LINES:
+        typer.echo(f"  … {len(plan.variants) - MOST_LINES} more")
     expected = forecast(plan)
     typer.echo(
         f"\n{len(plan.variants)} variants, {len({v.home_key for v in plan.variants})} homes,"
@@ -194,40 +196,40 @@ def _print_failures(location: str) -> None:
 
     table = open_study(location).arrow_variants.select(["variant", "status", "error"])
     failed = [row for row in table.to_pylist() if row["status"] == "failed"]
-    for row in failed[:SHOWN]:
+    for row in failed[:MOST_LINES]:
         typer.echo(f"variant {row['variant']} failed: {row['error']}", err=True)
-    if len(failed) > SHOWN:
-        typer.echo(f"… {len(failed) - SHOWN} more", err=True)
+    if len(failed) > MOST_LINES:
+        typer.echo(f"… {len(failed) - MOST_LINES} more", err=True)
 
 
 def _number_of(study: "Study", variant: str) -> int:
     table = study.arrow_variants.select(["variant", "identity"]).to_pylist()
     if variant.isdigit() and any(row["variant"] == int(variant) for row in table):
         return int(variant)
-    fitting = []
+    matches = []
     if len(variant) >= IDENTITY_START:
-        fitting = [row["variant"] for row in table if (row["identity"] or "").startswith(variant)]
-    if len(fitting) != 1:
+        matches = [row["variant"] for row in table if (row["identity"] or "").startswith(variant)]
+    if len(matches) != 1:
         raise InputError(
-            f"{study.location} has {len(fitting) or 'no'} variant{'s' * (len(fitting) > 1)}"
+            f"{study.location} has {len(matches) or 'no'} variant{'s' * (len(matches) > 1)}"
             f" {variant!r}: give a number from 0 to {len(table) - 1}, or the first"
             f" {IDENTITY_START} characters or more of an identity"
         )
-    return int(fitting[0])
+    return int(matches[0])
 
 
 @contextmanager
 def _terminated_as_interrupted() -> Iterator[None]:
-    """Let SIGTERM end a study as Ctrl-C does: workers gone, finished variants kept."""
+    """Treat SIGTERM as Ctrl-C: workers end, and finished variants are kept."""
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    handler = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGTERM, handler)
 
 
 def tune(
@@ -241,7 +243,7 @@ def tune(
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Search parameters on training homes, and judge what is found on homes not seen."""
+    """Search parameters on training homes, and judge the best on other homes."""
     from fleet2d.studies.api import default_location, make_executor
     from fleet2d.studies.progress import observing_trials
     from fleet2d.studies.specification import read_specification
@@ -253,24 +255,24 @@ def tune(
     with _terminated_as_interrupted(), restricting(trust, trust_dir):
         try:
             with observing_trials(show=sys.stderr.isatty() and not quiet) as observer:
-                found = search(specification, folder, make_executor(executor, workers), observer)
+                result = search(specification, folder, make_executor(executor, workers), observer)
         except KeyboardInterrupt:
             typer.echo(f"interrupted; {folder} has what is finished: the same command goes on",
                        err=True)  # fmt: skip
             raise typer.Exit(130) from None
     if quiet:
         return
-    counts = ", ".join(f"{n} {state}" for state, n in found.trials.items())
+    counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())
     typer.echo(f"trials: {counts}; in {folder}")
-    for name, settings in found.settings.items():
-        values = ", ".join(f"{value:.4g}" for value in found.values[name])
+    for name, settings in result.settings.items():
+        values = ", ".join(f"{value:.4g}" for value in result.values[name])
         typer.echo(f"{name}: {values} on the training homes")
         for key, value in settings.items():
             typer.echo(f"  {key}={value}")
     assert specification.file.tune is not None
     for metric in specification.file.tune.objectives:
         typer.echo(f"{metric} on the homes held out:")
-        for row in found.held_out.paired(metric, {"setting": "as it was"}).to_dicts():
+        for row in result.held_out.paired(metric, {"setting": "as it was"}).to_dicts():
             interval = f"({row['low']:.4g} to {row['high']:.4g})"
             typer.echo(
                 f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"

@@ -1,5 +1,6 @@
-"""The variants of a study: which there are, and the scenario of each."""
+"""The variants of a study: their labels, and the scenario of each."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,9 +27,9 @@ class AxisPlan:
     Attributes:
         name: Its name.
         columns: The columns that it fills.
-        when: Values of other columns with which it applies.
-        choices: Its points.
-        changes: What each point changes, with the place that messages name.
+        when: Condition on the columns of earlier axes under which it applies.
+        choices: Its choices, in order.
+        changes: The scenario change of each choice, with the place that messages name.
     """
 
     name: str
@@ -40,7 +41,7 @@ class AxisPlan:
 
 @dataclass(frozen=True)
 class RulePlan:
-    """A conditional change: a condition on columns, and what it changes."""
+    """A change of the scenario for all variants that fulfil a condition on columns."""
 
     when: Mapping[str, Any]
     change: Document
@@ -48,17 +49,17 @@ class RulePlan:
 
 @dataclass(frozen=True)
 class Design:
-    """All variants of a study, each built when it is asked for; it can be pickled.
+    """All variants of a study. Scenarios are built on request; a design can be pickled.
 
     A variant is a combination of choices, and a seed. Seeds change fastest: variants of one home
-    with the same seeds stay together, and share the lives of their people.
+    with the same seeds stay together, and their users live the same lives.
 
     Attributes:
-        base: The composed base scenario, with what all variants have in common.
+        base: The composed base scenario, with the changes that all variants share.
         folder: The folder of the study file.
         axes: The axes.
         rules: Conditional changes.
-        exclude: Combinations that are left out.
+        exclude: Conditions on columns; combinations that fulfil one are left out.
         seeds: The seeds of each combination.
     """
 
@@ -72,7 +73,7 @@ class Design:
     @cached_property
     def combinations(self) -> list[tuple[int, ...]]:
         """The index of the choice on each axis, by combination; -1 where an axis doesn't apply."""
-        return list(self._combined((), {}))
+        return list(self._extend((), {}))
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -82,12 +83,12 @@ class Design:
     @property
     def labels(self) -> dict[str, list[Label]]:
         """The labels of each column, in order."""
-        found: dict[str, list[Label]] = {}
-        for axis in self.axes:
-            for column in axis.columns:
-                labels = (choice.labels[column] for choice in axis.choices)
-                found[column] = list(dict.fromkeys(labels))
-        return {**found, SEED: list(self.seeds)}
+        labels: dict[str, list[Label]] = {
+            column: list(dict.fromkeys(choice.labels[column] for choice in axis.choices))
+            for axis in self.axes
+            for column in axis.columns
+        }
+        return {**labels, SEED: list(self.seeds)}
 
     def __len__(self) -> int:
         """Return the number of variants."""
@@ -102,7 +103,7 @@ class Design:
         """Build and check the scenario of a variant.
 
         Raises:
-            ScenarioError: What is wrong; the message names the axis and the value.
+            ScenarioError: The scenario is wrong; the message names the axis and the value.
         """
         combination, seed = self._at(index)
         labels = {**self._labels(combination), SEED: seed}
@@ -120,12 +121,12 @@ class Design:
 
     def describe(self, index: int) -> str:
         """Return a variant as messages call it: 'variant 3 (speed = 0.3, seed = 1)'."""
-        words = ", ".join(
+        labels = ", ".join(
             f"{column} = {label}"
             for column, label in self.parameters(index).items()
             if label is not None
         )
-        return f"variant {index} ({words})"
+        return f"variant {index} ({labels})"
 
     def _at(self, index: int) -> tuple[tuple[int, ...], int]:
         combination, seed = divmod(index, len(self.seeds))
@@ -140,21 +141,21 @@ class Design:
                 labels |= axis.choices[choice].labels
         return labels
 
-    def _combined(
-        self, begun: tuple[int, ...], labels: Mapping[str, Label]
+    def _extend(
+        self, prefix: tuple[int, ...], labels: Mapping[str, Label]
     ) -> Iterator[tuple[int, ...]]:
-        """Yield the combinations that begin so, the last axis changing fastest."""
-        if len(begun) == len(self.axes):
+        """Yield the combinations that start with a prefix, the last axis changing fastest."""
+        if len(prefix) == len(self.axes):
             if not any(matches(condition, labels) for condition in self.exclude):
-                yield begun
+                yield prefix
             return
-        axis = self.axes[len(begun)]
+        axis = self.axes[len(prefix)]
         if matches(axis.when, labels):
             for number, choice in enumerate(axis.choices):
-                yield from self._combined((*begun, number), {**labels, **choice.labels})
+                yield from self._extend((*prefix, number), {**labels, **choice.labels})
         else:
-            without = {**labels, **dict.fromkeys(axis.columns)}
-            yield from self._combined((*begun, NOT_APPLICABLE), without)
+            empty = dict.fromkeys(axis.columns)
+            yield from self._extend((*prefix, NOT_APPLICABLE), {**labels, **empty})
 
 
 def matches(condition: Mapping[str, Any], labels: Mapping[str, Label]) -> bool:
@@ -163,23 +164,28 @@ def matches(condition: Mapping[str, Any], labels: Mapping[str, Label]) -> bool:
     >>> matches({"robot": ["patrol", "hangout"]}, {"robot": "hangout", "speed": 0.3})
     True
     """
-    for column, wanted in condition.items():
-        values = wanted if isinstance(wanted, list | tuple) else [wanted]
-        if not any(same_label(labels.get(column), value) for value in values):
-            return False
-    return True
+    return all(
+        any(same_label(labels.get(column), value) for value in _values(condition, column))
+        for column in condition
+    )
+
+
+def _values(condition: Mapping[str, Any], column: str) -> Sequence[Any]:
+    """Return the values of a column that a condition allows."""
+    value = condition[column]
+    return value if isinstance(value, list | tuple) else [value]
 
 
 def same_label(label: Label, value: Any) -> bool:
-    """Return whether a label is the one that is written: 1 is 1.0, but true is not 1."""
+    """Return whether a label equals a value of the study file: 1 is 1.0, but true is not 1."""
     return label == value and isinstance(label, bool) == isinstance(value, bool)
 
 
 def build_design(specification: Specification) -> Design:
-    """Turn a study into its variants; none is built yet.
+    """Turn a study into its variants, without building their scenarios.
 
     Raises:
-        ScenarioError: An axis has no values, a condition names a value that there isn't, or there
+        ScenarioError: An axis has no values, a condition names a value that no axis has, or there
             are too many variants.
     """
     file = specification.file
@@ -188,9 +194,7 @@ def build_design(specification: Specification) -> Design:
         RulePlan(rule.when, _change(rule.set.items(), _place(specification, "rules", i)))
         for i, rule in enumerate(file.rules)
     )
-    count = 1
-    for axis in axes:
-        count *= len(axis.choices)
+    count = math.prod(len(axis.choices) for axis in axes)
     if count > MOST_VARIANTS:
         raise ScenarioError(
             f"{specification.name} would have {count:,} combinations: at most {MOST_VARIANTS:,}"
@@ -210,11 +214,10 @@ def _axis_plan(specification: Specification, name: str) -> AxisPlan:
     place = specification.places.place(("axes", name))
     try:
         choices = tuple(axis.choices(name))
-        where = f", {place}" if place else ""
         changes = tuple(
             _change(
                 ((".".join(keys), value) for keys, value in choice.changes),
-                f"axis {name!r}, {choice.words}{where}",
+                f"axis {name!r}, {choice.words}{', ' * bool(place)}{place}",
             )
             for choice in choices
         )
@@ -224,7 +227,7 @@ def _axis_plan(specification: Specification, name: str) -> AxisPlan:
 
 
 def _change(changes: Any, place: str) -> Document:
-    """Return changes by key path as one."""
+    """Merge (key path, value) pairs into one change; messages name the place."""
     result = Document()
     for path, value in changes:
         result = merge(result, assignment(key_path(path), value, place))
@@ -233,8 +236,8 @@ def _change(changes: Any, place: str) -> Document:
 
 def _place(specification: Specification, *location: str | int) -> str:
     place = specification.places.place(location)
-    words = ".".join(map(str, location))
-    return f"{words}, {place}" if place else words
+    key = ".".join(map(str, location))
+    return f"{key}, {place}" if place else key
 
 
 def _check_conditions(specification: Specification, design: Design) -> None:
@@ -244,15 +247,17 @@ def _check_conditions(specification: Specification, design: Design) -> None:
         *(((("axes", axis.name, "when")), axis.when) for axis in design.axes),
         *((("rules", i, "when"), rule.when) for i, rule in enumerate(file.rules)),
         *((("exclude", i), condition) for i, condition in enumerate(file.exclude)),
-        *((("compare", i, "against"), one.against) for i, one in enumerate(file.compare)),
+        *(
+            (("compare", i, "against"), comparison.against)
+            for i, comparison in enumerate(file.compare)
+        ),
     ]
     if file.tune is not None:
         conditions.append((("tune", "held_out"), file.tune.held_out))
     for location, condition in conditions:
-        for column, wanted in condition.items():
-            values = wanted if isinstance(wanted, list | tuple) else [wanted]
+        for column in condition:
             labels = design.labels[column]
-            for value in values:
+            for value in _values(condition, column):
                 if not any(same_label(label, value) for label in labels):
                     place = specification.places.place((*location, column))
                     raise ScenarioError(
@@ -263,7 +268,7 @@ def _check_conditions(specification: Specification, design: Design) -> None:
 
 
 def _artifacts(tables: Sequence[str]) -> Document:
-    """Return the change that has runs make no tables that are not kept."""
+    """Return the change that turns off the tables that a study doesn't keep."""
     settings: dict[str, Any] = {name: name in tables for name in SWITCHES}
     if "trajectories" not in tables:
         settings["trajectories"] = "off"

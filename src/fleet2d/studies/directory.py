@@ -1,4 +1,4 @@
-"""The folder of a study: its plan, its results so far, and who may write them."""
+"""The folder of a study: its plan, its results so far, and the lock of its writer."""
 
 import hashlib
 import json
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.studies.journal import Journal
-from fleet2d.studies.parts import Part, read_parts, write_part
+from fleet2d.studies.parts import Part, next_number, part_name, read_parts, write_part
 from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
@@ -25,15 +25,15 @@ META, PLAN, SCENARIOS, VARIANTS = (
 
 @dataclass(frozen=True)
 class Meta:
-    """What `study.json` holds.
+    """The content of `study.json`.
 
     Attributes:
-        name: What the study is called.
-        description: What it is to answer.
-        code: The version of what computes.
+        name: The name of the study.
+        description: The question that it answers.
+        code: The version of the code that runs it.
         columns: The columns of the axes, the seed last.
-        populations: Those whose values stand for a population.
-        tables: The tables that are kept.
+        populations: The columns whose values are a sample of a population.
+        tables: The names of the tables to keep.
         compare: The comparisons that the report shows.
         source: The study file's text, for readers.
     """
@@ -53,7 +53,7 @@ class Meta:
 
     @classmethod
     def of(cls, content: Mapping[str, Any], location: str) -> "Meta":
-        """Return what a file says.
+        """Return the content of a file, checked for its format.
 
         Raises:
             RunDirectoryError: A later version of Fleet2D wrote it.
@@ -73,23 +73,23 @@ class StudyDirectory:
     """A study on the disk or in a store.
 
     Attributes:
-        storage: Where it lies.
-        scratch: A local folder for the journal and for files under way.
+        storage: The folder or store of its files.
+        scratch: A local folder for the journal and for unfinished files.
     """
 
     def __init__(self, location: str | Path) -> None:
-        """Touch nothing yet."""
+        """Name the folder; nothing is read or written."""
         self.storage = Storage(location)
         folder = self.storage.folder
         self.scratch = folder or _scratch_of(self.storage.location)
 
     @property
     def location(self) -> str:
-        """Where it lies, in the user's words."""
+        """The folder or store as the user wrote it, without secrets."""
         return self.storage.location
 
     def exists(self) -> bool:
-        """Return whether a study is there."""
+        """Return whether there is a study."""
         return self.storage.exists(META)
 
     def check_empty(self) -> None:
@@ -107,7 +107,7 @@ class StudyDirectory:
             )
 
     def read_meta(self) -> Meta:
-        """Return what the study says of itself.
+        """Return the description of the study.
 
         Raises:
             RunDirectoryError: There is no study, or a later version wrote it.
@@ -123,11 +123,11 @@ class StudyDirectory:
         return Meta.of(content, self.location)
 
     def write_meta(self, meta: Meta) -> None:
-        """Write what the study says of itself."""
+        """Write the description of the study."""
         self.storage.write(META, meta.to_json())
 
     def write_table(self, name: str, table: "pa.Table") -> None:
-        """Write a Parquet file at one stroke."""
+        """Write a Parquet file; readers see all of it, or none."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -143,21 +143,20 @@ class StudyDirectory:
         """
         import pyarrow.parquet as pq
 
-        chosen = None if columns is None else list(columns)
+        names = None if columns is None else list(columns)
         path = self.storage.path(name)
-        return pq.read_table(path, filesystem=self.storage.filesystem, columns=chosen)
+        return pq.read_table(path, filesystem=self.storage.filesystem, columns=names)
 
     def parts(self) -> list[Part]:
         """Return the parts of the data set that are committed."""
         return read_parts(self.storage)
 
     def journal_path(self, parts: Iterable[Part]) -> Path:
-        """Return where the journal of the next part lies."""
-        number = max((part.number for part in parts), default=0) + 1
-        return self.scratch / f"journal-{number:06d}.bin"
+        """Return the path of the journal of the next part."""
+        return self.scratch / f"journal-{part_name(next_number(parts))}.bin"
 
     def open_journal(self, parts: Iterable[Part]) -> Journal:
-        """Open the journal of the next part; those of committed parts are removed.
+        """Open the journal of the next part; journals of committed parts are removed.
 
         Raises:
             ArtifactError: It can't be written.
@@ -165,9 +164,9 @@ class StudyDirectory:
         path = self.journal_path(parts)
         try:
             self.scratch.mkdir(parents=True, exist_ok=True)
-            for old in self.scratch.glob("journal-*.bin"):
-                if old.name < path.name:  # a crash came between commit and removal
-                    old.unlink()
+            for journal in self.scratch.glob("journal-*.bin"):
+                if journal.name < path.name:  # left by a crash between commit and removal
+                    journal.unlink()
         except OSError as error:
             raise write_error(self.scratch, error) from error
         return Journal(path)
@@ -178,8 +177,8 @@ class StudyDirectory:
         Raises:
             ArtifactError: The part can't be written; the journal stays.
         """
-        number = max((part.number for part in parts), default=0) + 1
-        part = write_part(self.storage, self.scratch / "partial", number, journal)
+        scratch = self.scratch / "partial"
+        part = write_part(self.storage, scratch, next_number(parts), journal)
         journal.close()
         with suppress(OSError):
             journal.path.unlink()
@@ -205,7 +204,7 @@ class StudyDirectory:
 
 
 def _lock(file: int, location: str) -> None:
-    """Lock a file for as long as it is open; where the system can't, do nothing."""
+    """Lock a file while it is open; do nothing where the system has no such locks."""
     try:
         import fcntl
     except ImportError:
@@ -220,7 +219,7 @@ def _lock(file: int, location: str) -> None:
 
 
 def _scratch_of(location: str) -> Path:
-    """Return the local folder that goes with a store."""
+    """Return the local folder for the unfinished files of a remote store."""
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     name = hashlib.sha256(location.encode()).hexdigest()[:16]
     return Path(base) / "fleet2d" / "studies" / name

@@ -1,7 +1,4 @@
-"""The one door to the simulator: a study runs scenarios through this module alone.
-
-Whatever processes may share between runs, such as homes, belongs here.
-"""
+"""Running scenarios: the only module of `studies` that imports the engine."""
 
 import copy
 import sys
@@ -28,18 +25,18 @@ SEPARATOR = "."
 
 
 @dataclass
-class Outcome:
-    """What came of a variant.
+class VariantOutcome:
+    """The results of a variant, or its error.
 
     Attributes:
         status: `complete` or `failed`.
-        digest: Of the run; None if it failed.
-        metrics: The numbers that are kept, by name like `ltp_error.ana.tv`.
-        tables: The tables that are kept, by name.
-        wall_s: Seconds by phase: `setup`, `simulate`, `total`.
-        peak_rss_mb: The most memory that the process has held [MB].
-        error: What went wrong, in words; None if nothing did.
-        trace: The lines of code on the way to the error.
+        digest: The digest of the run; None if it failed.
+        metrics: The numbers to keep, by name, such as `ltp_error.ana.tv`.
+        tables: The tables to keep, by name.
+        wall_s: Wall time by phase: `setup`, `simulate`, `total` [s].
+        peak_rss_mb: The largest memory of the process so far [MB].
+        error: The error in words; None if there is none.
+        trace: The traceback of the error.
     """
 
     status: Status
@@ -53,7 +50,7 @@ class Outcome:
 
 
 def files_of(scenario: Scenario) -> list[Path]:
-    """Return the files that a scenario reads, and the modules of the user's own."""
+    """Return the files that a scenario reads, with the modules of the user's components."""
     return input_files(scenario)
 
 
@@ -75,19 +72,19 @@ def run_scenario(
     """Run a scenario, in memory or stored.
 
     Raises:
-        Fleet2DError: It is wrong, or a component failed.
+        Fleet2DError: The scenario is wrong, or a component failed.
     """
     return Simulation(scenario, out=out, **settings).run()
 
 
-class Prefix:
-    """A run under way: what it came to by some time is read, and it goes on from there.
+class StagedRun:
+    """A run in stages: it stops at simulated times, and its results so far can be read there.
 
     Example:
         >>> from fleet2d.scenario.model import load_scenario
-        >>> prefix = Prefix(load_scenario("simulation.duration=2 h", seed=4))
-        >>> hour = prefix.until(3600.0)
-        >>> whole = prefix.until(None)
+        >>> stages = StagedRun(load_scenario("simulation.duration=2 h", seed=4))
+        >>> hour = stages.until(3600.0)
+        >>> whole = stages.until(None)
         >>> hour.status, whole.status
         ('interrupted', 'complete')
     """
@@ -106,7 +103,7 @@ class Prefix:
         return self._simulation.done
 
     def until(self, seconds: float | None) -> "Run":
-        """Go on until a simulated time [s], None for the end; return the run as of then.
+        """Continue to a simulated time [s], None for the end; return the run so far.
 
         Raises:
             Fleet2DError: A component failed.
@@ -120,30 +117,30 @@ class Prefix:
         return copy.deepcopy(simulation).finish()
 
 
-def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> Outcome:
-    """Run a scenario and return what of it is kept; whatever goes wrong is kept, too.
+def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> VariantOutcome:
+    """Run a scenario; return the results to keep, or the error if it fails.
 
     Args:
         scenario: The scenario, with its seed.
         metrics: Patterns of the numbers to keep.
         tables: Names of the tables to keep.
     """
-    began = time.perf_counter()
+    start_s = time.perf_counter()
     try:
         run = run_scenario(scenario)
     except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
-        seconds = {"total": time.perf_counter() - began}
-        return Outcome(
+        seconds = {"total": time.perf_counter() - start_s}
+        return VariantOutcome(
             "failed",
             wall_s=seconds,
             peak_rss_mb=peak_rss_mb(),
             error=describe_error(error),
             trace="".join(traceback.format_exception(error)),
         )
-    wall_s: dict[str, float] = {**run.manifest["wall_s"], "total": time.perf_counter() - began}
+    wall_s: dict[str, float] = {**run.manifest["wall_s"], "total": time.perf_counter() - start_s}
     numbers = dict(flat_numbers(run.metrics))
     patterns = tuple(metrics)
-    return Outcome(
+    return VariantOutcome(
         "complete",
         run.digest,
         {n: v for n, v in numbers.items() if any(fnmatchcase(n, p) for p in patterns)},
@@ -154,7 +151,7 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
 
 
 def describe_error(error: BaseException) -> str:
-    """Return an error in words, with its kind unless it explains itself."""
+    """Return the text of an error, after its class unless the text names a component."""
     text = str(error)
     return text if isinstance(error, ComponentError) else f"{type(error).__name__}: {text}"
 
@@ -173,7 +170,7 @@ def flat_numbers(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple
 
 
 def peak_rss_mb() -> float:
-    """Return the most memory that this process has held [MB]; 0 where it is not known."""
+    """Return the largest memory of this process so far [MB]; 0 where the system can't say."""
     try:
         import resource
     except ImportError:
@@ -183,12 +180,12 @@ def peak_rss_mb() -> float:
 
 
 @dataclass(frozen=True)
-class Pace:
-    """How fast a scenario runs here.
+class RunSpeed:
+    """How fast a scenario runs on this machine.
 
     Attributes:
         setup_s: Wall time of its set-up [s].
-        speedup: Simulated time by wall time after that.
+        speedup: Simulated time over wall time after the set-up.
     """
 
     setup_s: float
@@ -199,25 +196,25 @@ class Pace:
         return self.setup_s + simulated_s / self.speedup
 
 
-def measure(scenario: Scenario, simulated_s: float = 86_400.0, most_s: float = 2.0) -> Pace:
-    """Run the beginning of a scenario to see how fast it goes.
+def measure(scenario: Scenario, simulated_s: float = 86_400.0, most_s: float = 2.0) -> RunSpeed:
+    """Run the beginning of a scenario to measure its speed.
 
     Args:
         scenario: The scenario.
-        simulated_s: How much of it, if it lasts that long [s].
-        most_s: Wall time after which it is enough [s].
+        simulated_s: The simulated time to run, if the scenario lasts that long [s].
+        most_s: The longest wall time after the set-up [s].
 
     Raises:
-        Fleet2DError: It is wrong, or a component failed.
+        Fleet2DError: The scenario is wrong, or a component failed.
     """
-    began = time.perf_counter()
+    start_s = time.perf_counter()
     simulation = Simulation(scenario)
-    ready = time.perf_counter()
+    ready_s = time.perf_counter()
     hour = max(1, int(3600e6 / simulation.clock.step_us))
-    while not simulation.done and time.perf_counter() - ready < most_s:
+    while not simulation.done and time.perf_counter() - ready_s < most_s:
         simulation.advance(hour)
         if simulation.step * simulation.clock.step_us / 1e6 >= simulated_s:
             break
-    wall_s = max(time.perf_counter() - ready, 1e-6)
+    wall_s = max(time.perf_counter() - ready_s, 1e-6)
     done_s = simulation.step * simulation.clock.step_us / 1e6
-    return Pace(ready - began, done_s / wall_s)
+    return RunSpeed(ready_s - start_s, done_s / wall_s)

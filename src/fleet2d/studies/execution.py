@@ -1,31 +1,31 @@
-"""What every executor offers: tasks in, and what becomes of each out."""
+"""The interface of executors: they take tasks, and yield an event for each."""
 
 import os
 from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Protocol
 
-from fleet2d.studies.jobs import Job
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.jobs import WorkerJob
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 
-MOST_ATTEMPTS = 3  # of a task during which its worker dies
+MOST_ATTEMPTS = 3  # of a task whose worker dies each time
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A task that was done, and the bytes that came of it."""
+    """A finished task with its results as bytes."""
 
-    task: Task
+    task: WorkerTask
     payload: bytes
     attempts: int
 
 
 @dataclass(frozen=True)
 class Lost:
-    """A task that is given up, for its worker died each time; and why."""
+    """A task without results, as its worker died in each attempt; with the reason."""
 
-    task: Task
+    task: WorkerTask
     reason: str
     attempts: int
 
@@ -41,8 +41,8 @@ class Executor(Protocol):
         """How many tasks run at a time."""
         ...
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
-        """Yield what becomes of each task as it is known; closing the iterator ends all work."""
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        """Yield an event for each task as it ends; closing the iterator ends all work."""
         ...
 
 
@@ -51,14 +51,16 @@ class SerialExecutor:
 
     workers = 1
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
-        """Yield what becomes of each task."""
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        """Yield an event for each task."""
         while (task := tasks.take(self)) is not None:
             yield Finished(task, job(task), 1)
 
 
-def lose(task: Task, attempts: dict[int, int], tasks: Schedule, reason: str) -> Lost | None:
-    """Let a task whose worker died be run again, or give it up after some attempts."""
+def retry(
+    task: WorkerTask, attempts: dict[int, int], tasks: TaskSchedule, reason: str
+) -> Lost | None:
+    """Schedule a task again whose worker died; after some attempts return it as lost."""
     attempts[task.number] = attempts.get(task.number, 0) + 1
     if attempts[task.number] < MOST_ATTEMPTS:
         tasks.put_back(task)
@@ -67,7 +69,7 @@ def lose(task: Task, attempts: dict[int, int], tasks: Schedule, reason: str) -> 
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system

@@ -1,4 +1,4 @@
-"""What a study will take: measured on the beginning of some of its variants."""
+"""The time that a study will take, measured on the beginning of some of its variants."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -6,45 +6,45 @@ from datetime import timedelta
 
 from fleet2d.errors import ComponentError
 from fleet2d.studies.engine import measure
-from fleet2d.studies.plan import Plan
+from fleet2d.studies.plan import StudyPlan
 
 SAMPLES = 3
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a study will take.
+    """The time that a study will take.
 
     Attributes:
-        simulated: Simulated time of all variants.
-        wall: Wall time of all variants, one after the other.
+        simulated: The simulated time of all variants.
+        wall: The wall time of all variants with one worker.
     """
 
     simulated: timedelta
     wall: timedelta
 
     def by(self, workers: int) -> timedelta:
-        """Return the wall time by so many workers at a time."""
+        """Return the wall time with a number of workers."""
         return self.wall / max(workers, 1)
 
 
-def forecast(plan: Plan, samples: int = SAMPLES) -> Forecast:
-    """Measure how fast some variants begin; the first of each is not counted, for it loads code.
+def forecast(plan: StudyPlan, samples: int = SAMPLES) -> Forecast:
+    """Measure the speed of some variants, after a warm-up that loads all code.
 
     Raises:
-        ComponentError: All variants that are begun fail.
+        ComponentError: All measured variants fail.
     """
     count = len(plan.variants)
-    chosen = sorted({round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)})
+    numbers = sorted({round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)})
     measure(plan.design.scenario(0), most_s=0.0)
-    paces = []
-    for i in chosen:
-        with suppress(ComponentError):  # a variant may fail, and the study go on
-            paces.append(measure(plan.design.scenario(plan.variants[i].index)))
-    if not paces:
-        raise ComponentError("none of the variants that were begun can be run: run one by itself")
+    speeds = []
+    for i in numbers:
+        with suppress(ComponentError):  # a variant may fail without ending the study
+            speeds.append(measure(plan.design.scenario(plan.variants[i].index)))
+    if not speeds:
+        raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
     wall_s = sum(
-        sum(pace.seconds(variant.simulated_s) for pace in paces) / len(paces)
+        sum(speed.seconds(variant.simulated_s) for speed in speeds) / len(speeds)
         for variant in plan.variants
     )
     simulated_s = sum(variant.simulated_s for variant in plan.variants)

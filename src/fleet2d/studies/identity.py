@@ -1,4 +1,4 @@
-"""Who a variant is: a hash of its resolved scenario, its inputs, and the code that computes it."""
+"""The identity of a variant: a hash of its resolved scenario, its input files and the code."""
 
 import hashlib
 import json
@@ -13,8 +13,8 @@ from fleet2d.errors import InputError
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.engine import files_of
 
-DIGITS = 32  # of the hexadecimal text of a hash
-# What runs, shows or sums up simulations has no part in what they compute.
+DIGITS = 32  # hexadecimal digits of a hash
+# Packages that run, show or evaluate simulations without changing their results.
 _LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate", "published")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
@@ -22,9 +22,9 @@ _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no resu
 
 @cache
 def code_version() -> str:
-    """Return the version of Fleet2D, and a hash of its files that take part in a run.
+    """Return the version of Fleet2D with a hash of the files that can change a run.
 
-    A release always has the same; where Fleet2D is developed, it changes with every edit.
+    It is constant for a release; in a checkout it changes with every edit of such a file.
     """
     root = Path(version.__file__).parent
     digest = hashlib.sha256()
@@ -38,31 +38,31 @@ def code_version() -> str:
 
 
 class FileHashes:
-    """Hashes of input files, each read once as long as it stays as it is."""
+    """Hashes of input files; a file is read again only after it changed."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[str, int, int], str] = {}
+        self._hashes: dict[tuple[str, int, int], str] = {}
 
     def __getitem__(self, path: Path) -> str:
         """Return the SHA-256 of a file.
 
         Raises:
-            InputError: It can't be read.
+            InputError: The file can't be read.
         """
         try:
             status = path.stat()
             key = (str(path), status.st_mtime_ns, status.st_size)
-            if key not in self._known:
-                self._known[key] = hashlib.sha256(path.read_bytes()).hexdigest()
+            if key not in self._hashes:
+                self._hashes[key] = hashlib.sha256(path.read_bytes()).hexdigest()
         except OSError as error:
             raise InputError(
                 f"{path} can't be read: {error.strerror}; a variant needs it"
             ) from error
-        return self._known[key]
+        return self._hashes[key]
 
 
 def scenario_content(scenario: Scenario) -> dict[str, Any]:
-    """Return what of a resolved scenario has an effect on its results."""
+    """Return the keys of a resolved scenario that have an effect on its results."""
     content = scenario.resolved()
     content.pop("name", None)
     content["simulation"] = {k: v for k, v in content["simulation"].items() if k not in _NO_EFFECT}
@@ -80,16 +80,16 @@ def content_hash(content: Any) -> str:
 
 
 def input_hash(scenario: Scenario, files: FileHashes) -> str:
-    """Return a hash of the files that a scenario names: floor plans, logs, modules of one's own.
+    """Return a hash of the files that a scenario names: floor plans, logs, the user's modules.
 
     Raises:
-        InputError: One can't be read.
+        InputError: A file can't be read.
     """
     return content_hash({str(path): files[path] for path in files_of(scenario)})
 
 
 def identity(content: Mapping[str, Any], inputs: str) -> tuple[str, str]:
-    """Return the identity of a variant, and the part of it that the scenario alone makes up.
+    """Return the identity of a variant, and the hash of its scenario alone.
 
     Args:
         content: Its `scenario_content`, with its seed.

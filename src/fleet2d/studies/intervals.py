@@ -1,13 +1,14 @@
 """Means with intervals over homes, people and seeds, by a hierarchical bootstrap.
 
-A value stands for one home with one seed (or more such levels). Seeds are crossed with homes: a
-seed is the same life in each. Each resample draws homes and seeds with replacement (the pigeonhole
-bootstrap, Owen 2007). It has the right shape but not the right width with few homes or seeds, so
-its deviations are scaled to the variance that an analysis of variance estimates without bias, and
-widened as Student's t does for its degrees of freedom (Satterthwaite).
+Each value belongs to one home and one seed (or more such levels). Seeds are crossed with homes: a
+seed is the same life in each home. Each resample draws homes and seeds with replacement (the
+pigeonhole bootstrap, Owen 2007). With few homes or seeds the shape of their distribution is right
+but not its width. So deviations are scaled to the variance that an analysis of variance estimates
+without bias, and widened as Student's t is for its degrees of freedom (Satterthwaite).
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,19 +22,19 @@ F64 = NDArray[np.float64]
 LEVEL = 0.95
 RESAMPLES = 2000
 POWER_Z = 0.84  # standard normal quantile of a power of 80 %
-MOST_NEEDED = 10_000
-BLOCK = 4_000_000  # cells of a matrix of weights at a time
+MOST_NEEDED = 10_000  # units of a level
+BLOCK = 4_000_000  # largest number of weights in memory
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How values vary, by level.
+    """The variance of values, by level.
 
     Attributes:
-        units: How many there are of each level, such as homes.
+        units: The number of units of each level, such as homes.
         components: The variance between the units of a level.
-        residual: The variance of a single value beside that.
-        values: How many values there are.
+        residual: The variance of a single value beyond that.
+        values: The number of values.
     """
 
     units: Mapping[str, int]
@@ -42,9 +43,11 @@ class Spread:
     values: int
 
     def shows(self, size: float, units: Mapping[str, int]) -> bool:
-        """Return whether so many units would show a mean of a size to differ from zero.
+        """Return whether so many units show with a power of 80 % that a mean isn't zero.
 
-        In four of five such studies they would: a power of 80 %.
+        Args:
+            size: The mean.
+            units: The number of units of each level.
         """
         parts = [(self.components[level] / n, n - 1) for level, n in units.items()]
         parts.append((self.residual / math.prod(units.values()), max(units.values()) - 1))
@@ -56,7 +59,7 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class MeanEstimate:
     """A mean, with its interval.
 
     Attributes:
@@ -65,7 +68,7 @@ class Estimate:
         high: The upper end.
         error: The standard error.
         freedom: Degrees of freedom.
-        spread: How the values vary.
+        spread: The variance of the values by level.
     """
 
     mean: float
@@ -77,28 +80,24 @@ class Estimate:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the interval leaves zero out."""
+        """Whether the interval excludes zero."""
         return self.low > 0 or self.high < 0
 
     def needed(self) -> dict[str, int]:
-        """Return how many units of a level would show the mean to differ from zero.
+        """Return for each level how many units are needed to show that the mean isn't zero.
 
-        Each number is that of one level, the others staying as they are; a level that can't do it
-        alone is missing. With so many, four of five such studies show a mean of this size.
+        Each number is for one level while the others stay as they are; levels of which no number
+        is enough are missing. The power is 80 %.
         """
         counts: dict[str, int] = {}
         for level, now in self.spread.units.items():
 
-            def enough(count: int, level: str = level) -> bool:
+            def is_enough(count: int, level: str = level) -> bool:
                 return self.spread.shows(self.mean, {**self.spread.units, level: count})
 
-            if now < 2 or not enough(MOST_NEEDED):
-                continue
-            low, high = 2, MOST_NEEDED
-            while low < high:
-                middle = (low + high) // 2
-                low, high = (low, middle) if enough(middle) else (middle + 1, high)
-            counts[level] = max(low, now + 1)
+            if now >= 2 and is_enough(MOST_NEEDED):
+                count = bisect_left(range(MOST_NEEDED), True, lo=2, key=is_enough)
+                counts[level] = max(count, now + 1)
         return counts
 
 
@@ -108,103 +107,106 @@ def estimate(
     *,
     level: float = LEVEL,
     resamples: int = RESAMPLES,
-) -> Estimate:
+) -> MeanEstimate:
     """Return the mean of values and its interval over the units that they belong to.
 
     Args:
         values: One for each combination of units, such as home and seed.
-        levels: For each level the unit of each value; left out: each value is a unit.
-        level: How often the interval is to hold the true mean.
-        resamples: How many resamples are drawn; the same at each call.
+        levels: For each level the unit of each value; None: each value is a unit of its own.
+        level: The share of studies whose interval contains the true mean.
+        resamples: The number of resamples; they are the same at each call.
 
     Example:
-        >>> found = estimate([1.0, 2.0, 4.0], {"seed": [0, 1, 2]})
-        >>> round(found.mean, 2), found.spread.units
+        >>> score = estimate([1.0, 2.0, 4.0], {"seed": [0, 1, 2]})
+        >>> round(score.mean, 2), score.spread.units
         (2.33, {'seed': 3})
     """
     data: F64 = np.asarray(values, np.float64)
     if not len(data):
-        return Estimate(math.nan)
+        return MeanEstimate(math.nan)
     codes = _codes(levels if levels else {"value": range(len(data))}, len(data))
     mean = float(data.mean())
     if not codes:
-        return Estimate(mean)
+        return MeanEstimate(mean)
     spread, variance, freedom = _analyse(data, codes)
     if variance <= 0 or not np.ptp(data):
-        return Estimate(mean, mean, mean, 0.0, freedom, spread)
+        return MeanEstimate(mean, mean, mean, 0.0, freedom, spread)
     deviations = _resampled_means(data, list(codes.values()), resamples) - mean
     error = math.sqrt(variance)
     widening = _student_quantile(freedom, level) / _normal_quantile(level)
     scale = widening * error / max(float(deviations.std()), 1e-300)
     low, high = np.quantile(deviations, [(1 - level) / 2, (1 + level) / 2]) * scale
-    return Estimate(mean, mean + float(low), mean + float(high), error, freedom, spread)
+    return MeanEstimate(mean, mean + float(low), mean + float(high), error, freedom, spread)
 
 
 def _codes(levels: Mapping[str, Sequence[Any]], count: int) -> dict[str, NDArray[np.int64]]:
-    """Return the unit of each value as a number, by level; without levels of one unit."""
+    """Return the number of the unit of each value, by level: int64 (values,).
+
+    Levels with one unit are left out, as are levels with a unit for each value unless there is no
+    other: the units of the other levels vary with it.
+    """
     codes = {}
     for name, labels in levels.items():
         texts = np.array([repr(label) for label in labels])
-        units, own = np.unique(texts, return_inverse=True)
+        units, numbers = np.unique(texts, return_inverse=True)
         if len(units) > 1:
-            codes[name] = own.astype(np.int64)
-    crossed = {name: own for name, own in codes.items() if own.max() + 1 < count}
-    # A level with a unit for each value is below all others: their units vary with it.
+            codes[name] = numbers.astype(np.int64)
+    crossed = {name: numbers for name, numbers in codes.items() if numbers.max() + 1 < count}
     return crossed or dict(list(codes.items())[-1:])
 
 
 def _analyse(data: F64, codes: Mapping[str, NDArray[np.int64]]) -> tuple[Spread, float, float]:
     """Return variance components, the variance of the mean, and its degrees of freedom."""
-    count, units = len(data), {name: int(own.max()) + 1 for name, own in codes.items()}
+    count, units = len(data), {name: int(numbers.max()) + 1 for name, numbers in codes.items()}
     if len(codes) == 1:
-        ((name, own),) = codes.items()
-        means = _unit_means(data, own)
+        ((name, numbers),) = codes.items()
+        means = _unit_means(data, numbers)
         variance = float(means.var(ddof=1)) / len(means)
-        within = float(((data - means[own]) ** 2).sum()) / max(count - len(means), 1)
+        within = float(((data - means[numbers]) ** 2).sum()) / max(count - len(means), 1)
         between = max(0.0, float(means.var(ddof=1)) - within * len(means) / count)
         return Spread(units, {name: between}, within, count), variance, len(means) - 1.0
     residuals, squares = data - data.mean(), {}
-    for name, own in codes.items():
-        means = _unit_means(data, own)
+    for name, numbers in codes.items():
+        means = _unit_means(data, numbers)
         squares[name] = float(means.var(ddof=1)) / len(means)
-        residuals = residuals - (means[own] - data.mean())
-    left = max(count - 1 - sum(n - 1 for n in units.values()), 1)
-    residual = float((residuals**2).sum()) / left
+        residuals = residuals - (means[numbers] - data.mean())
+    residual_freedom = max(count - 1 - sum(n - 1 for n in units.values()), 1)
+    residual = float((residuals**2).sum()) / residual_freedom
     share = residual / count
     variance = max(sum(squares.values()) - (len(codes) - 1) * share, share)
     parts = [(square, units[name] - 1.0) for name, square in squares.items()]
-    parts.append(((len(codes) - 1) * share, float(left)))
+    parts.append(((len(codes) - 1) * share, float(residual_freedom)))
     freedom = variance**2 / max(sum(part**2 / df for part, df in parts), 1e-300)
     freedom = max(freedom, min(units.values()) - 1.0)
     components = {name: max(0.0, (squares[name] - share) * units[name]) for name in codes}
     return Spread(units, components, residual, count), variance, freedom
 
 
-def _unit_means(data: F64, own: NDArray[np.int64]) -> F64:
-    sums: F64 = np.bincount(own, data) / np.bincount(own)
+def _unit_means(data: F64, numbers: NDArray[np.int64]) -> F64:
+    sums: F64 = np.bincount(numbers, data) / np.bincount(numbers)
     return sums
 
 
 def _resampled_means(data: F64, codes: list[NDArray[np.int64]], resamples: int) -> F64:
     """Return the means of resamples: float64 (resamples,)."""
     generator = np.random.Generator(np.random.Philox(key=0))
-    found: list[F64] = []
-    left = resamples
-    while left:
-        block = max(1, min(left, BLOCK // len(data)))
+    blocks: list[F64] = []
+    remaining = resamples
+    while remaining:
+        block = max(1, min(remaining, BLOCK // len(data)))
         weights = np.ones((block, len(data)))
-        for own in codes:
-            units = int(own.max()) + 1
+        for numbers in codes:
+            units = int(numbers.max()) + 1
             counts = generator.multinomial(units, np.full(units, 1 / units), block)
-            weights *= counts[:, own]
+            weights *= counts[:, numbers]
         sums = weights.sum(axis=1)
         means = np.divide(weights @ data, sums, out=np.full(block, data.mean()), where=sums > 0)
-        found.append(means)
-        left -= block
-    return np.concatenate(found)
+        blocks.append(means)
+        remaining -= block
+    return np.concatenate(blocks)
 
 
-def _normal_quantile(level: float = LEVEL) -> float:
+def _normal_quantile(level: float) -> float:
     from statistics import NormalDist
 
     return NormalDist().inv_cdf((1 + level) / 2)

@@ -1,4 +1,4 @@
-"""What workers do with a task: run a variant of a study, or a scenario for a function."""
+"""What workers do with tasks: run variants of a study, or scenarios for a function."""
 
 import pickle
 from collections.abc import Callable, Sequence
@@ -7,20 +7,26 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from fleet2d.errors import Fleet2DError
 from fleet2d.studies.design import Design
-from fleet2d.studies.engine import Outcome, check_setup, describe_error, execute, run_scenario
+from fleet2d.studies.engine import (
+    VariantOutcome,
+    check_setup,
+    describe_error,
+    execute,
+    run_scenario,
+)
 from fleet2d.studies.identity import FileHashes, identity, input_hash, scenario_content
-from fleet2d.studies.record import Task, record_of
+from fleet2d.studies.record import WorkerTask, record_of
 from fleet2d.trust import Trust, current_trust, under
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 
-class Job(Protocol):
-    """What a worker is given once, and then calls for each task; it can be pickled."""
+class WorkerJob(Protocol):
+    """A function that workers receive once and call for each task; it can be pickled."""
 
-    def __call__(self, task: Task) -> bytes:
-        """Do a task; return what came of it."""
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Do a task; return its results as bytes."""
         ...
 
 
@@ -32,7 +38,7 @@ class StudyJob:
         design: The design.
         metrics: Patterns of the numbers to keep.
         tables: Names of the tables to keep.
-        trust: Whose code may run, in whichever process.
+        trust: The code that workers may run; None: any.
     """
 
     design: Design
@@ -40,47 +46,47 @@ class StudyJob:
     tables: tuple[str, ...]
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: Task) -> bytes:
-        """Run a variant; return its record. What goes wrong in it is part of the record."""
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Run a variant; return its record, with the error if it fails."""
         with under(self.trust):
             return record_of(task, self._outcome(task)).encode()
 
-    def _outcome(self, task: Task) -> Outcome:
+    def _outcome(self, task: WorkerTask) -> VariantOutcome:
         try:
             scenario = self.design.scenario(task.index)
             inputs = input_hash(scenario, self._files)
-        except Fleet2DError as error:  # a file has changed since it was planned
-            return Outcome("failed", error=describe_error(error))
-        found, _ = identity(scenario_content(scenario), inputs)
-        if found == task.identity:
-            return execute(scenario, self.metrics, self.tables)
-        return Outcome("failed", error=CHANGED)
+        except Fleet2DError as error:  # a file changed after the study was planned
+            return VariantOutcome("failed", error=describe_error(error))
+        current, _ = identity(scenario_content(scenario), inputs)
+        if current != task.identity:
+            return VariantOutcome("failed", error=CHANGED)
+        return execute(scenario, self.metrics, self.tables)
 
     def __post_init__(self) -> None:
-        """Begin without knowing any file."""
+        """Start with no hashes."""
         self._files = FileHashes()
 
 
 CHANGED = (
-    "a file that the variant reads, or Fleet2D itself, is not what it was when the study began:"
-    " run the study again"
+    "a file that the variant reads, or Fleet2D itself, changed after the study began: run the study"
+    " again"
 )
 
 
 @dataclass
 class SetupJob:
-    """Sets variants up without running them.
+    """Sets variants up without running them, to find errors.
 
     Attributes:
         design: The design.
-        trust: Whose code may run, in whichever process.
+        trust: The code that workers may run; None: any.
     """
 
     design: Design
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: Task) -> bytes:
-        """Return what is wrong with a variant; nothing if nothing is."""
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Return the error of a variant's set-up as text; empty if there is none."""
         try:
             with under(self.trust):
                 check_setup(self.design.scenario(task.index))
@@ -91,7 +97,7 @@ class SetupJob:
 
 @dataclass
 class FunctionJob:
-    """Runs scenarios, and hands each run to a function.
+    """Runs scenarios, and calls a function with each run.
 
     Attributes:
         function: The function, pickled.
@@ -101,12 +107,12 @@ class FunctionJob:
     function: bytes
     scenarios: Sequence[Any]
 
-    def __call__(self, task: Task) -> bytes:
+    def __call__(self, task: WorkerTask) -> bytes:
         """Return what the function returns, or the error, pickled."""
         try:
             scenario = self.scenarios[task.index]
             return pickle.dumps((True, self._call(run_scenario(scenario))))
-        except Exception as error:  # noqa: BLE001 - raised again where the function came from
+        except Exception as error:  # noqa: BLE001 - raised again in the driver
             return pickle.dumps((False, _portable(error)))
 
     def _call(self, run: "Run") -> Any:
@@ -115,7 +121,7 @@ class FunctionJob:
 
 
 def _portable(error: Exception) -> Exception:
-    """Return an error that survives pickling."""
+    """Return the error if it can be pickled, else one with the same text."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
     except Exception:  # noqa: BLE001 - errors of users may do anything

@@ -1,7 +1,7 @@
-"""The journal of a study: each finished variant is appended at once, and survives whatever comes.
+"""The journal of a study: each finished variant is appended at once, and survives crashes.
 
-A frame is a mark, a length, a checksum and a record. What a crash cut off is recognized by its
-checksum and dropped; everything before it counts.
+A frame is a mark, a length, a checksum and a record. A frame that a crash cut off has a wrong
+checksum and is dropped; all frames before it count.
 """
 
 import os
@@ -11,12 +11,12 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from fleet2d.studies.record import Record
+from fleet2d.studies.record import VariantRecord
 from fleet2d.studies.storage import write_error
 
 _FRAME = struct.Struct("<4sQI")
 _MARK = b"F2DV"
-SYNC_EVERY_S = 2.0  # what a power cut may take; a killed process loses nothing
+SYNC_EVERY_S = 2.0  # the most that a power cut loses; a killed process loses nothing
 
 
 class Journal:
@@ -24,12 +24,12 @@ class Journal:
 
     Attributes:
         path: The file.
-        offsets: Where the frame of each record begins, by number of variant; the newest counts.
-        size: Bytes of whole frames.
+        offsets: The offset of the newest frame of each variant, by its number [bytes].
+        size: The size of all complete frames [bytes].
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a journal for appending, and cut off what a crash left unfinished.
+        """Open a journal for appending, and cut off an incomplete frame at its end.
 
         Raises:
             ArtifactError: It can't be written.
@@ -44,47 +44,47 @@ class Journal:
             os.ftruncate(self._file, self.size)
         except OSError as error:
             raise write_error(path.parent, error) from error
-        self._synced = time.monotonic()
+        self._sync_time = time.monotonic()
 
     def __len__(self) -> int:
         """Return the number of variants in it."""
         return len(self.offsets)
 
-    def append(self, record: Record) -> None:
-        """Add a record; when this returns, a killed process loses it no more.
+    def append(self, record: VariantRecord) -> None:
+        """Add a record; after that it survives a kill of the process.
 
         Raises:
-            ArtifactError: The disk is full, or the file can't be written; nothing is added then.
+            ArtifactError: The disk is full, or the file can't be written; nothing is added.
         """
         data = record.encode()
         frame = _FRAME.pack(_MARK, len(data), zlib.crc32(data)) + data
         try:
-            written = 0
-            while written < len(frame):
-                written += os.pwrite(self._file, frame[written:], self.size + written)
-            if time.monotonic() - self._synced > SYNC_EVERY_S:
+            done = 0
+            while done < len(frame):
+                done += os.pwrite(self._file, frame[done:], self.size + done)
+            if time.monotonic() - self._sync_time > SYNC_EVERY_S:
                 os.fsync(self._file)
-                self._synced = time.monotonic()
+                self._sync_time = time.monotonic()
         except OSError as error:
             os.ftruncate(self._file, self.size)
             raise write_error(self.path.parent, error) from error
         self.offsets[record.number] = self.size
         self.size += len(frame)
 
-    def read(self, number: int) -> Record:
+    def read(self, number: int) -> VariantRecord:
         """Return the newest record of a variant."""
         offset = self.offsets[number]
         _, length, _ = _FRAME.unpack(os.pread(self._file, _FRAME.size, offset))
-        return Record.decode(os.pread(self._file, length, offset + _FRAME.size))
+        return VariantRecord.decode(os.pread(self._file, length, offset + _FRAME.size))
 
     def close(self) -> None:
-        """See everything onto the disk, and let go of the file."""
+        """Flush everything to the disk, and close the file."""
         os.fsync(self._file)
         os.close(self._file)
 
 
-def read_journal(path: Path) -> Iterator[Record]:
-    """Yield the whole records of a journal that another process may be writing."""
+def read_journal(path: Path) -> Iterator[VariantRecord]:
+    """Yield the complete records of a journal; another process may be writing it."""
     try:
         file = os.open(path, os.O_RDONLY)
     except FileNotFoundError:
@@ -96,8 +96,8 @@ def read_journal(path: Path) -> Iterator[Record]:
         os.close(file)
 
 
-def _frames(file: int) -> Iterator[tuple[int, int, Record]]:
-    """Yield (begin, end, record) of each whole frame, up to the first that is not."""
+def _frames(file: int) -> Iterator[tuple[int, int, VariantRecord]]:
+    """Yield (start, end, record) of each complete frame, up to the first incomplete one [bytes]."""
     offset = 0
     while True:
         head = os.pread(file, _FRAME.size, offset)
@@ -110,5 +110,5 @@ def _frames(file: int) -> Iterator[tuple[int, int, Record]]:
         if len(data) < length or zlib.crc32(data) != checksum:
             return
         end = offset + _FRAME.size + length
-        yield offset, end, Record.decode(data)
+        yield offset, end, VariantRecord.decode(data)
         offset = end

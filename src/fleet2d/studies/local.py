@@ -13,16 +13,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
-from fleet2d.studies.execution import Event, Finished, Lost, lose
-from fleet2d.studies.jobs import Job
+from fleet2d.studies.execution import Event, Finished, Lost, retry
+from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.pipe import receive, send
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.studies.worker import BROKEN, READY
 
-AHEAD = 2  # tasks that a worker holds, so that it never waits for the next
-MEMORY_SHARE = 0.8  # of the machine's memory that workers may hold together
-MOST_STARTS = 3  # of a worker that ends before it can work
+AHEAD = 2  # tasks of a worker: one runs, one waits, so that it is never idle
+MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
+MOST_STARTS = 3  # of workers that end before they are ready
 
 _numbers = itertools.count()
 
@@ -33,19 +33,20 @@ class _Worker:
 
     Attributes:
         process: The process.
-        tasks: The tasks that it holds; it is running the first.
+        number: Its number, by which the schedule knows it.
+        tasks: Its tasks; it is running the first.
         is_ready: Whether it is set up.
-        is_full: Whether it holds so much memory that it is to be replaced.
+        is_full: Whether it uses so much memory that it must be replaced.
     """
 
     process: "subprocess.Popen[bytes]"
     number: int = field(default_factory=lambda: next(_numbers))
-    tasks: deque[Task] = field(default_factory=deque)
+    tasks: deque[WorkerTask] = field(default_factory=deque)
     is_ready: bool = False
     is_full: bool = False
 
     def close(self) -> int:
-        """Wait until the process is gone; return its exit code."""
+        """Wait for the end of the process; return its exit code."""
         code = self.process.wait()
         for stream in (self.process.stdin, self.process.stdout):
             with suppress(OSError):
@@ -54,36 +55,31 @@ class _Worker:
         return code
 
     def send(self, message: Any) -> None:
-        """Send a message; a worker that is gone is noticed elsewhere."""
+        """Send a message. An error is ignored: `_listen` reports a worker that has ended."""
         assert self.process.stdin is not None
         with suppress(OSError):
             send(self.process.stdin, message)
 
 
 class LocalExecutor:
-    """Runs tasks in processes of their own, which stay alive from one task to the next.
+    """Runs tasks in worker processes, each of which runs many tasks.
 
     Args:
-        workers: How many processes.
-        memory_mb: What a process may hold before it is replaced between two tasks [MB]; None: its
-            share of most of the machine's memory.
+        workers: The number of processes.
+        memory_mb: Memory beyond which a process is replaced between two tasks [MB]; None: an equal
+            share of 80 % of the machine's memory.
     """
 
     def __init__(self, workers: int, memory_mb: float | None = None) -> None:
-        """Start nothing yet."""
+        """Create the executor; workers start with `run`."""
         self.workers = workers
         self._limit_mb = memory_mb or MEMORY_SHARE * _memory_mb() / workers
         self._messages: queue.SimpleQueue[tuple[_Worker, Any]] = queue.SimpleQueue()
         self._crew: list[_Worker] = []
         self._failed_starts = 0
 
-    @property
-    def process_ids(self) -> list[int]:
-        """The ids of the worker processes."""
-        return [worker.process.pid for worker in self._crew]
-
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
-        """Yield what becomes of each task as it is known; closing the iterator ends all work.
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        """Yield an event for each task as it ends; closing the iterator ends all work.
 
         Raises:
             InputError: Workers can't be set up.
@@ -109,12 +105,12 @@ class LocalExecutor:
         finally:
             self._stop()
 
-    def _start(self, job: Job) -> None:
+    def _start(self, job: WorkerJob) -> None:
         process = subprocess.Popen(
             [sys.executable, "-m", "fleet2d.studies.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for the driver, which ends the workers
+            start_new_session=True,  # Ctrl-C reaches the driver only, which ends the workers
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
         worker = _Worker(process)
@@ -124,7 +120,7 @@ class LocalExecutor:
         worker.send(job)
 
     def _listen(self, worker: _Worker) -> None:
-        """Pass on what a worker says; None when it is gone."""
+        """Queue the messages of a worker, and None when it has ended."""
         assert worker.process.stdout is not None
         try:
             while True:
@@ -133,28 +129,33 @@ class LocalExecutor:
         except (EOFError, OSError, ValueError):
             self._messages.put((worker, None))
 
-    def _hand_out(self, worker: _Worker, tasks: Schedule) -> None:
+    def _hand_out(self, worker: _Worker, tasks: TaskSchedule) -> None:
         if worker not in self._crew or not worker.is_ready:
             return
         if worker.is_full:
             if not worker.tasks:
-                worker.send(None)  # ends it; its place is filled when it is gone
+                worker.send(None)  # ends it; `_replace` starts another
             return
         while len(worker.tasks) < AHEAD and (task := tasks.take(worker.number)) is not None:
             worker.tasks.append(task)
             worker.send(task)
 
     def _finished(
-        self, worker: _Worker, task: Task, payload: bytes, rss_mb: float, attempts: dict[int, int]
+        self,
+        worker: _Worker,
+        task: WorkerTask,
+        payload: bytes,
+        rss_mb: float,
+        attempts: dict[int, int],
     ) -> Finished:
         worker.tasks.popleft()
         worker.is_full = rss_mb > self._limit_mb
         return Finished(task, payload, attempts.get(task.number, 0) + 1)
 
     def _replace(
-        self, worker: _Worker, job: Job, tasks: Schedule, attempts: dict[int, int]
+        self, worker: _Worker, job: WorkerJob, tasks: TaskSchedule, attempts: dict[int, int]
     ) -> Iterator[Lost]:
-        """Fill the place of a worker that is gone; what it was running is run again."""
+        """Replace a worker that has ended; the task that it was running is run again."""
         code = worker.close()
         self._crew.remove(worker)
         tasks.leave(worker.number)
@@ -162,21 +163,21 @@ class LocalExecutor:
             self._failed_starts += 1
             if self._failed_starts >= MOST_STARTS:
                 raise InputError(
-                    f"workers end before they can work (exit code {code}): see what they print"
+                    f"workers end before they are ready (exit code {code}): see their output"
                 )
         running, *waiting = worker.tasks or [None]
         for task in reversed(waiting):
             if task is not None:
                 tasks.put_back(task)
         if running is not None:
-            lost = lose(running, attempts, tasks, f"the worker process ended ({_cause(code)})")
+            lost = retry(running, attempts, tasks, f"the worker process ended ({_cause(code)})")
             if lost is not None:
                 yield lost
-        if tasks or any(other.tasks for other in self._crew):
+        if tasks or any(worker.tasks for worker in self._crew):
             self._start(job)
 
     def _stop(self) -> None:
-        """End all workers at once; nothing that they hold is needed."""
+        """End all workers at once; none of their tasks is needed."""
         for worker in self._crew:
             with suppress(OSError):
                 worker.process.kill()

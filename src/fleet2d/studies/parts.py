@@ -1,7 +1,7 @@
 """Parts of a study's data set: many variants in one Parquet file for each table.
 
-A part is written beside its place, moved there file by file, and counts from the moment at which
-its commit record is there: its files with their sizes and checksums.
+A part is written to a scratch folder and moved into the storage file by file. It counts once its
+commit record is written: the names of its files with their sizes and checksums.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.studies.record import Record
+from fleet2d.studies.record import VariantRecord
 from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Part:
 
     Attributes:
         number: Its number, from 1.
-        variants: How many variants are in it.
+        variants: The number of its variants.
         files: Its files.
     """
 
@@ -49,11 +49,11 @@ class Part:
     files: tuple[PartFile, ...]
 
     def problem(self, storage: Storage, *, checksums: bool) -> str | None:
-        """Return what is wrong with its files, None if nothing is.
+        """Return the first problem of its files in words, None if there is none.
 
         Args:
-            storage: Where they lie.
-            checksums: Read them whole, not just look at their sizes.
+            storage: The storage of the files.
+            checksums: Whether to read the files and compare checksums, beside their sizes.
         """
         for file in self.files:
             size = storage.size(file.name)
@@ -67,12 +67,17 @@ class Part:
 
 
 def part_name(number: int) -> str:
-    """Return what the files of a part are called."""
+    """Return the name of the files of a part."""
     return f"{number:06d}"
 
 
+def next_number(parts: Iterable[Part]) -> int:
+    """Return the number of the part after these."""
+    return max((part.number for part in parts), default=0) + 1
+
+
 def read_parts(storage: Storage) -> list[Part]:
-    """Return the parts that are committed, in order."""
+    """Return the committed parts, in order."""
     parts = []
     for name in storage.names(RECORDS):
         if name.endswith(".json"):
@@ -83,7 +88,7 @@ def read_parts(storage: Storage) -> list[Part]:
 
 
 def drop_part(storage: Storage, part: Part) -> None:
-    """Take a part back: its commit record first, so that it never counts half."""
+    """Delete a part: its commit record first, so that it never counts without its files."""
     storage.delete(f"{RECORDS}/{part_name(part.number)}.json")
     for file in part.files:
         storage.delete(file.name)
@@ -93,25 +98,25 @@ def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal")
     """Write the variants of a journal as a part, and commit it.
 
     Args:
-        storage: Where to.
-        scratch: A local folder for files under way, on the disk of a local storage.
-        number: The part's.
+        storage: The storage of the study.
+        scratch: A local folder for unfinished files, on the same disk as a local storage.
+        number: The number of the part.
         journal: The records.
 
     Raises:
-        ArtifactError: It can't be written; the journal holds everything still.
+        ArtifactError: It can't be written; the journal still holds everything.
     """
     name, files = part_name(number), []
     try:
         scratch.mkdir(parents=True, exist_ok=True)
-        for old in scratch.iterdir():  # what a crash left
-            old.unlink()
-        written = _write_files(scratch, name, journal)
+        for file in scratch.iterdir():  # left by a crash
+            file.unlink()
+        local_files = _write_files(scratch, name, journal)
     except OSError as error:
         raise write_error(storage.location, error) from error
-    for target, local in written.items():
-        with local.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    for target, local in local_files.items():
+        with local.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
         files.append(PartFile(target, local.stat().st_size, digest))
         storage.publish(local, target)
     part = Part(number, len(journal), tuple(files))
@@ -125,7 +130,7 @@ def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal")
 
 
 def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path]:
-    """Write results and tables; return the local files by the names they are to have."""
+    """Write results and tables; return the local files by their names in the storage."""
     import pyarrow.parquet as pq
 
     numbers = sorted(journal.offsets)
@@ -136,21 +141,21 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
         results,
         compression="zstd",
     )
-    written = {f"{RESULTS}/{name}.parquet": results}
+    files = {f"{RESULTS}/{name}.parquet": results}
     with ExitStack() as stack:
         writers: dict[str, _TableWriter] = {}
         for i, (table, schema) in enumerate(schemas.items()):
             local = scratch / f"{name}-table-{i}"
-            written[f"{TABLES}/{table}/{name}.parquet"] = local
+            files[f"{TABLES}/{table}/{name}.parquet"] = local
             writers[table] = stack.enter_context(_TableWriter(local, schema))
         for number in numbers:
             for table, rows in tables_of(journal.read(number)).items():
                 writers[table].write(number, rows)
-    return written
+    return files
 
 
 class _TableWriter:
-    """One Parquet file of a table; a row group holds whole variants, small ones together."""
+    """Writes one Parquet file of a table. A row group holds the rows of one or more variants."""
 
     def __init__(self, path: Path, schema: "pa.Schema") -> None:
         import pyarrow as pa
@@ -158,12 +163,12 @@ class _TableWriter:
 
         self._schema = schema.insert(0, pa.field(VARIANT, pa.int32(), nullable=False))
         self._writer: pq.ParquetWriter = pq.ParquetWriter(path, self._schema, compression="zstd")
-        self._waiting: list[pa.Table] = []
+        self._buffer: list[pa.Table] = []
 
     def write(self, number: int, rows: "pa.Table") -> None:
         """Add the rows of a variant."""
-        self._waiting.append(with_variant(rows, number, self._schema))
-        if sum(table.num_rows for table in self._waiting) >= ROWS_A_GROUP:
+        self._buffer.append(with_variant(rows, number, self._schema))
+        if sum(table.num_rows for table in self._buffer) >= ROWS_A_GROUP:
             self._flush()
 
     def __enter__(self) -> "_TableWriter":
@@ -176,13 +181,13 @@ class _TableWriter:
     def _flush(self) -> None:
         import pyarrow as pa
 
-        if self._waiting:
-            table = pa.concat_tables(self._waiting)
+        if self._buffer:
+            table = pa.concat_tables(self._buffer)
             self._writer.write_table(table, row_group_size=max(table.num_rows, 1))
-            self._waiting = []
+            self._buffer = []
 
 
-def tables_of(record: Record) -> "dict[str, pa.Table]":
+def tables_of(record: VariantRecord) -> "dict[str, pa.Table]":
     """Return the tables of a record."""
     import pyarrow as pa
 
@@ -192,7 +197,7 @@ def tables_of(record: Record) -> "dict[str, pa.Table]":
 
 
 def with_variant(rows: "pa.Table", number: int, schema: "pa.Schema") -> "pa.Table":
-    """Return a variant's rows in the schema of the data set: its number first, words as text."""
+    """Return the rows of a variant in the schema of the data set, with a column of its number."""
     import pyarrow as pa
 
     count = rows.num_rows
@@ -208,7 +213,7 @@ def with_variant(rows: "pa.Table", number: int, schema: "pa.Schema") -> "pa.Tabl
 
 
 def plain_schema(schema: "pa.Schema") -> "pa.Schema":
-    """Return a schema without dictionaries, whose words differ between homes."""
+    """Return a schema without dictionary types: their words differ between homes."""
     import pyarrow as pa
 
     fields = []
@@ -219,19 +224,17 @@ def plain_schema(schema: "pa.Schema") -> "pa.Schema":
     return pa.schema(fields)
 
 
-def _table_schemas(records: Iterable[Record]) -> "dict[str, pa.Schema]":
-    """Return the schema of each table that fits all of its variants."""
+def _table_schemas(records: Iterable[VariantRecord]) -> "dict[str, pa.Schema]":
+    """Return for each table the schema that fits the rows of all variants."""
     import pyarrow as pa
 
     schemas: dict[str, pa.Schema] = {}
     for record in records:
         for name, buffer in record.streams().items():
             schema = plain_schema(pa.ipc.open_stream(buffer).schema)
-            known = schemas.get(name)
-            if known is None:
-                schemas[name] = schema
-            elif known != schema:
-                schemas[name] = pa.unify_schemas([known, schema], promote_options="permissive")
+            common = schemas.setdefault(name, schema)
+            if common != schema:
+                schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
     return schemas
 
 
@@ -240,11 +243,11 @@ _SECONDS = ("setup", "simulate", "total")
 RESULT_COLUMNS = (
     VARIANT, *_HEADER_FIELDS, "attempts", "setup_s", "simulate_s", "wall_s", "peak_rss_mb",
 )  # fmt: skip
-"""Columns of the results that are no metrics."""
+"""The columns of the results beside the metrics."""
 
 
 def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
-    """Return one row for each variant: how it ended, and a column for each metric."""
+    """Return one row for each variant: status, times, memory, and a column for each metric."""
     import pyarrow as pa
 
     rows = list(headers)

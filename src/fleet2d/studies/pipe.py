@@ -1,4 +1,4 @@
-"""Messages between a driver and its workers: a length, and as many bytes."""
+"""Messages between a driver and its workers: a length, then so many bytes of pickle."""
 
 import pickle
 import struct
@@ -11,7 +11,7 @@ def send(stream: IO[bytes], message: Any) -> None:
     """Send a message.
 
     Raises:
-        OSError: Nobody reads any more.
+        OSError: The other process has closed the stream.
     """
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     stream.write(_LENGTH.pack(len(data)) + data)
@@ -22,7 +22,7 @@ def receive(stream: IO[bytes]) -> Any:
     """Return the next message.
 
     Raises:
-        EOFError: Nobody writes any more.
+        EOFError: The other process has closed the stream.
     """
     (length,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
     return pickle.loads(_exactly(stream, length))  # noqa: S301 - between our own processes

@@ -1,4 +1,4 @@
-"""The plan of a study: every variant built and checked, with its identity."""
+"""The plan of a study: all its variants, checked, each with its identity."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from fleet2d.studies.identity import (
     scenario_content,
 )
 from fleet2d.studies.jobs import SetupJob
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.units import parse_duration
 
-MOST_PROBLEMS = 10  # that are reported at once
-FEW_SETUPS = 8  # that are not worth starting workers for
+MOST_PROBLEMS = 10  # in one report
+FEW_SETUPS = 8  # up to here starting workers costs more than it saves
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +32,13 @@ class PlannedVariant:
     """A variant before it is run.
 
     Attributes:
-        number: What results call it: stays when the study is extended.
-        index: Its place in the design.
-        identity: The hash of all that its results depend on.
+        number: Its number in results; it stays when the study is extended.
+        index: Its index in the design.
+        identity: The hash of everything that its results depend on.
         scenario: The hash of its scenario alone.
         template: The hash of its scenario without the seed.
         home_key: The same for variants that can share a home.
-        simulated_s: How long it lasts [s].
+        simulated_s: The simulated time of its run [s].
     """
 
     number: int
@@ -51,12 +51,12 @@ class PlannedVariant:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A design whose variants are all checked.
+class StudyPlan:
+    """A design and its variants, all checked.
 
     Attributes:
         design: The design.
-        variants: The variants in the design's order.
+        variants: The variants, in the order of the design.
     """
 
     design: Design
@@ -69,16 +69,16 @@ class Plan:
 
 def make_plan(
     design: Design, tables: Sequence[str] = (), keep: Callable[[str, Any], None] | None = None
-) -> Plan:
+) -> StudyPlan:
     """Build and check the scenario of every variant of a design.
 
     Args:
         design: The design.
         tables: The tables to keep, each of which some variant must have.
-        keep: Called with the template and the content of each combination's scenario.
+        keep: Called with the template (a hash) and the content of each combination's scenario.
 
     Raises:
-        ScenarioError: What is wrong, with axis and value; a line per problem.
+        ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
     variants: list[PlannedVariant] = []
     problems: list[str] = []
@@ -97,16 +97,17 @@ def make_plan(
         if keep is not None:
             keep(variants[-1].template, scenario.resolved())
         known_tables |= {*scenario.algorithms, *scenario.metrics, *_sensor_tables(scenario)}
-    _refuse(problems)
+    _raise_problems(problems)
     _check_tables(tables, known_tables)
     _check_identities(design, variants)
-    return Plan(design, tuple(variants))
+    return StudyPlan(design, tuple(variants))
 
 
-def setups_to_check(plan: Plan) -> list[PlannedVariant]:
+def setups_to_check(plan: StudyPlan) -> list[PlannedVariant]:
     """Return variants in which each home meets each choice of every other axis, and no more.
 
-    To set them up shows whoever can't stand where they should, in fewer set-ups than variants.
+    Their set-up shows people and robots that have no room where they start, without setting up
+    every variant.
     """
     design = plan.design
     by_home: dict[str, list[tuple[PlannedVariant, tuple[int, ...]]]] = {}
@@ -123,11 +124,11 @@ def _covering(
     first = variants[0][1]
     varying = [i for i in range(len(first)) if any(c[i] != first[i] for _, c in variants)]
     covered: set[tuple[int, int]] = set()
-    for all_new in (True, False):  # first those in which everything is new: fewer are needed
+    for all_new in (True, False):  # variants of new choices only come first: fewer are needed
         for variant, combination in variants:
             choices = {(axis, combination[axis]) for axis in varying}
-            new = choices - covered
-            if (new and new == choices) if all_new else new:
+            uncovered = choices - covered
+            if uncovered and (uncovered == choices or not all_new):
                 covered |= choices
                 yield variant
     if not varying:
@@ -135,17 +136,17 @@ def _covering(
 
 
 def check_setups(
-    plan: Plan, executor: Executor, on_progress: Callable[[int, int], None] | None = None
+    plan: StudyPlan, executor: Executor, on_progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Set up homes with everybody in them, as `setups_to_check` chooses.
+    """Set up the variants that `setups_to_check` returns: homes with people and robots in them.
 
     Raises:
-        ScenarioError: What is wrong, with axis and value; a line per problem.
+        ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
-    chosen, problems = setups_to_check(plan), dict[int, str]()
-    tasks = [Task(v.number, v.index, v.identity, v.home_key) for v in chosen]
+    problems: dict[int, str] = {}
+    tasks = [WorkerTask(v.number, v.index, v.identity, v.home_key) for v in setups_to_check(plan)]
     runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
-    events = runner.run(SetupJob(plan.design), Schedule(tasks))
+    events = runner.run(SetupJob(plan.design), TaskSchedule(tasks))
     try:
         for done, event in enumerate(events):
             if on_progress is not None:
@@ -157,12 +158,12 @@ def check_setups(
                 break
     finally:
         events.close()
-    _refuse([problems[index] for index in sorted(problems)])
+    _raise_problems([problems[index] for index in sorted(problems)])
 
 
-def _refuse(problems: list[str]) -> None:
+def _raise_problems(problems: list[str]) -> None:
     if len(problems) == MOST_PROBLEMS:
-        problems = [*problems, "… and perhaps more: these are the first"]
+        problems = [*problems, f"… and perhaps more: these are the first {MOST_PROBLEMS}"]
     if problems:
         raise ScenarioError("\n".join(_without_repetition(problems)))
 
@@ -170,15 +171,15 @@ def _refuse(problems: list[str]) -> None:
 def _planned(
     design: Design, first: int, content: dict[str, Any], inputs: str
 ) -> Iterator[PlannedVariant]:
-    """Yield the variants of one combination, which differ by their seeds only."""
+    """Yield the variants of one combination; they differ by their seeds only."""
     home, simulation = home_key(content), content["simulation"]
     step, duration = parse_duration(simulation["step"]), parse_duration(simulation["duration"])
     template = content_hash({**content, "simulation": {**simulation, "seed": None}})
     for i, seed in enumerate(design.seeds):
         simulation["seed"] = seed
-        own, alone = identity(content, inputs)
+        whole, scenario = identity(content, inputs)
         simulated_s = (duration // step * step).total_seconds()
-        yield PlannedVariant(first + i, first + i, own, alone, template, home, simulated_s)
+        yield PlannedVariant(first + i, first + i, whole, scenario, template, home, simulated_s)
 
 
 def _sensor_tables(scenario: Scenario) -> list[str]:
@@ -197,7 +198,7 @@ def _check_tables(tables: Sequence[str], known: set[str]) -> None:
 
 
 def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> None:
-    """Refuse two variants with the same scenario: one of their axes has no effect."""
+    """Refuse two variants with the same scenario, of which one axis has no effect."""
     known: dict[str, PlannedVariant] = {}
     for variant in variants:
         other = known.setdefault(variant.identity, variant)
@@ -210,12 +211,8 @@ def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> Non
 
 
 def _without_repetition(problems: list[str]) -> list[str]:
-    """Drop what is said of several variants in the same words, but for the first."""
-    seen: set[str] = set()
-    kept = []
+    """Return the first of all problems that differ by their variant only."""
+    first: dict[str, str] = {}
     for text in problems:
-        what = text.partition("): ")[2] or text
-        if what not in seen:
-            kept.append(text)
-        seen.add(what)
-    return kept
+        first.setdefault(text.partition("): ")[2] or text, text)
+    return list(first.values())

@@ -6,52 +6,52 @@ from contextlib import contextmanager
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.studies.driver import Observer, SilentObserver
+from fleet2d.studies.driver import Observer
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from fleet2d.studies.record import Record
+    from fleet2d.studies.record import VariantRecord
     from fleet2d.studies.results import Counts
     from fleet2d.studies.tune import TuneObserver
 
 
-class BarObserver:
-    """Shows how a study goes on."""
+class BarObserver(Observer):
+    """Shows the progress of a study as a bar."""
 
     def __init__(self, progress: "Progress") -> None:
-        """Show nothing yet."""
+        """Show a bar without a total."""
         self._progress = progress
         self._task: TaskID = progress.add_task("checking", total=None)
-        self._began = time.monotonic()
-        self._done = self._failed = 0
+        self._start_s = time.monotonic()
+        self._finished = self._failed = 0
 
-    def note(self, text: str) -> None:
+    def on_note(self, text: str) -> None:
         """Print a remark above the bar."""
         self._progress.console.print(f"note: {text}", highlight=False, markup=False)
 
-    def checked(self, done: int, total: int) -> None:
-        """Show how many set-ups are checked."""
+    def on_check(self, done: int, total: int) -> None:
+        """Show the number of checked set-ups."""
         self._progress.update(self._task, completed=done, total=total, description="checking homes")
 
-    def began(self, counts: "Counts", workers: int) -> None:
-        """Show what there is already."""
-        self._began = time.monotonic()
+    def on_start(self, counts: "Counts", workers: int) -> None:
+        """Show the number of variants that are complete."""
+        self._start_s = time.monotonic()
         self._progress.reset(
             self._task, total=counts.total, completed=counts.complete, description="running"
         )
 
-    def ended(self, record: "Record") -> None:
-        """Show one more."""
-        self._done += 1
+    def on_result(self, record: "VariantRecord") -> None:
+        """Show one more variant, with rate and failures."""
+        self._finished += 1
         self._failed += not record.is_complete
-        rate = self._done / max(time.monotonic() - self._began, 1e-9)
+        rate = self._finished / max(time.monotonic() - self._start_s, 1e-9)
         failed = f", {self._failed} failed" if self._failed else ""
         self._progress.update(self._task, advance=1, description=f"{_rate(rate)}{failed}")
 
 
 def _rate(per_second: float) -> str:
-    """Return a rate in words.
+    """Return a rate as text.
 
     >>> _rate(12.3), _rate(0.05)
     ('12.3 variants/s', '3.0 variants/min')
@@ -63,9 +63,9 @@ def _rate(per_second: float) -> str:
 
 @contextmanager
 def observing(*, show: bool) -> Iterator[Observer]:
-    """Return what shows the progress of a study, on a terminal only."""
+    """Yield an observer of a study; it shows a bar if `show`, else nothing."""
     if not show:
-        yield SilentObserver()
+        yield Observer()
         return
     from rich.console import Console
     from rich.progress import (
@@ -85,7 +85,7 @@ def observing(*, show: bool) -> Iterator[Observer]:
 
 
 def in_words(time_span: timedelta) -> str:
-    """Return a span of time as people say it.
+    """Return a duration in its largest fitting unit.
 
     >>> in_words(timedelta(seconds=200)), in_words(timedelta(hours=30))
     ('3.3 min', '30.0 h')
@@ -102,7 +102,7 @@ def in_words(time_span: timedelta) -> str:
 
 @contextmanager
 def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
-    """Return what shows the progress of a search, on a terminal only."""
+    """Yield an observer of a search; it shows a bar if `show`, else nothing."""
     if not show:
         yield None
         return
@@ -113,8 +113,8 @@ def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("trials", total=None)
 
-        def ended(done: int, trials: int, best: list[float] | None) -> None:
-            words = "" if best is None else ", ".join(f"{value:.4g}" for value in best)
-            progress.update(task, completed=done, total=trials, description=f"best {words}")
+        def update(done: int, trials: int, best: list[float] | None) -> None:
+            values = ", ".join(f"{value:.4g}" for value in best or ())
+            progress.update(task, completed=done, total=trials, description=f"best {values}")
 
-        yield ended
+        yield update

@@ -1,4 +1,4 @@
-"""Workers on a Ray cluster: one that runs already, or one that is started here."""
+"""Workers on a Ray cluster: a running one, or one that is started on this machine."""
 
 import itertools
 import os
@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
-from fleet2d.studies.execution import Event, Finished, Lost, lose
-from fleet2d.studies.jobs import Job
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.execution import Event, Finished, Lost, retry
+from fleet2d.studies.jobs import WorkerJob
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 
-AHEAD = 2  # tasks that a worker holds, so that it never waits for the next
-LOOK_EVERY_S = 5.0  # for nodes that came or went
-MOST_STARTS = 3  # of a worker that ends before it can work
+AHEAD = 2  # tasks of a worker: one runs, one waits, so that it is never idle
+LOOK_EVERY_S = 5.0  # for new and lost nodes
+MOST_STARTS = 3  # of workers that end before they are ready
 
 _numbers = itertools.count()
 
@@ -27,29 +27,30 @@ class _Actor:
     """A worker on the cluster, as the driver knows it.
 
     Attributes:
-        handle: Ray's.
-        start: A reference that is there once it is set up; until then it is given no tasks, for
+        handle: Ray's handle of the actor.
+        start: A reference that is ready once the worker is set up. Until then it gets no tasks, as
             it may wait for a core that never comes.
-        tasks: The tasks that it holds with their references; it is running the first.
+        number: Its number, by which the schedule knows it.
+        tasks: Its tasks with the references of their results; it is running the first.
         is_ready: Whether it is set up.
     """
 
     handle: Any
     start: Any
     number: int = field(default_factory=lambda: next(_numbers))
-    tasks: deque[tuple[Task, Any]] = field(default_factory=deque)
+    tasks: deque[tuple[WorkerTask, Any]] = field(default_factory=deque)
     is_ready: bool = False
 
 
 class RayExecutor:
     """Runs tasks on a Ray cluster, one worker a core.
 
-    A cluster that runs is joined, by RAY_ADDRESS or the one on this machine; else one is started
-    here. A worker or a node that dies loses what it was running, which is run again elsewhere.
+    It joins the cluster at RAY_ADDRESS or on this machine; if there is none, it starts one here.
+    The tasks of a worker or node that dies are run again elsewhere.
 
     Args:
-        workers: How many workers at most; None: one for each core of the cluster.
-        address: The cluster's; None: as Ray finds it.
+        workers: The largest number of workers; None: one for each core of the cluster.
+        address: The address of the cluster; None: Ray looks for one.
     """
 
     def __init__(self, workers: int | None = None, address: str | None = None) -> None:
@@ -68,12 +69,12 @@ class RayExecutor:
 
     @property
     def workers(self) -> int:
-        """How many workers there are to be: the cores of the cluster as it is now, or fewer."""
+        """The number of workers: the cores that the cluster has now, or fewer."""
         cores = int(self._ray.cluster_resources().get("CPU", 0))
         return max(1, min(cores, self._most or cores))
 
-    def run(self, job: Job, tasks: Schedule) -> Generator[Event]:
-        """Yield what becomes of each task as it is known; closing the iterator ends all work.
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        """Yield an event for each task as it ends; closing the iterator ends all work.
 
         Raises:
             InputError: Workers can't be set up.
@@ -88,8 +89,8 @@ class RayExecutor:
                     for actor in self._crew
                     if actor.tasks or not actor.is_ready
                 }
-                ready, _ = self._ray.wait(list(awaited), timeout=LOOK_EVERY_S)
-                for reference in ready:
+                references, _ = self._ray.wait(list(awaited), timeout=LOOK_EVERY_S)
+                for reference in references:
                     actor = awaited[reference]
                     if actor.is_ready:
                         yield from self._take(actor, tasks, attempts)
@@ -98,11 +99,11 @@ class RayExecutor:
         finally:
             self._stop()
 
-    def _fill(self, shared: Any, tasks: Schedule) -> None:
-        """Start workers for cores that have none, and give those that are up something to do."""
+    def _fill(self, shared: Any, tasks: TaskSchedule) -> None:
+        """Start workers for free cores, and hand tasks to those that are ready."""
         cores = self.workers
         for actor in [actor for actor in self._crew if not actor.is_ready]:
-            if len(self._crew) > cores:  # the core that it was meant for is gone
+            if len(self._crew) > cores:  # the cluster lost the core that it waits for
                 self._ray.kill(actor.handle)
                 self._crew.remove(actor)
         for _ in range(min(cores, len(self._crew) + len(tasks)) - len(self._crew)):
@@ -116,7 +117,7 @@ class RayExecutor:
                 actor.tasks.append((task, actor.handle.run.remote(task)))
 
     def _begin(self, actor: _Actor) -> None:
-        """Take in that a worker is set up, or that it could not be."""
+        """Mark a worker as ready, or drop it if its set-up failed."""
         try:
             self._ray.get(actor.start)
             actor.is_ready, self._failed_starts = True, 0
@@ -124,10 +125,12 @@ class RayExecutor:
             self._crew.remove(actor)
             self._failed_starts += 1
             if self._failed_starts > MOST_STARTS * self.workers:
-                raise InputError(f"workers end before they can work: {error}") from error
+                raise InputError(f"workers end before they are ready: {error}") from error
 
-    def _take(self, actor: _Actor, tasks: Schedule, attempts: dict[int, int]) -> Generator[Event]:
-        """Yield what became of the first task of a worker."""
+    def _take(
+        self, actor: _Actor, tasks: TaskSchedule, attempts: dict[int, int]
+    ) -> Generator[Event]:
+        """Yield the event of the first task of a worker."""
         task, reference = actor.tasks.popleft()
         try:
             payload = self._ray.get(reference)
@@ -139,24 +142,24 @@ class RayExecutor:
     def _replace(
         self,
         actor: _Actor,
-        running: Task,
-        tasks: Schedule,
+        running: WorkerTask,
+        tasks: TaskSchedule,
         attempts: dict[int, int],
         error: Exception,
     ) -> Generator[Lost]:
-        """Let go of a worker that is gone; what it held is run elsewhere."""
+        """Drop a worker that has ended; its tasks are run elsewhere."""
         self._crew.remove(actor)
         tasks.leave(actor.number)
         for task, _ in reversed(actor.tasks):
             tasks.put_back(task)
-        lost = lose(running, attempts, tasks, f"the worker is gone ({type(error).__name__})")
+        lost = retry(running, attempts, tasks, f"the worker is gone ({type(error).__name__})")
         if lost is not None:
             yield lost
 
     def _stop(self) -> None:
-        """End all workers at once; leave a cluster as it was found."""
+        """End all workers at once, and the cluster if this executor started it."""
         for actor in self._crew:
-            with suppress(Exception):  # whatever state the cluster is in
+            with suppress(Exception):  # the cluster may be in any state
                 self._ray.kill(actor.handle)
         self._crew = []
         if not self._was_joined:
@@ -164,28 +167,28 @@ class RayExecutor:
 
 
 class Worker:
-    """What runs on the cluster: a job, called for each task."""
+    """A worker on the cluster: it calls a job for each task."""
 
     def __init__(self, shared: list[Any]) -> None:
         """Fetch the job."""
-        self._job: Job = _ray().get(shared[0])
+        self._job: WorkerJob = _ray().get(shared[0])
 
     def is_up(self) -> bool:
-        """Return that it is set up."""
+        """Return True; Ray calls it once the worker is set up."""
         return True
 
-    def run(self, task: Task) -> bytes:
-        """Do a task."""
+    def run(self, task: WorkerTask) -> bytes:
+        """Run a task; return its results as bytes."""
         return self._job(task)
 
 
 def _worker_class(ray: Any) -> Any:
-    """Return the class of workers: never restarted by Ray, for the driver knows what they held."""
+    """Return the class of workers; Ray never restarts them, as the driver retries their tasks."""
     return ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Worker)
 
 
 def _join(ray: Any, address: str | None) -> None:
-    # Workers on this machine find what this process finds.
+    # Workers on this machine import the same modules as this process.
     paths = os.pathsep.join(filter(None, sys.path))
     options: dict[str, Any] = {
         "address": address,

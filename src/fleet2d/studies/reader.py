@@ -1,4 +1,4 @@
-"""Reading a study: its variants and its tables as one data set, without loading all of it."""
+"""Reading a study: its variants and its tables as one data set that needn't fit into memory."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
 
 class Study:
-    """A study that was run, whole or in part.
+    """A study that was run completely or partly.
 
     Attributes:
-        location: Where it lies.
-        meta: What it says of itself: name, columns, populations, comparisons.
+        location: The folder or store, without secrets.
+        meta: Its description: name, columns, populations, comparisons.
 
     Example:
         >>> study = open_study("studies/speed")  # doctest: +SKIP
@@ -47,24 +47,24 @@ class Study:
     """
 
     def __init__(self, directory: StudyDirectory) -> None:
-        """Read what it is; results are read when they are asked for."""
+        """Read the description; results are read when they are used."""
         self._directory = directory
         self.location = directory.location
         self.meta = directory.read_meta()
 
     def __repr__(self) -> str:
-        """Say where it is and how far."""
+        """Return its location and its progress."""
         counts = self.counts
         return f"<Study {self.location}: {counts.complete} of {counts.total} variants complete>"
 
     @cached_property
     def arrow_variants(self) -> "pa.Table":
-        """The variants, a row each: parameters, status, time, digest, and a column a metric."""
+        """The variants, a row each: parameters, status, time, digest and metrics."""
         return variants_table(self._directory)
 
     @cached_property
     def variants(self) -> "pl.DataFrame":
-        """The same as a polars data frame.
+        """The variants as a polars data frame, with the columns of `arrow_variants`.
 
         Raises:
             InputError: polars is not installed.
@@ -73,9 +73,8 @@ class Study:
 
     @property
     def counts(self) -> Counts:
-        """How far the study is."""
-        states = self.arrow_variants.column("status").to_pylist()
-        return Counts(len(states), states.count("complete"), states.count("failed"))
+        """The numbers of complete, failed and missing variants."""
+        return Counts.of(self.arrow_variants.column("status").to_pylist())
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -84,9 +83,9 @@ class Study:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """The numbers that each run came to, by name."""
-        others = {*self.columns, *RESULT_COLUMNS, "simulated_s"}
-        return tuple(name for name in self.arrow_variants.column_names if name not in others)
+        """The names of the metrics, such as `ltp_error.ana.tv`."""
+        no_metrics = {*self.columns, *RESULT_COLUMNS, "simulated_s"}
+        return tuple(name for name in self.arrow_variants.column_names if name not in no_metrics)
 
     @property
     def failures(self) -> "pl.DataFrame":
@@ -96,9 +95,9 @@ class Study:
 
     @cached_property
     def tables(self) -> tuple[str, ...]:
-        """The tables that are kept and have rows, by name."""
-        stored = (name.split("/") for name in self._directory.storage.names(TABLES))
-        names = {parts[-2] for parts in stored if len(parts) >= 2}
+        """The names of the tables that the study keeps and that have rows."""
+        paths = (name.split("/") for name in self._directory.storage.names(TABLES))
+        names = {path[-2] for path in paths if len(path) >= 2}
         for record in self._journal_records():
             names |= {name for name, _ in record.header["tables"]}
         return tuple(sorted(names))
@@ -124,23 +123,23 @@ class Study:
             if storage.exists(name)
         ]
         schemas = [pads.dataset(file, filesystem=storage.filesystem).schema for file in files]
-        waiting = [
+        recent = [
             (record.number, rows)
             for record in self._journal_records()
             if record.is_complete and (rows := tables_of(record).get(table)) is not None
         ]
         field = pa.field(VARIANT, pa.int32(), nullable=False)
-        schemas += [plain_schema(rows.schema).insert(0, field) for _, rows in waiting]
+        schemas += [plain_schema(rows.schema).insert(0, field) for _, rows in recent]
         schema = pa.unify_schemas(schemas, promote_options="permissive")
         stored = pads.dataset(files, schema, filesystem=storage.filesystem, format="parquet")
-        if not waiting:
+        if not recent:
             return stored
-        tables = [with_variant(rows, number, schema) for number, rows in waiting]
-        recent = pads.dataset(pa.concat_tables(tables))
-        return pads.dataset([stored, recent]) if files else recent
+        tables = [with_variant(rows, number, schema) for number, rows in recent]
+        journal = pads.dataset(pa.concat_tables(tables))
+        return pads.dataset([stored, journal]) if files else journal
 
     def polars(self, table: str) -> "pl.LazyFrame":
-        """Return a table of all variants with their parameters, read when it is collected.
+        """Return a table of all variants with their parameters as a lazy frame.
 
         Raises:
             ArtifactError: The study keeps no such table.
@@ -179,12 +178,12 @@ class Study:
         variants: Sequence[int] | None = None,
         columns: Sequence[str] | None = None,
     ) -> "Iterator[pa.RecordBatch]":
-        """Yield the rows of a table by pieces that fit into memory, as Arrow has them."""
+        """Yield the rows of a table in Arrow record batches, which fit into memory."""
         import pyarrow.compute as pc
 
-        chosen = None if variants is None else pc.field(VARIANT).isin(list(variants))
-        wanted = None if columns is None else list(columns)
-        yield from self.arrow(table).to_batches(columns=wanted, filter=chosen)
+        condition = None if variants is None else pc.field(VARIANT).isin(list(variants))
+        names = None if columns is None else list(columns)
+        yield from self.arrow(table).to_batches(columns=names, filter=condition)
 
     def duckdb(self) -> "duckdb.DuckDBPyConnection":
         """Return a DuckDB connection with a view `variants`, and one for each table.
@@ -223,9 +222,9 @@ class Study:
         Args:
             variant: Its number.
             out: Where to store the run; None: in memory.
-            trust: Files and folders of code that may be run, if the scenario has components of its
-                own that aren't loaded yet.
-            settings: Changes, as `fleet2d.run` takes them, such as more `artifacts`.
+            trust: Files and folders of code that may run, for scenarios with components of the
+                user.
+            settings: Changes of the scenario, as of `fleet2d.run`, such as more `artifacts`.
 
         Raises:
             RunDirectoryError: There is no such variant, or the directory can't be used.
@@ -233,8 +232,6 @@ class Study:
         """
         with of_others(Trust.of(trust)):
             return run_scenario(self.scenario(variant), out, **settings)
-
-    # Answers
 
     @property
     def complete(self) -> "pl.DataFrame":
@@ -251,14 +248,14 @@ class Study:
         """Compare the values of an axis with one of them, pair by pair.
 
         A pair is two variants that differ by that axis alone: same home, same people, same seed,
-        and so the same lives.
+        and so the same lives of the people.
 
         Args:
             metric: A number, such as `ltp_error.ana.tv`.
-            against: The axis and the value that the others are held to.
-            by: Columns over which intervals go; None: homes, people and seeds of the study.
-            within: Axes for whose values the comparison is made one by one; over other axes the
-                differences are averaged.
+            against: The axis and its reference value, as in {"robot": "patrol"}.
+            by: Columns of the units over which intervals hold; None: homes, people and seeds.
+            within: Axes with a comparison for each of their values; over other axes the differences
+                are averaged.
 
         Returns:
             A row for each other value: mean, reference, difference, low and high (95 %), pairs,
@@ -282,7 +279,7 @@ class Study:
         return answers.summary(self._with_metric(metric), metric, axes, self._units(by))
 
     def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
-        """Return the main effect of each value of each axis: its mean less the mean of all.
+        """Return the main effect of each value of each axis: its mean minus the mean of all.
 
         Raises:
             InputError: There is no such metric.
@@ -304,12 +301,7 @@ class Study:
 
     def _units(self, by: Sequence[str] | None) -> tuple[str, ...]:
         units = tuple(self.meta.populations if by is None else by)
-        for column in units:
-            if column not in self.columns:
-                raise InputError(
-                    f"the study has no axis {column!r}{did_you_mean(column, self.columns)} It has:"
-                    f" {', '.join(self.columns)}"
-                )
+        answers.check_axes(units, self.columns)
         return units
 
     def _with_metric(self, metric: str) -> "pl.DataFrame":
@@ -330,7 +322,7 @@ class Study:
 
 
 def open_study(location: str | Path) -> Study:
-    """Open a study for reading, also while it is being run.
+    """Open a study for reading, even while it is being run.
 
     Args:
         location: The folder that `fleet2d study run` wrote, or a location like s3://bucket/study.

@@ -1,13 +1,13 @@
-"""One variant's results as bytes: what workers send, and what the journal keeps."""
+"""The results of one variant as bytes, as workers send them and the journal stores them."""
 
 import json
 import struct
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.manifest import plain
-from fleet2d.studies.engine import Outcome
+from fleet2d.studies.engine import VariantOutcome
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -16,13 +16,13 @@ _LENGTH = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
-class Task:
+class WorkerTask:
     """A variant to run.
 
     Attributes:
-        number: What results call it.
-        index: Its place in the design.
-        identity: What it was when it was planned.
+        number: Its number in results.
+        index: Its index in the design.
+        identity: Its identity when it was planned.
         home: The same for variants that can share a home.
     """
 
@@ -33,7 +33,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Record:
+class VariantRecord:
     """The results of one variant.
 
     Attributes:
@@ -61,8 +61,8 @@ class Record:
         return _LENGTH.pack(len(text)) + text + self.body
 
     @classmethod
-    def decode(cls, data: bytes) -> "Record":
-        """Return the record of such bytes."""
+    def decode(cls, data: bytes) -> "VariantRecord":
+        """Return the record that `encode` returned as bytes."""
         (length,) = _LENGTH.unpack_from(data)
         end = _LENGTH.size + length
         return cls(json.loads(data[_LENGTH.size : end]), bytes(data[end:]))
@@ -71,17 +71,18 @@ class Record:
         """Return the Arrow stream of each table."""
         import pyarrow as pa
 
-        whole, start, found = pa.py_buffer(self.body), 0, {}
+        body, start, streams = pa.py_buffer(self.body), 0, {}
         for name, size in self.header["tables"]:
-            found[name] = whole.slice(start, size)
+            streams[name] = body.slice(start, size)
             start += size
-        return found
+        return streams
 
 
-def record_of(task: Task, outcome: Outcome, attempts: int = 1) -> Record:
-    """Return what came of a task as a record."""
+def record_of(task: WorkerTask, outcome: VariantOutcome, attempts: int = 1) -> VariantRecord:
+    """Return the outcome of a task as a record."""
     streams = {name: _stream(table) for name, table in outcome.tables.items()}
-    header = {key: value for key, value in asdict_without_tables(outcome).items() if value != {}}
+    fields = vars(outcome).items()
+    header = {key: value for key, value in fields if key != "tables" and value != {}}
     header |= {
         "number": task.number,
         "identity": task.identity,
@@ -89,13 +90,7 @@ def record_of(task: Task, outcome: Outcome, attempts: int = 1) -> Record:
         "metrics": outcome.metrics,
         "tables": [(name, len(data)) for name, data in streams.items()],
     }
-    return Record(plain(header), b"".join(streams.values()))
-
-
-def asdict_without_tables(outcome: Outcome) -> dict[str, Any]:
-    """Return the fields of an outcome but its tables."""
-    bare = Outcome(**{**vars(outcome), "tables": {}})
-    return {key: value for key, value in asdict(bare).items() if key != "tables"}
+    return VariantRecord(plain(header), b"".join(streams.values()))
 
 
 def _stream(table: "pa.Table") -> bytes:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ArtifactError, InputError
@@ -37,7 +38,7 @@ def write_report(study: "Study", folder: Path) -> Path:
 
     Raises:
         ArtifactError: No variant is complete.
-        InputError: matplotlib, polars or scipy is missing, or the folder can't be written.
+        InputError: matplotlib, polars or scipy is missing, or the folder can't be created.
     """
     from fleet2d.view.floorplan import drawing_style
 
@@ -46,7 +47,9 @@ def write_report(study: "Study", folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder} can't be made: {error.strerror}; name another --out") from error
+        raise InputError(
+            f"{folder} can't be created: {error.strerror}; name another --out"
+        ) from error
     page = _Page(study, folder)
     with drawing_style():
         content = "\n".join(page.sections())
@@ -61,7 +64,7 @@ def write_report(study: "Study", folder: Path) -> Path:
 
 
 class _Page:
-    """Writes the sections of a report, and its figures."""
+    """The sections of a report; figures are written to files on the way."""
 
     def __init__(self, study: "Study", folder: Path) -> None:
         self.study, self.folder = study, folder
@@ -80,9 +83,9 @@ class _Page:
         metrics = self._metrics()
         for metric in metrics:
             yield from self._metric(metric)
-        left_out = len(self.study.metrics) - len(metrics)
-        if left_out:
-            yield f"<p>{left_out} more numbers are in <code>variants.parquet</code>.</p>"
+        more = len(self.study.metrics) - len(metrics)
+        if more:
+            yield f"<p>{more} more numbers are in <code>variants.parquet</code>.</p>"
         yield from self._failures()
         yield from self._source()
 
@@ -98,24 +101,24 @@ class _Page:
         rows = []
         for column in self.study.columns:
             labels = self.study.variants[column].unique(maintain_order=True).to_list()
-            shown = ", ".join(map(_text, labels[:12])) + (", …" if len(labels) > 12 else "")
-            rows.append([column, str(len(labels)), shown])
+            values = ", ".join(map(_text, labels[:12])) + (", …" if len(labels) > 12 else "")
+            rows.append([column, str(len(labels)), values])
         yield _table(["axis", "values", "which"], rows, text=(0, 2))
         yield from self._warnings(counts.total - counts.complete)
 
     def _warnings(self, missing: int) -> Iterator[str]:
         if missing:
-            yield _warning(f"{missing} variants have no results: what follows leaves them out.")
+            yield _warning(f"{missing} variants have no results: the answers below leave them out.")
         for column in self.units:
             count = self.study.variants[column].n_unique()
             if count < FEW_UNITS:
                 yield _warning(
-                    f"There are only {count} values of {column}: intervals are wide, and hold only"
-                    f" if these are like others. {FEW_UNITS} or more are better."
+                    f"There are only {count} values of {column}: intervals are wide and uncertain."
+                    f" {FEW_UNITS} or more are better."
                 )
         for column in self.study.meta.populations:
             if column not in self.units:
-                yield _warning(f"There is one {column} only: answers hold for that one alone.")
+                yield _warning(f"There is only one {column}: answers hold for that one only.")
 
     def _comparison(self, number: int, comparison: Any) -> Iterator[str]:
         from fleet2d.studies.figures import draw_comparison
@@ -129,19 +132,19 @@ class _Page:
             yield _warning(str(error))
             return
         yield self._figure(draw_comparison(table, axis, reference, metric), f"compare-{number + 1}")
-        words = ["variance_ratio"]
-        yield _frame(table.drop(words), text=(axis, "verdict", *comparison["within"]))
-        ratio = [r for r in table["variance_ratio"].to_list() if r is not None and math.isfinite(r)]
-        if ratio:
-            middle = sorted(ratio)[len(ratio) // 2]
+        yield _frame(table.drop("variance_ratio"), text=(axis, "verdict", *comparison["within"]))
+        ratios = [r for r in table["variance_ratio"].to_list() if r and math.isfinite(r)]
+        if ratios:
             yield (
                 f"<p>Differences are taken in pairs with the same homes, people and seeds; their"
-                f" variance is {_number(1 / middle)} of that of unpaired differences.</p>"
+                f" variance is {_number(1 / median_high(ratios))} of that of"
+                " unpaired differences.</p>"
             )
 
     def _metrics(self) -> list[str]:
-        compared = [one["metric"] for one in self.study.meta.compare]
-        ordered = list(dict.fromkeys([*compared, *self.study.metrics]))
+        """Return the metrics of the report, those of comparisons first."""
+        compared = [comparison["metric"] for comparison in self.study.meta.compare]
+        ordered = dict.fromkeys([*compared, *self.study.metrics])
         return [name for name in ordered if name in self.study.metrics][:MOST_METRICS]
 
     def _metric(self, metric: str) -> Iterator[str]:
@@ -177,15 +180,15 @@ class _Page:
         failures = self.study.failures
         if len(failures):
             yield "<h2>Failures</h2>"
-            shown = failures.select("variant", *self.study.columns, "error").head(50)
-            yield _frame(shown, text=(*self.study.columns, "error"))
+            table = failures.select("variant", *self.study.columns, "error").head(50)
+            yield _frame(table, text=(*self.study.columns, "error"))
 
     def _source(self) -> Iterator[str]:
         if self.study.meta.source:
             yield f"<h2>The study file</h2><pre>{html.escape(self.study.meta.source)}</pre>"
 
     def _figure(self, figure: "Figure", name: str) -> str:
-        """Write a figure to a file, and return it as part of the page."""
+        """Write a figure to a file; return it as an HTML image."""
         from fleet2d.view.floorplan import save_figure
 
         path = self.folder / "figures" / f"{name}.svg"
@@ -204,13 +207,15 @@ def _warning(text: str) -> str:
 
 
 def _frame(frame: "pl.DataFrame", text: Sequence[str] = ()) -> str:
-    """Return a data frame as a table of the page."""
-    places = tuple(i for i, column in enumerate(frame.columns) if column in text)
+    """Return a data frame as an HTML table; `text` names its columns of text."""
+    text_columns = tuple(i for i, column in enumerate(frame.columns) if column in text)
     rows = [[_text(value) for value in row] for row in frame.rows()]
-    return _table([column.replace("_", " ") for column in frame.columns], rows, places)
+    return _table([column.replace("_", " ") for column in frame.columns], rows, text_columns)
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()) -> str:
+    """Return an HTML table; `text` holds the indices of its columns of text."""
+
     def cells(tag: str, values: Sequence[str]) -> str:
         return "".join(
             f"<{tag}{' class=text' if i in text else ''}>{html.escape(value)}</{tag}>"
@@ -228,7 +233,7 @@ def _text(value: Any) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number with three digits that matter.
+    """Return a number with three significant digits.
 
     >>> _number(0.12345), _number(1234.5), _number(float("nan"))
     ('0.123', '1,234', '–')

@@ -1,9 +1,10 @@
 """The results of a study so far: from its committed parts and from its journal."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _STATE = b"fleet2d.parts"
-_IN_PLAN = ("identity", "scenario", "template", "home_key")  # columns of the plan that aren't shown
+_PLAN_ONLY = ("identity", "scenario", "template", "home_key")  # no columns of `variants`
 MISSING = "missing"
 
 
@@ -24,44 +25,48 @@ class Counts:
     """How far a study is.
 
     Attributes:
-        total: Its variants.
-        complete: How many have run.
-        failed: How many failed.
+        total: The number of its variants.
+        complete: The number of variants that are complete.
+        failed: The number of variants that failed.
     """
 
     total: int
     complete: int
     failed: int
 
+    @classmethod
+    def of(cls, statuses: Sequence[str | None]) -> Self:
+        """Count the statuses of variants."""
+        return cls(len(statuses), statuses.count("complete"), statuses.count("failed"))
+
     @property
     def missing(self) -> int:
-        """How many have not run."""
+        """The number of variants without results."""
         return self.total - self.complete - self.failed
 
 
 def statuses(directory: StudyDirectory, parts: Iterable[Part]) -> dict[int, str]:
-    """Return how each variant with results ended: the newest result counts."""
-    known = tuple(parts)
-    found: dict[int, str] = {}
-    for table in read_results(directory.storage, known):
-        found |= zip(
+    """Return the status of each variant with results, by number; the newest result counts."""
+    parts = tuple(parts)
+    ended: dict[int, str] = {}
+    for table in read_results(directory.storage, parts):
+        ended |= zip(
             table.column(VARIANT).to_pylist(), table.column("status").to_pylist(), strict=True
         )
-    for record in read_journal(directory.journal_path(known)):
-        found[record.number] = record.header["status"]
-    return found
+    for record in read_journal(directory.journal_path(parts)):
+        ended[record.number] = record.header["status"]
+    return ended
 
 
 def count(directory: StudyDirectory) -> Counts:
     """Return how far a study is."""
     numbers = directory.read_table(PLAN, [VARIANT]).column(VARIANT).to_pylist()
     ended = statuses(directory, directory.parts())
-    states = [ended.get(number, MISSING) for number in numbers]
-    return Counts(len(states), states.count("complete"), states.count("failed"))
+    return Counts.of([ended.get(number) for number in numbers])
 
 
 def assemble(directory: StudyDirectory) -> "pa.Table":
-    """Return `variants`: parameters, status, time, digest and metrics, in the design's order."""
+    """Return `variants`: parameters, status, time, digest, metrics, in the order of the design."""
     import pyarrow as pa
 
     parts = directory.parts()
@@ -69,30 +74,25 @@ def assemble(directory: StudyDirectory) -> "pa.Table":
     results = list(read_results(directory.storage, parts))
     if headers or not results:
         results.append(results_table(headers))
-    joined = pa.concat_tables(results, promote_options="default")
+    table = pa.concat_tables(results, promote_options="default")
     plan = directory.read_table(PLAN)
-    rows = _newest_rows(joined.column(VARIANT).to_numpy(), plan.column(VARIANT).to_numpy())
-    matched = joined.take(pa.array(rows, pa.int64(), mask=rows < 0))
-    columns = {name: plan.column(name) for name in plan.column_names if name not in _IN_PLAN}
-    for name in joined.column_names:
-        if name != VARIANT:
-            columns[name] = matched.column(name)
+    rows = _newest_rows(table.column(VARIANT).to_numpy(), plan.column(VARIANT).to_numpy())
+    newest = table.take(pa.array(rows, pa.int64(), mask=rows < 0))
+    columns = {name: plan.column(name) for name in plan.column_names if name not in _PLAN_ONLY}
+    columns |= {name: newest.column(name) for name in newest.column_names if name != VARIANT}
     columns["status"] = columns["status"].fill_null(MISSING)
-    table = pa.table(columns)
-    return table.replace_schema_metadata({_STATE: _state(parts, bool(headers))})
+    return pa.table(columns).replace_schema_metadata({_STATE: _state(parts, bool(headers))})
 
 
 def variants_table(directory: StudyDirectory) -> "pa.Table":
-    """Return `variants`, from its file if that is current."""
+    """Return `variants`, read from its file if that is up to date."""
     parts = directory.parts()
     has_journal = next(read_journal(directory.journal_path(parts)), None) is not None
     if not has_journal:
-        try:
+        with suppress(FileNotFoundError):
             table = directory.read_table(VARIANTS)
-        except FileNotFoundError:
-            return assemble(directory)
-        if (table.schema.metadata or {}).get(_STATE) == _state(parts, has_journal=False):
-            return table
+            if (table.schema.metadata or {}).get(_STATE) == _state(parts, has_journal=False):
+                return table
     return assemble(directory)
 
 
@@ -101,11 +101,16 @@ def write_variants(directory: StudyDirectory) -> None:
     directory.write_table(VARIANTS, assemble(directory))
 
 
-def _newest_rows(numbers: Any, wanted: Any) -> Any:
-    """Return for each wanted number its last row, -1 where there is none."""
-    last = np.full(max(numbers.max(initial=-1), wanted.max(initial=-1)) + 2, -1, np.int64)
-    last[numbers] = np.arange(len(numbers))
-    return last[wanted]
+def _newest_rows(numbers: Any, variants: Any) -> Any:
+    """Return the last row of each variant in a table of results, -1 where there is none.
+
+    Args:
+        numbers: The variant of each row of the results: int32 (rows,).
+        variants: The variants to look up: int32 (variants,).
+    """
+    rows = np.full(max(numbers.max(initial=-1), variants.max(initial=-1)) + 2, -1, np.int64)
+    rows[numbers] = np.arange(len(numbers))
+    return rows[variants]
 
 
 def _state(parts: Iterable[Part], has_journal: bool) -> bytes:

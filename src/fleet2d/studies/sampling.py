@@ -13,7 +13,7 @@ from fleet2d.errors import InputError
 from fleet2d.problems import problem
 
 Method = Literal["random", "latin_hypercube"]
-DIGITS = 6  # significant ones of a sampled number: what is printed is what was run
+DIGITS = 6  # significant digits of a sampled number, so that tables print the very value
 
 
 class Parameter(Settings):
@@ -34,13 +34,13 @@ class Parameter(Settings):
                 raise problem("give low and high, or choices, not both")
             return self
         if self.low is None or self.high is None or not self.low < self.high:
-            raise problem("low and high are wanted, low below high; or choices")
+            raise problem("give low and high, low below high; or choices")
         if self.log and self.low <= 0:
             raise problem(f"low is {self.low:g}; with log it must be above 0")
         return self
 
     def at(self, share: float) -> Any:
-        """Return the value at a share of the range, 0 up to 1.
+        """Return the value at a share of the range, from 0 to 1.
 
         >>> Parameter(key="a.b", low=1, high=100, log=True).at(0.5)
         10.0
@@ -55,17 +55,17 @@ class Parameter(Settings):
             return rounded(math.exp(math.log(self.low) + share * math.log(self.high / self.low)))
         return rounded(self.low + share * (self.high - self.low))
 
-    def written(self, value: Any) -> Any:
-        """Return the value as the scenario takes it, with its unit.
+    def with_unit(self, value: Any) -> Any:
+        """Return a value as the scenario file spells it, with its unit.
 
-        >>> Parameter(key="a.b", low=1, high=9, unit="d").written(2.5)
+        >>> Parameter(key="a.b", low=1, high=9, unit="d").with_unit(2.5)
         '2.5 d'
         """
         return f"{value!r} {self.unit}" if self.unit and not self.choices else value
 
 
 def rounded(value: float, digits: int = DIGITS) -> float:
-    """Return a number with so many significant digits.
+    """Return a number rounded to a number of significant digits.
 
     >>> rounded(0.123456789)
     0.123457
@@ -77,7 +77,7 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np
     """Return points of the unit cube: float64 (count, dimensions), the same at each call.
 
     Raises:
-        InputError: scipy is missing, which draws Latin hypercubes.
+        InputError: scipy is missing, which Latin hypercubes need.
     """
     generator = np.random.Generator(np.random.Philox(seed))
     if method == "random":
@@ -93,7 +93,7 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np
 def draw(
     parameters: Mapping[str, Parameter], method: Method, count: int, seed: int
 ) -> list[dict[str, Any]]:
-    """Return `count` samples, each a value by name of parameter."""
+    """Return `count` samples, each a mapping of parameter name to value."""
     points = shares(method, count, len(parameters), seed)
     return [
         {

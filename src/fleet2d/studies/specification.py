@@ -1,4 +1,4 @@
-"""What a study file holds, validated."""
+"""The study file: its sections as typed settings, and how it is read."""
 
 import os.path
 from collections.abc import Mapping
@@ -26,10 +26,10 @@ RESERVED = (
     "attempts", "step", "time", "scenario", "template", "home_key", "simulated_s", "trace",
     "peak_rss_mb",
 )  # fmt: skip
-"""Columns of the results, which no axis may be called."""
+"""Columns of the results; no axis may have such a name."""
 
 
-class Rule(Settings):
+class ConditionalChange(Settings):
     """A change for all variants that fulfil a condition."""
 
     when: dict[str, Any] = Field(default={}, description="values of axes; a list: any of them")
@@ -37,7 +37,7 @@ class Rule(Settings):
 
 
 class Keep(Settings):
-    """What of each run is kept."""
+    """What a study keeps of each run."""
 
     metrics: tuple[str, ...] = Field(
         default=("*",), description="names or patterns of numbers, such as ltp_error.*.tv"
@@ -45,7 +45,7 @@ class Keep(Settings):
     tables: tuple[str, ...] = Field(default=(), description="tables of a run, by name")
 
 
-class Comparison(Settings):
+class PairedComparison(Settings):
     """A paired comparison that the report shows."""
 
     metric: str = Field(description="a number, such as ltp_error.ana.tv")
@@ -71,8 +71,8 @@ def _numbers_or_count(value: Any) -> Any:
 class StudyFile(Settings):
     """A study: a base scenario, axes along which it varies, what to keep and to compare."""
 
-    name: str | None = Field(default=None, description="what the study is called in reports")
-    description: str = Field(default="", description="what it is to answer, for the report")
+    name: str | None = Field(default=None, description="the name of the study in reports")
+    description: str = Field(default="", description="the question it answers, for the report")
     base: Any = Field(
         default=None,
         description="the scenario: a file, bundled:NAME, or a mapping; left out: bundled:base",
@@ -81,18 +81,22 @@ class StudyFile(Settings):
     replicates: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**63)], ...], BeforeValidator(_numbers_or_count)
     ] = Field(default=(), description="how many seeds, from 0 on, or a list; left out: the base's")
-    rules: tuple[Rule, ...] = Field(default=(), description="changes for some of the variants")
+    rules: tuple[ConditionalChange, ...] = Field(
+        default=(), description="changes for some of the variants"
+    )
     exclude: tuple[dict[str, Any], ...] = Field(
         default=(), description="combinations to leave out: {axis: value, …}"
     )
     keep: Keep = Field(default=Keep(), description="what of each run is kept")
-    compare: tuple[Comparison, ...] = Field(default=(), description="what the report compares")
+    compare: tuple[PairedComparison, ...] = Field(
+        default=(), description="what the report compares"
+    )
     tune: TuneSettings | None = Field(default=None, description="what `fleet2d tune` searches")
 
     @model_validator(mode="before")
     @classmethod
     def _short_axes(cls, data: Any) -> Any:
-        """Let `robots.astro.speed: [0.3, 0.6]` stand for an axis with that key."""
+        """Expand `robots.astro.speed: [0.3, 0.6]` to an axis with that key."""
         axes = data.get("axes") if isinstance(data, Mapping) else None
         if not isinstance(axes, Mapping):
             return data
@@ -122,9 +126,9 @@ class StudyFile(Settings):
             _check_columns(rule.when, [*known, SEED], ("rules", i, "when"), "axes")
         for i, condition in enumerate(self.exclude):
             _check_columns(condition, [*known, SEED], ("exclude", i), "axes")
-        for i, one in enumerate(self.compare):
+        for i, comparison in enumerate(self.compare):
             for key in ("against", "by", "within"):
-                columns = getattr(one, key) or ()
+                columns = getattr(comparison, key) or ()
                 _check_columns(columns, [*known, SEED], ("compare", i, key), "axes")
         return self
 
@@ -135,9 +139,9 @@ class StudyFile(Settings):
 
     @property
     def populations(self) -> tuple[str, ...]:
-        """The columns whose values stand for a population, the seed last."""
-        inner = (c for name, axis in self.axes.items() for c in axis.populations(name))
-        return (*inner, SEED)
+        """The columns whose values are a sample of a population, the seed last."""
+        columns = (c for name, axis in self.axes.items() for c in axis.populations(name))
+        return (*columns, SEED)
 
 
 def _long_form(name: str, axis: Any) -> Any:
@@ -149,8 +153,8 @@ def _long_form(name: str, axis: Any) -> Any:
                 f" robots.astro.speed: […]; else write {name}: {{key: PATH, values: […]}}",
             )
         return {"key": name, "values": list(axis)}
-    keyless = isinstance(axis, Mapping) and "key" not in axis and "." in name
-    if keyless and axis.keys() & {"values", "range"}:
+    needs_key = isinstance(axis, Mapping) and "key" not in axis and "." in name
+    if needs_key and axis.keys() & {"values", "range"}:
         return {"key": name, **axis}
     return axis
 
@@ -172,13 +176,13 @@ def _check_columns(
 
 @dataclass(frozen=True)
 class Specification:
-    """A study file that was read.
+    """The content of a study file.
 
     Attributes:
-        file: What it says, validated.
-        places: Where each key was written.
+        file: The sections, validated.
+        places: File and line of each key.
         base: The composed base scenario.
-        folder: The folder that relative paths start from.
+        folder: The folder of the file, for relative paths.
         source: The file; None for a mapping.
     """
 
@@ -190,7 +194,7 @@ class Specification:
 
     @property
     def name(self) -> str:
-        """What the study is called."""
+        """The name of the study: as the file says, else the name of the file."""
         return self.file.name or (self.source.stem if self.source else "study")
 
 
@@ -201,7 +205,7 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
         source: A YAML file, or the same as a mapping.
 
     Raises:
-        ScenarioError: What is wrong, where it is written, and what is wanted.
+        ScenarioError: The study is wrong; the message says where and what to write.
     """
     if isinstance(source, Specification):
         return source
@@ -221,7 +225,7 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
 
 
 def _base(base: Any, document: Document) -> Document:
-    """Compose the base scenario; its messages name the lines of the study file."""
+    """Compose the base scenario; messages name the lines of the study file."""
     try:
         if isinstance(base, Scenario):
             return compose(base.resolved())
@@ -233,19 +237,22 @@ def _base(base: Any, document: Document) -> Document:
             raise ScenarioError(f"found {base!r}; a scenario's file or a mapping is wanted")
         return compose(os.path.relpath(folder_of(base) / Path(base).expanduser()))
     except ScenarioError as error:
-        where = document.place(("base",))
-        raise ScenarioError(f"{where}{': ' * bool(where)}base: {error}") from None
+        place = document.place(("base",))
+        raise ScenarioError(f"{place}{': ' * bool(place)}base: {error}") from None
 
 
 def _inline_base(base: Mapping[str, Any], document: Document) -> Document:
-    extended = base.get("extends") or []
-    parents = extended if isinstance(extended, list) else [extended]
+    """Compose a base that the study file itself holds, with the lines of its keys."""
+    extends = base.get("extends") or []
+    parents = extends if isinstance(extends, list) else [extends]
     paths = [
         str(p) if str(p).startswith("bundled:") else str(folder_of(p) / Path(str(p)).expanduser())
         for p in parents
     ]
-    own = {key: value for key, value in base.items() if key != "extends"}
-    composed = compose({"extends": paths, **own})
-    places = {keys[1:]: where for keys, where in document.places.items() if keys[:1] == ("base",)}
-    composed.places.update((k, where) for k, where in places.items() if k[:1] != ("extends",))
+    composed = compose({**base, "extends": paths})
+    composed.places.update(
+        (keys[1:], place)
+        for keys, place in document.places.items()
+        if keys[:1] == ("base",) and keys[1:2] != ("extends",)
+    )
     return composed

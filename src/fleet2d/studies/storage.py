@@ -1,21 +1,18 @@
-"""Where a study's files lie: a local folder, or any store that pyarrow's file systems reach."""
+"""The files of a study: in a local folder, or in any store that pyarrow can reach."""
 
 import os
 import re
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fleet2d.artifacts.directory import is_disk_full
 from fleet2d.errors import ArtifactError, RunDirectoryError
-
-if TYPE_CHECKING:
-    pass
 
 COPY_BYTES = 1 << 22
 
 
 def write_error(location: str | Path, error: OSError) -> ArtifactError:
-    """Return the error to raise where a study can't be written."""
+    """Return the error of a failed write, with its reason and remedy."""
     reason = "the disk is full" if is_disk_full(error) else (error.strerror or str(error))
     remedy = "free some space" if is_disk_full(error) else "see that it can be written"
     return ArtifactError(
@@ -25,17 +22,17 @@ def write_error(location: str | Path, error: OSError) -> ArtifactError:
 
 
 class Storage:
-    """Files by name; a file is there whole, or not at all.
+    """Files by name. A file is complete, or it doesn't exist.
 
     Attributes:
-        location: What the user wrote, without the secrets in it.
+        location: The folder or store as the user wrote it, without secrets.
         folder: The local folder; None for a remote store.
-        filesystem: That of pyarrow.
-        root: The folder's path in it.
+        filesystem: The file system of pyarrow.
+        root: The path of the folder in it.
     """
 
     def __init__(self, location: str | Path) -> None:
-        """Touch nothing yet.
+        """Find the file system; nothing is read or written.
 
         Raises:
             RunDirectoryError: The location can't be understood or reached.
@@ -43,29 +40,29 @@ class Storage:
         import pyarrow as pa
         import pyarrow.fs as pafs
 
-        self._written = str(location)
-        self.location = re.sub(r"//[^/@]*@", "//", self._written)
+        self._source = str(location)
+        self.location = re.sub(r"//[^/@]*@", "//", self._source)
         self.folder: Path | None = None
         self.filesystem: pafs.FileSystem
-        if "://" in self._written:
+        if "://" in self._source:
             try:
-                self.filesystem, self.root = pafs.FileSystem.from_uri(self._written)
+                self.filesystem, self.root = pafs.FileSystem.from_uri(self._source)
             except (pa.ArrowException, OSError, ValueError) as error:
                 raise RunDirectoryError(
                     f"{self.location} can't be used as a store: {error}; write a folder, or a"
                     " location like s3://bucket/study"
                 ) from error
         else:
-            self.folder = Path(self._written).absolute()
+            self.folder = Path(self._source).absolute()
             self.filesystem, self.root = pafs.LocalFileSystem(), str(self.folder)
 
     @property
     def is_local(self) -> bool:
-        """Whether it is a folder of this machine."""
+        """Whether it is a local folder."""
         return self.folder is not None
 
     def path(self, name: str) -> str:
-        """Return where the file system has a file."""
+        """Return the path of a file in the file system."""
         return str(PurePosixPath(self.root) / name)
 
     def names(self, folder: str = "") -> list[str]:
@@ -82,15 +79,15 @@ class Storage:
             infos = self.filesystem.get_file_info(selector)
         except OSError as error:
             raise self._unreachable(error) from error
-        found = [info.path for info in infos if info.type == pafs.FileType.File]
-        return sorted(str(PurePosixPath(path).relative_to(self.root)) for path in found)
+        paths = (info.path for info in infos if info.type == pafs.FileType.File)
+        return sorted(str(PurePosixPath(path).relative_to(self.root)) for path in paths)
 
     def exists(self, name: str) -> bool:
-        """Return whether a file is there."""
+        """Return whether there is such a file."""
         return self.size(name) is not None
 
     def size(self, name: str) -> int | None:
-        """Return the bytes of a file, None if there is none."""
+        """Return the size of a file [bytes], None if there is none."""
         try:
             info = self.filesystem.get_file_info(self.path(name))
         except OSError as error:
@@ -108,7 +105,7 @@ class Storage:
             return bytes(file.read())
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file at one stroke.
+        """Write a file; readers see all of it, or none.
 
         Raises:
             ArtifactError: It can't be written.
@@ -130,7 +127,7 @@ class Storage:
             raise write_error(self.location, error) from error
 
     def publish(self, local: Path, name: str) -> None:
-        """Bring a finished local file to its place: renamed where possible, else copied.
+        """Move a finished local file into the storage: by renaming if it is local, else by a copy.
 
         Raises:
             ArtifactError: It can't be written.
@@ -154,7 +151,7 @@ class Storage:
             raise write_error(self.location, error) from error
 
     def delete(self, name: str) -> None:
-        """Delete a file, if it is there."""
+        """Delete a file, if there is one."""
         if self.exists(name):
             self.filesystem.delete_file(self.path(name))
 
@@ -163,4 +160,4 @@ class Storage:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the location alone."""
-        return Storage, (self._written,)
+        return Storage, (self._source,)

@@ -15,34 +15,34 @@ _CLOCK = (VARIANT, "step", "time")
 
 
 def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
-    """Return a metric as it was at each moment: variant, `day`, `value` and the axes.
+    """Return a metric at each moment: columns `variant`, `day`, `value` and the axes.
 
-    The table is that of the metric's first name, the column that of its last, and the names in
+    The first part of the metric's name is the table, the last part the column, and the parts
     between select rows: `ltp_error.ana.tv` is column `tv` of the rows of ana in `ltp_error`.
 
     Returns:
-        None if the study keeps no such table.
+        The rows by variant and day; None if the study keeps no such table.
     """
     import polars as pl
 
-    name, *middle, last = metric.split(".")
+    name, *middle, end = metric.split(".")
     if name not in study.tables:
         return None
     rows = study.polars(name)
     schema = rows.collect_schema()
     columns = [c for c in schema if c not in (*_CLOCK, *study.columns)]
     numbers = [c for c in columns if schema[c].is_float()]
-    words = [c for c in columns if schema[c] == pl.String]
-    if last in numbers:
-        column, selectors = last, middle
+    texts = [c for c in columns if schema[c] == pl.String]
+    if end in numbers:
+        column, selectors = end, middle
     elif numbers:
-        column, selectors = numbers[0], [*middle, last]
+        column, selectors = numbers[0], [*middle, end]
     else:
         return None
     for selector in selectors:
-        if not words:
+        if not texts:
             return None
-        rows = rows.filter(pl.any_horizontal(pl.col(c) == selector for c in words))
+        rows = rows.filter(pl.any_horizontal(pl.col(c) == selector for c in texts))
     start = pl.col("time").dt.truncate("1d").min().over(VARIANT)
     day = (pl.col("time") - start).dt.total_microseconds() / _US_A_DAY
     return (

@@ -1,4 +1,4 @@
-"""A search as tasks for workers: settings are asked of Optuna, run on homes, and told back."""
+"""A search as tasks for workers: Optuna suggests settings, workers run them on homes."""
 
 import pickle
 from collections import deque
@@ -11,27 +11,27 @@ from fleet2d.scenario.compose import assignment, changed
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.choice import key_path
 from fleet2d.studies.design import Design
-from fleet2d.studies.engine import Prefix, describe_error, flat_numbers
-from fleet2d.studies.record import Task
+from fleet2d.studies.engine import StagedRun, describe_error, flat_numbers
+from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.sampling import Parameter, rounded
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.trust import Trust, current_trust, under
 
 if TYPE_CHECKING:
     import optuna
 
-MOST_KEPT = 40  # runs under way that a process keeps for the next stage of their trial
-FAILURE = "failure"  # what Optuna keeps the reason of a failed trial under
+MOST_RUNS = 40  # unfinished runs that a worker holds for the next stage of their trial
+FAILURE = "failure"  # the attribute of a failed trial that holds the error
 
 
 @dataclass(frozen=True)
-class TrialTask(Task):
+class TrialTask(WorkerTask):
     """One variant with one setting, up to a simulated time.
 
     Attributes:
         trial: The number of the trial.
         settings: The values of the searched parameters.
-        until_s: Simulated time at which it ends [s]; None: that of the scenario.
+        until_s: The simulated time at which the stage ends [s]; None: the end of the scenario.
     """
 
     trial: int = 0
@@ -46,27 +46,27 @@ class TrialJob:
     Attributes:
         design: The variants.
         search: The searched parameters.
-        objectives: The names of the numbers.
-        trust: Whose code may run, in whichever process.
+        objectives: The names of the metrics.
+        trust: The code that workers may run; None: any.
     """
 
     design: Design
     search: Mapping[str, Parameter]
     objectives: tuple[str, ...]
     trust: Trust | None = field(default_factory=current_trust)
-    _kept: dict[tuple[int, int], Prefix] = field(default_factory=dict, repr=False)
+    _runs: dict[tuple[int, int], StagedRun] = field(default_factory=dict, repr=False)
 
     def scenario(self, index: int, settings: Mapping[str, Any]) -> Scenario:
-        """Return a variant with a setting.
+        """Return the scenario of a variant with a setting.
 
         Raises:
-            ScenarioError: The setting is none that the scenario can have.
+            ScenarioError: The scenario can't have that setting.
         """
         scenario = self.design.scenario(index)
         changes = [
             assignment(
                 key_path(self.search[name].key),
-                self.search[name].written(value),
+                self.search[name].with_unit(value),
                 f"tune.search.{name} = {value}",
             )
             for name, value in settings.items()
@@ -74,7 +74,7 @@ class TrialJob:
         document = changed(scenario._document, changes)
         return scenario_of(document, scenario.folder)
 
-    def __call__(self, task: Task) -> bytes:
+    def __call__(self, task: WorkerTask) -> bytes:
         """Return (objectives, error), pickled; one of them is None."""
         assert isinstance(task, TrialTask)
         try:
@@ -83,43 +83,50 @@ class TrialJob:
             numbers = dict(flat_numbers(metrics))
             missing = [name for name in self.objectives if name not in numbers]
             if missing:
-                raise ComponentError(f"the run came to no number {missing[0]!r}")
+                raise ComponentError(f"the run has no metric {missing[0]!r}")
             return pickle.dumps(([numbers[name] for name in self.objectives], None))
         except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
             return pickle.dumps((None, describe_error(error)))
 
     def _metrics(self, task: TrialTask) -> Mapping[str, Any]:
-        """Return the metrics as of the end of a stage; go on with what this process keeps of it."""
+        """Return the metrics at the end of a stage; the run of earlier stages is continued."""
         key = task.trial, task.index
-        prefix = self._kept.pop(key, None)
-        if prefix is None:
-            prefix = Prefix(self.scenario(task.index, task.settings))
-        metrics = prefix.until(task.until_s).metrics
-        if task.until_s is not None and not prefix.done:
-            self._kept[key] = prefix
-            while len(self._kept) > MOST_KEPT:  # of trials given up, which no message tells of
-                del self._kept[next(iter(self._kept))]
+        run = self._runs.pop(key, None) or StagedRun(self.scenario(task.index, task.settings))
+        metrics = run.until(task.until_s).metrics
+        if task.until_s is not None and not run.done:
+            self._runs[key] = run
+            while len(self._runs) > MOST_RUNS:  # workers don't hear of trials that ended early
+                del self._runs[next(iter(self._runs))]
         return metrics
 
 
 @dataclass
-class _Running:
-    """A trial under way: at which of its stages, and what is known of it."""
+class _RunningTrial:
+    """A running trial.
+
+    Attributes:
+        trial: The trial of Optuna.
+        settings: The values of the searched parameters.
+        stage: The index of the current stage.
+        objectives: The objectives of each variant that has finished the stage.
+        unfinished: The number of variants that haven't finished the stage.
+        error: The first error of a variant.
+    """
 
     trial: "optuna.Trial"
     settings: dict[str, Any]
     stage: int = 0
-    found: list[list[float]] = field(default_factory=list)
+    objectives: list[list[float]] = field(default_factory=list)
+    unfinished: int = 0
     error: str | None = None
-    left: int = 0
 
 
-class TrialSchedule(Schedule):
-    """Tasks of a search: a new trial is asked for when workers have nothing else to do.
+class TrialSchedule(TaskSchedule):
+    """The tasks of a search: a new trial starts when workers have nothing else to do.
 
-    A trial runs all variants up to each time of `prune_at` before it goes on to the next; Optuna
-    decides in between whether it is worth going on. A variant goes on with the worker that keeps
-    it: another takes it only if nothing else is left, and runs it from the start.
+    A trial runs all variants up to one time of `prune_at` before the next; between them Optuna
+    decides whether the trial continues. The worker that holds the run of a variant continues it;
+    another worker takes it only if there is nothing else, and runs it from the start.
     """
 
     def __init__(
@@ -130,95 +137,104 @@ class TrialSchedule(Schedule):
         stages: Sequence[float | None],
         trials: int,
     ) -> None:
-        """Ask nothing yet.
+        """Create the schedule without a trial.
 
         Args:
-            study: Optuna's.
+            study: The study of Optuna.
             search: The searched parameters.
-            variants: Index in the design and home of each variant that a trial runs.
-            stages: Simulated times up to which a trial runs [s]; the last is None.
-            trials: How many trials are to begin.
+            variants: The index in the design and the home of each variant that a trial runs.
+            stages: The simulated times of the stages [s]; the last is None.
+            trials: The number of trials to start.
         """
         super().__init__(())
         self._study, self._search = study, search
         self._variants, self._stages = variants, stages
-        self._to_begin = trials
-        self._running: dict[int, _Running] = {}
+        self._new_trials = trials
+        self._running: dict[int, _RunningTrial] = {}
         self._waiting: deque[TrialTask] = deque()
-        self._keepers: dict[tuple[int, int], Hashable] = {}
-        self._numbers = 0
+        self._holders: dict[tuple[int, int], Hashable] = {}
+        self._task_count = 0
 
     def __len__(self) -> int:
-        """Return how many tasks there may be."""
-        return len(self._waiting) + self._to_begin * len(self._variants)
+        """Return the largest number of tasks that workers can take now."""
+        return len(self._waiting) + self._new_trials * len(self._variants)
 
     def __bool__(self) -> bool:
-        """Return whether there is anything left to take."""
-        return bool(self._waiting or self._to_begin)
+        """Return whether there are more tasks or trials."""
+        return bool(self._waiting or self._new_trials)
 
-    def take(self, worker: Hashable) -> Task | None:
-        """Return the next task: one to go on with, to begin with, of a new trial, or any left."""
+    def take(self, worker: Hashable) -> WorkerTask | None:
+        """Return the next task: of a run that the worker holds, a new run or trial, or any task."""
         task = self._waiting_for(worker)
-        if task is None and self._to_begin:
-            self._to_begin -= 1
+        if task is None and self._new_trials:
+            self._new_trials -= 1
             trial = self._study.ask()
             settings = {name: suggested(trial, name, p) for name, p in self._search.items()}
-            self._running[trial.number] = running = _Running(trial, settings)
-            self._begin_stage(running)
+            self._running[trial.number] = running = _RunningTrial(trial, settings)
+            self._start_stage(running)
             task = self._waiting_for(worker)
         task = task or (self._waiting[0] if self._waiting else None)
         if task is not None:
             self._waiting.remove(task)
-            self._keepers[task.trial, task.index] = worker
+            self._holders[task.trial, task.index] = worker
         return task
 
     def _waiting_for(self, worker: Hashable) -> TrialTask | None:
-        """Return the first task that a worker goes on with, else one that nobody has begun with."""
-        keepers = [self._keepers.get((task.trial, task.index)) for task in self._waiting]
-        for keeper in (worker, None):
-            if keeper in keepers:
-                return self._waiting[keepers.index(keeper)]
+        """Return the first task of a run that the worker holds, else of one that nobody holds."""
+        holders = [self._holders.get((task.trial, task.index)) for task in self._waiting]
+        for holder in (worker, None):
+            if holder in holders:
+                return self._waiting[holders.index(holder)]
         return None
 
     def leave(self, worker: Hashable) -> None:
-        """Give up what a worker kept: it is gone."""
-        self._keepers = {key: keeper for key, keeper in self._keepers.items() if keeper != worker}
+        """Forget the runs that a worker held: it has ended."""
+        self._holders = {key: holder for key, holder in self._holders.items() if holder != worker}
 
-    def put_back(self, task: Task) -> None:
-        """Let a task be taken again."""
+    def put_back(self, task: WorkerTask) -> None:
+        """Return a task to the front of the schedule."""
         assert isinstance(task, TrialTask)
         self._waiting.appendleft(task)
 
-    def finished(self, task: TrialTask, values: list[float] | None, error: str | None) -> bool:
-        """Take in what came of a task; return whether its trial is over."""
+    def finish(self, task: TrialTask, objectives: list[float] | None, error: str | None) -> bool:
+        """Record the result of a task; return whether its trial is over."""
         running = self._running[task.trial]
-        running.left -= 1
+        running.unfinished -= 1
         running.error = running.error or error
-        if values is not None:
-            running.found.append(values)
-        if running.left:
+        if objectives is not None:
+            running.objectives.append(objectives)
+        if running.unfinished:
             return False
-        if running.error is None and self._goes_on(running):
+        if running.error is not None:
+            running.trial.set_user_attr(FAILURE, running.error)
+            self._study.tell(running.trial, state=_state("FAIL"))
+        elif self._continue(running):
             return False
         del self._running[task.trial]
         for index, _ in self._variants:
-            self._keepers.pop((task.trial, index), None)
+            self._holders.pop((task.trial, index), None)
         return True
 
-    def _begin_stage(self, running: _Running) -> None:
+    def _start_stage(self, running: _RunningTrial) -> None:
         until_s = self._stages[running.stage]
-        running.found, running.left = [], len(self._variants)
+        running.objectives, running.unfinished = [], len(self._variants)
         for index, home in self._variants:
-            self._numbers += 1
+            self._task_count += 1
             self._waiting.append(
                 TrialTask(
-                    self._numbers, index, "", home, running.trial.number, running.settings, until_s
+                    self._task_count,
+                    index,
+                    "",
+                    home,
+                    running.trial.number,
+                    running.settings,
+                    until_s,
                 )
             )
 
-    def _goes_on(self, running: _Running) -> bool:
-        """Tell Optuna what a stage came to; return whether there is another."""
-        means = [sum(values) / len(values) for values in zip(*running.found, strict=True)]
+    def _continue(self, running: _RunningTrial) -> bool:
+        """Report the means of a stage to Optuna; start the next stage, if there is to be one."""
+        means = [sum(values) / len(values) for values in zip(*running.objectives, strict=True)]
         until_s = self._stages[running.stage]
         if until_s is None:
             self._study.tell(running.trial, means)
@@ -228,18 +244,12 @@ class TrialSchedule(Schedule):
             self._study.tell(running.trial, state=_state("PRUNED"))
             return False
         running.stage += 1
-        self._begin_stage(running)
+        self._start_stage(running)
         return True
-
-    def fail(self, task: TrialTask) -> None:
-        """Tell Optuna that a trial failed."""
-        trial = self._study.trials[task.trial]
-        if not trial.state.is_finished():
-            self._study.tell(task.trial, state=_state("FAIL"))
 
 
 def suggested(trial: "optuna.Trial", name: str, parameter: Parameter) -> Any:
-    """Return the value that Optuna wants tried."""
+    """Return the value that Optuna suggests for a parameter."""
     if parameter.choices:
         return parameter.choices[trial.suggest_categorical(name, range(len(parameter.choices)))]
     assert parameter.low is not None
@@ -257,10 +267,10 @@ def _state(name: str) -> Any:
 
 
 def check_settings(job: TrialJob, index: int) -> None:
-    """Build a variant with the ends of each parameter's range, and with each of its choices.
+    """Check a variant with both ends of each parameter's range, and with each of its choices.
 
     Raises:
-        ScenarioError: A value is none that the scenario can have.
+        ScenarioError: The scenario can't have such a value.
     """
     for name, parameter in job.search.items():
         for value in parameter.choices or (parameter.at(0.0), parameter.at(1.0)):

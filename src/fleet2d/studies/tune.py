@@ -1,4 +1,4 @@
-"""Tuning: a search on training homes with Optuna, judged on homes that it has not seen."""
+"""Tuning: a search on training homes with Optuna, judged on other homes."""
 
 import pickle
 from collections.abc import Mapping
@@ -10,11 +10,11 @@ from fleet2d.errors import InputError, ScenarioError
 from fleet2d.studies.axes import OptionsAxis
 from fleet2d.studies.design import matches
 from fleet2d.studies.directory import StudyDirectory
-from fleet2d.studies.driver import Checked, RunOptions, check_study, run_study
+from fleet2d.studies.driver import CheckedStudy, RunOptions, check_study, run_study
 from fleet2d.studies.execution import Executor, Lost
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.sampling import rounded
-from fleet2d.studies.specification import Comparison, Specification, read_specification
+from fleet2d.studies.specification import PairedComparison, Specification, read_specification
 from fleet2d.studies.storage import write_error
 from fleet2d.studies.trials import (
     FAILURE,
@@ -30,26 +30,26 @@ if TYPE_CHECKING:
 
 TRIALS, HELD_OUT = "trials.log", "held_out"
 SETTING, BEFORE, TUNED = "setting", "as it was", "tuned"
-MOST_TUNED = 5  # settings of a search for several objectives that are judged
+MOST_TUNED = 5  # settings to judge after a search for several objectives
 
 
 class TuneObserver(Protocol):
-    """Is told how a search goes on."""
+    """Follows the progress of a search."""
 
     def __call__(self, done: int, trials: int, best: list[float] | None) -> None:
-        """Take in how many trials are over, and the best objectives so far."""
+        """Receive the number of trials that are over, and the best objectives so far."""
         ...
 
 
 @dataclass(frozen=True)
-class Tuned:
-    """What a search came to.
+class TuneResult:
+    """The result of a search.
 
     Attributes:
         settings: The best settings by name, as overrides: key path to value.
-        values: Their objectives on the training homes.
-        trials: How many trials are complete, pruned and failed.
-        held_out: The study on the homes that the search has not seen.
+        values: Their objectives on the training homes, by name.
+        trials: The numbers of complete, pruned and failed trials.
+        held_out: The study on the homes that the search doesn't use.
     """
 
     settings: dict[str, dict[str, Any]]
@@ -64,18 +64,20 @@ def tune(
     executor: Executor,
     observer: TuneObserver | None = None,
     options: RunOptions | None = None,
-) -> Tuned:
-    """Search the parameters that a study's `tune` section names, and judge what is found.
+) -> TuneResult:
+    """Search the parameters that a study's `tune` section names, and judge the best settings.
 
-    Called again, it goes on where it stopped.
+    A search that was interrupted continues.
 
     Raises:
-        InputError: The study has no such section, something in it is wrong, or Optuna is missing.
+        InputError: The study has no such section, the section is wrong, or Optuna is missing.
     """
     specification = read_specification(source)
     settings = specification.file.tune
     if settings is None:
-        raise ScenarioError(f"{specification.name} has no section `tune`: it says what to search")
+        raise ScenarioError(
+            f"{specification.name} has no section `tune`, which names the parameters to search"
+        )
     checked = check_study(specification)
     job = TrialJob(checked.plan.design, settings.search, tuple(settings.objectives))
     training = [
@@ -88,15 +90,15 @@ def tune(
     check_settings(job, training[0][0])
     directory = StudyDirectory(folder)
     if directory.storage.folder is None:
-        raise InputError(f"{folder} is no local folder: the storage of Optuna wants one")
+        raise InputError(f"{folder} is no local folder: the storage of Optuna needs one")
     with directory.locked():
         study = _open_optuna(directory.storage.folder / TRIALS, specification.name, settings)
         _search(study, job, training, settings, executor, observer)
     best = _best(study, settings)
-    judged = _judge(specification, best, settings)
-    run_study(judged, directory.storage.folder / HELD_OUT, executor, options or RunOptions())
+    held_out = _check_held_out(specification, best, settings)
+    run_study(held_out, directory.storage.folder / HELD_OUT, executor, options or RunOptions())
     states = [trial.state.name.lower() for trial in study.trials]
-    return Tuned(
+    return TuneResult(
         {name: _overrides(trial, settings) for name, trial in best.items()},
         {name: list(trial.values) for name, trial in best.items()},
         {state: states.count(state) for state in ("complete", "pruned", "fail")},
@@ -112,35 +114,29 @@ def _search(
     executor: Executor,
     observer: TuneObserver | None,
 ) -> None:
-    """Run trials until there are as many as wanted."""
+    """Run trials up to the number of the settings."""
     from optuna.trial import TrialState
 
-    over = (TrialState.COMPLETE, TrialState.PRUNED)
-    done = len(study.get_trials(deepcopy=False, states=over))
-    stages = (*(at.total_seconds() for at in settings.prune_at), None)
-    left = settings.trials - done
-    if left <= 0:
+    states = (TrialState.COMPLETE, TrialState.PRUNED)
+    over = len(study.get_trials(deepcopy=False, states=states))
+    stages = (*(time.total_seconds() for time in settings.prune_at), None)
+    if over >= settings.trials:
         return
-    schedule = TrialSchedule(study, settings.search, training, stages, left)
+    schedule = TrialSchedule(study, settings.search, training, stages, settings.trials - over)
     events = executor.run(job, schedule)
     try:
         for event in events:
             task = event.task
             assert isinstance(task, TrialTask)
             if isinstance(event, Lost):
-                values, error = None, event.reason
+                objectives, error = None, event.reason
             else:
-                values, error = pickle.loads(event.payload)  # noqa: S301 - from our own workers
-            if not schedule.finished(task, values, error):
+                objectives, error = pickle.loads(event.payload)  # noqa: S301 - from our own workers
+            if not schedule.finish(task, objectives, error):
                 continue
-            if error is not None:
-                study._storage.set_trial_system_attr(
-                    study.trials[task.trial]._trial_id, FAILURE, error
-                )
-            schedule.fail(task)
-            done += 1
+            over += 1
             if observer is not None:
-                observer(done, settings.trials, _best_values(study))
+                observer(over, settings.trials, _best_values(study))
     finally:
         events.close()
 
@@ -151,10 +147,10 @@ def _best_values(study: "optuna.Study") -> list[float] | None:
 
 
 def _open_optuna(path: Path, name: str, settings: TuneSettings) -> "optuna.Study":
-    """Open Optuna's storage; trials that a killed process left are begun anew.
+    """Open Optuna's storage; unfinished trials of a killed process are started again.
 
     Raises:
-        InputError: Optuna is not installed, or the storage is of another search.
+        InputError: Optuna is not installed, or the storage belongs to another search.
     """
     try:
         import optuna
@@ -174,7 +170,7 @@ def _open_optuna(path: Path, name: str, settings: TuneSettings) -> "optuna.Study
         pruner=optuna.pruners.MedianPruner(n_startup_trials=5),
     )  # fmt: skip
     if [direction.name.lower() for direction in study.directions] != directions:
-        raise InputError(f"{path} is of a search for other objectives: choose another --out")
+        raise InputError(f"{path} belongs to a search for other objectives: choose another --out")
     finished = len(study.trials)
     if len(directions) == 1:
         study.sampler = optuna.samplers.TPESampler(seed=settings.seed + finished)
@@ -188,15 +184,15 @@ def _open_optuna(path: Path, name: str, settings: TuneSettings) -> "optuna.Study
 
 
 def _best(study: "optuna.Study", settings: TuneSettings) -> "dict[str, optuna.trial.FrozenTrial]":
-    """Return the best trials by what they are called in the report.
+    """Return the best trials by their names in the report.
 
     Raises:
         InputError: All trials failed.
     """
     best = study.best_trials[:MOST_TUNED]
     if not best:
-        reasons = [trial.system_attrs.get(FAILURE) for trial in study.trials]
-        reason = next((r for r in reasons if r), "none is complete")
+        reasons = (trial.user_attrs.get(FAILURE) for trial in study.trials)
+        reason = next(filter(None, reasons), "none is complete")
         raise InputError(f"no trial succeeded: {reason}")
     if len(settings.objectives) == 1:
         return {TUNED: best[0]}
@@ -204,35 +200,36 @@ def _best(study: "optuna.Study", settings: TuneSettings) -> "dict[str, optuna.tr
 
 
 def _overrides(trial: "optuna.trial.FrozenTrial", settings: TuneSettings) -> dict[str, Any]:
-    """Return a trial's settings as they are written in a scenario."""
-    found = {}
+    """Return the settings of a trial as changes of the scenario: key path to value."""
+    overrides = {}
     for name, value in trial.params.items():
         parameter = settings.search[name]
-        own = parameter.choices[value] if parameter.choices else value
-        own = rounded(own) if isinstance(own, float) else own
-        found[parameter.key] = parameter.written(own)
-    return found
+        if parameter.choices:
+            value = parameter.choices[value]
+        value = rounded(value) if isinstance(value, float) else value
+        overrides[parameter.key] = parameter.with_unit(value)
+    return overrides
 
 
-def _judge(
+def _check_held_out(
     specification: Specification,
     best: "dict[str, optuna.trial.FrozenTrial]",
     settings: TuneSettings,
-) -> Checked:
-    """Return the study of the best settings on the homes that were held out."""
+) -> CheckedStudy:
+    """Return the study that compares the best settings on the homes held out of the search."""
     ((axis, values),) = settings.held_out.items()
     design = check_study(specification).plan.design
-    seen = tuple(
+    training = tuple(
         label for label in design.labels[axis] if not matches({axis: list(values)}, {axis: label})
     )
     options = {BEFORE: dict[str, Any]()}
     options |= {name: _overrides(trial, settings) for name, trial in best.items()}
     file = specification.file
     compare = tuple(
-        Comparison(metric=metric, against={SETTING: BEFORE}) for metric in settings.objectives
+        PairedComparison(metric=metric, against={SETTING: BEFORE}) for metric in settings.objectives
     )
-    exclude = (*file.exclude, {axis: seen}) if seen else file.exclude
-    judged = file.model_copy(
+    exclude = (*file.exclude, {axis: training}) if training else file.exclude
+    comparison = file.model_copy(
         update={
             "name": f"{specification.name}, tuned",
             "axes": {**file.axes, SETTING: OptionsAxis(options=options)},
@@ -242,5 +239,5 @@ def _judge(
         }
     )
     return check_study(
-        Specification(judged, specification.places, specification.base, specification.folder)
+        Specification(comparison, specification.places, specification.base, specification.folder)
     )

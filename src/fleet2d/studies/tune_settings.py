@@ -11,29 +11,30 @@ from fleet2d.units import PositiveDuration
 
 
 class TuneSettings(Settings):
-    """What is searched, for which objectives, and on which homes it is judged."""
+    """The searched parameters, the objectives, and the homes on which the results are judged."""
 
     search: dict[str, Parameter] = Field(min_length=1, description="the parameters, by name")
     objectives: dict[str, Literal["minimize", "maximize"]] = Field(
-        min_length=1, description="numbers such as ltp_error.ana.tv, and which way is better"
+        min_length=1, description="metrics such as ltp_error.ana.tv, each with the better direction"
     )
-    trials: int = Field(default=40, ge=1, description="how many settings are tried")
+    trials: int = Field(default=40, ge=1, description="the number of settings to try")
     held_out: dict[str, tuple[Any, ...]] = Field(
         min_length=1,
         max_length=1,
-        description="{axis: [values]}: never seen by the search, only by the report",
+        description="{axis: [values]}: unknown to the search, used only by the report",
     )
     prune_at: tuple[PositiveDuration, ...] = Field(
         default=(),
-        description="simulated times at which a setting that does badly is given up; with one"
-        " objective only",
+        description="simulated times at which poor trials end early; with one objective only",
     )
-    seed: int = Field(default=0, ge=0, description="of the search")
+    seed: int = Field(default=0, ge=0, description="the seed of the search")
 
     @model_validator(mode="after")
     def _prunes_by_one_objective(self) -> Self:
         if self.prune_at and len(self.objectives) > 1:
-            raise problem("prune_at wants one objective: by several nothing can be given up early")
+            raise problem(
+                "prune_at needs one objective: with several objectives no trial can end early"
+            )
         if list(self.prune_at) != sorted(set(self.prune_at)):
-            raise problem("prune_at wants times in ascending order")
+            raise problem("prune_at needs times in ascending order")
         return self

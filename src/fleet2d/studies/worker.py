@@ -1,6 +1,6 @@
-"""A worker process: `python -m fleet2d.studies.worker`, spoken to through its standard streams.
+"""A worker process: `python -m fleet2d.studies.worker`, with messages on its standard streams.
 
-It ends at once when the process that began it is gone, whatever it is doing.
+It ends at once when the driver, which started it, has ended.
 """
 
 import os
@@ -16,8 +16,8 @@ READY, RESULT, BROKEN = "ready", "result", "broken"
 
 
 def main() -> None:
-    """Be set up, then do tasks until there are no more."""
-    # What a user's component prints must not get among the messages.
+    """Receive the job, then run tasks until there are no more."""
+    # Output of users' components goes to standard error: standard output carries messages.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -26,7 +26,7 @@ def main() -> None:
         folder, sys.path[:] = receive(stream)
         os.chdir(folder)
         job = receive(stream)
-    except BaseException:  # noqa: BLE001 - whatever an import does is reported
+    except BaseException:  # noqa: BLE001 - imports may raise anything
         send(answers, (BROKEN, traceback.format_exc()))
         return
     threading.Thread(target=_listen, args=(stream, tasks), daemon=True).start()
@@ -39,11 +39,11 @@ def _work(job: Any, tasks: "queue.SimpleQueue[Any]", answers: IO[bytes]) -> None
 
     while (task := tasks.get()) is not None:
         send(answers, (RESULT, (task, job(task), peak_rss_mb())))
-    os._exit(0)  # the thread that listens holds the standard input
+    os._exit(0)  # the listening thread blocks a normal exit
 
 
 def _listen(stream: IO[bytes], tasks: "queue.SimpleQueue[Any]") -> None:
-    """Take tasks in; end the process when the driver is gone."""
+    """Queue the tasks that arrive; end the process when the driver has ended."""
     try:
         while True:
             tasks.put(receive(stream))

@@ -16,8 +16,8 @@ from fleet2d.errors import InputError
 from fleet2d.problems import did_you_mean
 from fleet2d.studies.engine import describe_error
 from fleet2d.studies.execution import Executor, Lost
-from fleet2d.studies.record import Task
-from fleet2d.studies.schedule import Schedule
+from fleet2d.studies.record import WorkerTask
+from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
 from fleet2d.testing.life import Life, Trial
 from fleet2d.testing.running import Body, run_life
@@ -55,7 +55,7 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class TryTask(Task):
+class TryTask(WorkerTask):
     """One life.
 
     Attributes:
@@ -87,7 +87,7 @@ class TryJob:
         scenario = self.space.scenario(subject.base, subject.folder, point, seed)
         return run_life(Variant(scenario, {"seed": seed}), self._body)
 
-    def __call__(self, task: Task) -> bytes:
+    def __call__(self, task: WorkerTask) -> bytes:
         """Return (margin, error), pickled; one of them is None."""
         assert isinstance(task, TryTask)
         try:
@@ -96,7 +96,7 @@ class TryJob:
             return pickle.dumps((None, describe_error(error)))
 
 
-class TrySchedule(Schedule):
+class TrySchedule(TaskSchedule):
     """Lives to run: random points at first, then those that Optuna asks for.
 
     Attributes:
@@ -121,7 +121,7 @@ class TrySchedule(Schedule):
         late = self._deadline is not None and time.monotonic() > self._deadline
         return bool(self._again) or (self.begun < self._budget and not late)
 
-    def take(self, worker: Hashable) -> Task | None:
+    def take(self, worker: Hashable) -> WorkerTask | None:
         """Return the next life."""
         if not self:
             return None
@@ -131,7 +131,7 @@ class TrySchedule(Schedule):
         self.begun += 1
         return task
 
-    def put_back(self, task: Task) -> None:
+    def put_back(self, task: WorkerTask) -> None:
         """Let a life be run again."""
         assert isinstance(task, TryTask)
         self._again.append(task)

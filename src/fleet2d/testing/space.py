@@ -62,7 +62,7 @@ class Space:
         for name, value in point.items():
             if name in self.ranges:
                 parameter = self.ranges[name]
-                found.append((key_path(parameter.key), parameter.written(value)))
+                found.append((key_path(parameter.key), parameter.with_unit(value)))
             else:
                 found += self.choices[name][value].changes
         return found
