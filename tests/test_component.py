@@ -73,7 +73,7 @@ def test_configuration_is_frozen() -> None:
     with pytest.raises(AttributeError) as caught:
         Lamp().watts = 7
     assert str(caught.value) == (
-        "watts is configuration of Lamp and can't be changed in a run; keep what changes in "
+        "watts is configuration of Lamp and can't be changed in a run; store what changes in "
         "another attribute"
     )
 

@@ -1,4 +1,4 @@
-"""Errors keep their type, place and words when they are rewritten."""
+"""Errors keep their type, place and words when they are rewrite."""
 
 from datetime import date, datetime
 from decimal import Decimal
@@ -9,7 +9,7 @@ import pytest
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from fleet2d.problems import did_you_mean, problem_at, rewritten, unknown_key
+from fleet2d.problems import did_you_mean, problem_at, rewrite, unknown_key
 
 
 class Side(Enum):
@@ -50,7 +50,7 @@ class Everything(BaseModel):
 def test_rewritten_error_says_the_same(value: Any) -> None:
     with pytest.raises(ValidationError) as caught:
         Everything.model_validate(dict.fromkeys(Everything.model_fields, value))
-    again = rewritten(caught.value, lambda line: line)
+    again = rewrite(caught.value, lambda line: line)
 
     assert [(e["type"], e["loc"], e["msg"]) for e in caught.value.errors()] == [
         (e["type"], e["loc"], e["msg"]) for e in again.errors()
@@ -58,7 +58,7 @@ def test_rewritten_error_says_the_same(value: Any) -> None:
 
 
 def test_rewriting_moves_an_error() -> None:
-    error = rewritten(problem_at(("a", "b"), "no {b}"), lambda line: {**line, "loc": ("c",)})
+    error = rewrite(problem_at(("a", "b"), "no {b}"), lambda line: {**line, "loc": ("c",)})
 
     assert [(("c",), "no {b}")] == [(e["loc"], e["msg"]) for e in error.errors()]
 

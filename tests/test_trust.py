@@ -14,7 +14,7 @@ import fleet2d as package
 from fleet2d import cli
 from fleet2d.errors import ScenarioError
 from fleet2d.studies.reader import open_study
-from fleet2d.trust import Trust, check_code, code_of, restricted
+from fleet2d.trust import Trust, check_code, code_of, restrict
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]
@@ -125,7 +125,7 @@ def test_a_variant_of_a_stored_study_asks_for_trust(fleet2d: Cli, tmp_path: Path
         json.dumps(study.scenario(0)).replace(f"{tmp_path}/mine:", f"{other}/mine:")
     )
     Path("ran").unlink()
-    with pytest.raises(ScenarioError, match="which would run"), restricted(Trust()):
+    with pytest.raises(ScenarioError, match="which would run"), restrict(Trust()):
         package.run(scenario)
     assert not Path("ran").exists()
     assert 0 == fleet2d("study", "rerun", "studies/study", "0")[0]  # loaded already: its own code
@@ -161,7 +161,7 @@ def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d: Cli, tmp_p
     with pytest.raises(ScenarioError, match="which would run"):
         run.path("ana")
     assert not Path("ran").exists()
-    with restricted(Trust.of([theirs])):
+    with restrict(Trust.of([theirs])):
         assert 0 < len(run.path("ana").x)
 
 
@@ -178,7 +178,7 @@ def test_a_scenario_whose_code_is_named_is_watched(fleet2d: Cli) -> None:
 @pytest.mark.parametrize("name", ["mine:Über", "a/b/mine.py:C", "mine:A.B", "../x:Y", "ü.ö:ä"])
 def test_no_name_of_code_hides_from_the_list(name: str) -> None:
     assert [["a.0.type"]] == list(code_of({"a": [{"type": name}]}).values())
-    with restricted(Trust()), pytest.raises(ScenarioError, match=r"a\.0\.type"):
+    with restrict(Trust()), pytest.raises(ScenarioError, match=r"a\.0\.type"):
         check_code("it", {"a": [{"type": name}]})
 
 

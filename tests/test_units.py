@@ -103,7 +103,7 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dum
         ({"days": "3"}, "found {'days': '3'}; a duration is wanted"),
         (-1, "found -1 s; a duration can't be negative"),
         (timedelta(-1), "a duration can't be negative"),
-        (1e-7, "found 1e-07; a duration is told to the microsecond"),
+        (1e-7, "found 1e-07; the shortest duration is 1 microsecond"),
         ("1e300 s", "found '1e300 s'; 1000 years is the longest duration"),
         (timedelta.max, "1000 years is the longest duration"),
         (float("nan"), "found nan; a duration is a finite number"),

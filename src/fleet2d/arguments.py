@@ -1,4 +1,4 @@
-"""Arguments that several commands take."""
+"""Arguments of several commands."""
 
 import re
 from typing import Annotated, Literal
@@ -7,22 +7,21 @@ import typer
 
 Resolution = Annotated[
     float | None,
-    typer.Option(help="Metres per pixel, of a floor plan that is a mere picture."),
+    typer.Option(help="Metres per pixel, for a floor plan that is a picture without a scale."),
 ]
 
 ThemeChoice = Annotated[
-    Literal["light", "dark"], typer.Option(help="Of pictures: a light or a dark ground.")
+    Literal["light", "dark"], typer.Option(help="Theme of pictures: a light or a dark background.")
 ]
 
 
 def split(arguments: list[str] | None) -> tuple[str | None, list[str]]:
-    """Tell the scenario from the overrides: it comes first, and has no '='."""
-    rest = list(arguments or [])
-    if rest and "=" not in rest[0]:
-        return rest[0], rest[1:]
-    return None, rest
+    """Return the scenario, None if there is none, and the overrides, which have a '='."""
+    if arguments and "=" not in arguments[0]:
+        return arguments[0], arguments[1:]
+    return None, list(arguments or [])
 
 
 def file_name(name: str) -> str:
-    """Return what of a name can be a file's, wherever it comes from."""
+    """Return a name without the characters that a file name should not have."""
     return re.sub(r"[^\w.-]+", "-", name).strip(".-")

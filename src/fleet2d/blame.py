@@ -1,4 +1,4 @@
-"""Whose fault an error is: a component's, at a step."""
+"""Errors of components: which component failed, and at which step."""
 
 import sys
 import traceback
@@ -7,18 +7,19 @@ from typing import Any, ClassVar
 
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
-FRAMES = 4  # of the user's own code that are told, the innermost
+FRAMES = 4
+"""The innermost frames of the user's own code that a message lists, at most."""
 
 
 class blame:  # noqa: N801  (used as a function)
-    """Name the component and the step when a component's code fails.
+    """Name the component and the step in the error when a component's code fails.
 
     Args:
         path: The component's path in the scenario.
-        step: The step it is at; None before the run, when wrong input is not the component's fault.
+        step: The present step; None before the run, when errors about input are passed on.
 
     Raises:
-        ComponentError: The code raised something; an error about the input before the run stays it.
+        ComponentError: The code raised an exception.
 
     Example:
         >>> with blame("users.ana", 7):
@@ -28,39 +29,39 @@ class blame:  # noqa: N801  (used as a function)
     """
 
     now: ClassVar["blame | None"] = None
-    """The innermost component whose code runs now, for the watchdog."""
+    """The innermost component whose code is running, for the watchdog."""
 
     interrupts: ClassVar[bool] = True
-    """Whether Ctrl-C raises KeyboardInterrupt; in a run it is only noted, so code raised it."""
+    """Whether Ctrl-C raises KeyboardInterrupt; if not, a component must have raised it."""
 
     def __init__(self, path: str, step: int | None) -> None:
         self.path, self.step = path, step
 
     def __enter__(self) -> None:
-        """Begin."""
-        self._around, blame.now = blame.now, self
+        """Make this the running component."""
+        self._outer, blame.now = blame.now, self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        """Turn an exception into one that says whose it is."""
-        blame.now = self._around
+        """Replace an exception by one that names the component."""
+        blame.now = self._outer
         if error is None or isinstance(error, ArtifactError | GeneratorExit | MemoryError):
             return
         if isinstance(error, KeyboardInterrupt) and blame.interrupts:
             return
         if isinstance(error, InputError) and self.step is None:
             return
-        own = isinstance(error, ComponentError)
-        when = "when it was started" if self.step is None else f"at step {self.step}"
-        if own and self.path in str(error):
-            if when in str(error):
+        is_ours = isinstance(error, ComponentError)
+        time = "when it was started" if self.step is None else f"at step {self.step}"
+        if is_ours and self.path in str(error):
+            if time in str(error):
                 return
-            raise ComponentError(f"{error} ({when})") from error
-        what = str(error) if own else f"{type(error).__name__}: {_text(error)}"
-        raise ComponentError(f"{self.path} failed {when}: {what}{_place(error)}") from error
+            raise ComponentError(f"{error} ({time})") from error
+        message = str(error) if is_ours else f"{type(error).__name__}: {_text(error)}"
+        raise ComponentError(f"{self.path} failed {time}: {message}{_place(error)}") from error
 
 
 def _text(error: BaseException) -> str:
-    """Return the message of an error, whose own code may fail too."""
+    """Return the message of an error, even if its own code fails."""
     try:
         return str(error)
     except Exception as failure:  # noqa: BLE001 - it is the user's code
@@ -68,9 +69,12 @@ def _text(error: BaseException) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """Return where in files outside Fleet2D an error arose: the user's own code, caller first."""
-    frames = traceback.extract_tb(error.__traceback__)
-    others = (str(Path(__file__).parent), sys.prefix, sys.base_prefix, "<")
-    own = [f for f in frames if not f.filename.startswith(others)]
-    lines = [f"{Path(f.filename).name}:{f.lineno}, in {f.name}: {f.line}" for f in own[-FRAMES:]]
+    """Return the frames of an error in the user's own code, caller first."""
+    libraries = (str(Path(__file__).parent), sys.prefix, sys.base_prefix, "<")
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not frame.filename.startswith(libraries)
+    ]
+    lines = [f"{Path(f.filename).name}:{f.lineno}, in {f.name}: {f.line}" for f in frames[-FRAMES:]]
     return f" ({'; '.join(lines)})" if lines else ""

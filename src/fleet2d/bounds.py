@@ -1,7 +1,7 @@
 """Bounds on what is read from files, so that no file can take all memory or time of a machine.
 
-Each is far beyond what real homes, logs and scenarios need, is named in the message that refuses a
-file, and can be raised by a variable of the environment.
+Each is far beyond what real homes, logs and scenarios need. The message that refuses a file names
+the environment variable that raises the bound.
 """
 
 import os
@@ -15,12 +15,12 @@ from fleet2d.errors import Fleet2DError, InputError
 
 @dataclass(frozen=True)
 class Bound:
-    """The most of something that is read.
+    """An upper bound on something in a file.
 
     Attributes:
-        name: Of the variable that raises it, behind `FLEET2D_MAX_`.
-        usual: The most, unless that says otherwise.
-        noun: What is counted.
+        name: The name of the environment variable that raises it, without `FLEET2D_MAX_`.
+        usual: The bound without that variable.
+        noun: What is counted, for messages.
 
     Example:
         >>> Bound("DEPTH", 64, "lists in lists").check(100, "home.yaml")
@@ -35,15 +35,15 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
 
     @property
     def variable(self) -> str:
-        """The variable of the environment that raises it."""
+        """The name of the environment variable that raises it."""
         return f"FLEET2D_MAX_{self.name}"
 
     @property
     def most(self) -> int:
-        """The most that is read now.
+        """The present bound.
 
         Raises:
-            InputError: The variable holds no whole number above 0.
+            InputError: The variable is no whole number above 0.
         """
         text = os.environ.get(self.variable, "")
         if not text:
@@ -55,16 +55,16 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
     def check(
         self, amount: int, what: object, error: type[Fleet2DError] = InputError, *, least: str = ""
     ) -> None:
-        """Refuse what goes beyond the bound.
+        """Refuse an amount beyond the bound.
 
         Args:
-            amount: How much there is.
-            what: What has it, for the message.
-            error: What is raised.
-            least: Said before an amount that was not counted to its end, such as "more than ".
+            amount: The amount.
+            what: The file or object that has it, for the message.
+            error: The type of the error.
+            least: Text before an amount that was not counted to its end, such as "more than ".
 
         Raises:
-            Fleet2DError: Of the type that is wanted.
+            Fleet2DError: The amount is beyond the bound; an error of the type `error`.
         """
         if amount > self.most:
             raise error(
@@ -75,39 +75,39 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
 
 
 FILE_BYTES = Bound("FILE_BYTES", 64 << 20, "bytes")
-"""Of a text that is held whole: YAML, JSON, GeoJSON."""
+"""Size of a YAML, JSON or GeoJSON file."""
 PICTURE_BYTES = Bound("PICTURE_BYTES", 256 << 20, "bytes")
-"""Of a picture of a floor plan."""
+"""Size of a picture of a floor plan."""
 LOG_BYTES = Bound("LOG_BYTES", 1 << 30, "bytes")
-"""Of a log."""
+"""Size of a log."""
 DEPTH = Bound("DEPTH", 64, "lists in lists")
-"""Of YAML."""
+"""Depth of YAML."""
 VALUES = Bound("VALUES", 500_000, "values")
-"""Of a YAML text, each time that an alias stands for them counted."""
+"""Values in a YAML text; those of an anchor count again for each alias."""
 JSON_VALUES = Bound("JSON_VALUES", 5_000_000, "values")
-"""Of a JSON text."""
+"""Values in a JSON text."""
 PIXELS = Bound("PIXELS", 1 << 25, "pixels")
-"""Of a picture of a floor plan, unpacked."""
+"""Pixels of a picture of a floor plan."""
 POLYGONS = Bound("POLYGONS", 5_000, "polygons and lines")
-"""Of a floor plan: rooms, pieces, features, doorways."""
+"""Polygons of a floor plan: rooms, furniture, features, doorways."""
 CORNERS = Bound("CORNERS", 200_000, "corners")
-"""Of all polygons of a floor plan."""
+"""Corners of all polygons of a floor plan."""
 LOG_ROWS = Bound("LOG_ROWS", 5_000_000, "rows")
-"""Of a log of rooms, activities or detections."""
+"""Rows of a log of rooms, activities or detections."""
 FIXES = Bound("FIXES", 20_000_000, "fixes")
-"""Of a log of positions."""
+"""Rows of a log of positions."""
 LOG_DAYS = Bound("LOG_DAYS", 3_660, "days from its first to its last row")
-"""From the first to the last day of a log: ten years."""
+"""Days from the first to the last row of a log: ten years."""
 LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
-"""Of what an algorithm has learned, unpacked."""
+"""Size of what an algorithm has learned, unpacked."""
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
-"""Of a table that is read whole, unpacked."""
+"""Size of a table, unpacked, that is read at once."""
 
 BOUNDS = (
     FILE_BYTES, PICTURE_BYTES, LOG_BYTES, DEPTH, VALUES, JSON_VALUES, PIXELS, POLYGONS, CORNERS,
     LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES,
 )  # fmt: skip
-"""All of them."""
+"""All bounds."""
 
 
 def read_bytes(path: Path, bound: Bound, error: type[Fleet2DError] = InputError) -> bytes:
@@ -115,12 +115,12 @@ def read_bytes(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
 
     Raises:
         OSError: It can't be read.
-        Fleet2DError: It is larger than the bound, or is a device or a pipe.
+        Fleet2DError: It is larger than the bound, or a device or a pipe; of the type `error`.
     """
     check_file(path, bound, error)
     with path.open("rb") as file:
         content = file.read(bound.most + 1)
-    bound.check(len(content), path, error)  # it may have grown since
+    bound.check(len(content), path, error)  # it may have grown in the meantime
     return content
 
 
@@ -128,8 +128,8 @@ def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
     """Refuse a file that is larger than a bound, and devices and pipes, which have no end.
 
     Raises:
-        OSError: There is none.
-        Fleet2DError: See above.
+        OSError: There is no such file.
+        Fleet2DError: It is refused; of the type `error`.
     """
     state = path.stat()
     if not (stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)):
@@ -138,31 +138,32 @@ def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
 
 
 def unpacked_bytes(file: Any, group: int | None = None) -> int:
-    """Return about how many bytes a Parquet file, or a row group of it, takes once it is read.
+    """Return about how many bytes a Parquet file, or one of its row groups, takes in memory.
 
-    What is packed says how large it is unpacked, but few values may stand for many rows.
+    The file states its unpacked size, but an encoded value may stand for many rows; so it is at
+    least the size of the rows.
 
     Args:
         file: A `pyarrow.parquet.ParquetFile`.
         group: Number of the row group; None for all.
     """
     groups = range(file.num_row_groups) if group is None else (group,)
-    described = [file.metadata.row_group(number) for number in groups]
-    packed = sum(int(each.total_byte_size) for each in described)
-    widths = sum(_width_of(kind) for kind in file.schema_arrow.types)
-    return max(packed, sum(int(each.num_rows) for each in described) * widths)
+    metadata = [file.metadata.row_group(number) for number in groups]
+    stated = sum(int(row_group.total_byte_size) for row_group in metadata)
+    row_bytes = sum(_width_of(kind) for kind in file.schema_arrow.types)
+    return max(stated, sum(int(row_group.num_rows) for row_group in metadata) * row_bytes)
 
 
 def _width_of(kind: Any) -> int:
-    """Return the bytes that a value of an Arrow type takes at the least."""
+    """Return the bytes that a value of an Arrow type takes at least."""
     try:
         return max(1, int(kind.bit_width) // 8)
-    except ValueError:  # of a text or a list: its offset
+    except ValueError:  # the offset of a text or a list
         return 4
 
 
 def one_line(value: object, most: int = 60) -> str:
-    r"""Return what a file has for a message: on one line, and cut where it is long.
+    r"""Return text from a file for a message: on one line, and shortened if it is long.
 
     Example:
         >>> one_line("a\nb"), one_line("x" * 100, 12)

@@ -57,7 +57,7 @@ class Clock:
 
 
 def next_time(text: str, now: datetime) -> datetime:
-    """Return the next moment at which it is a time of day, now included.
+    """Return the next moment at a time of day, which may be the present one.
 
     Raises:
         InputError: It is no time of day.

@@ -1,7 +1,7 @@
-"""Components: what a scenario is made of, how they are declared, registered and found by name.
+"""Components: the parts of a scenario, and how they are declared, registered and looked up.
 
 A component is one class whose typed fields are its configuration. Its kind (floorplan, behavior,
-algorithm, metric) is declared by the base class that its siblings share::
+algorithm, metric) is declared by the base class of all components of that kind::
 
     class Algorithm(Component):
         kind: ClassVar[str] = "algorithm"
@@ -10,7 +10,7 @@ algorithm, metric) is declared by the base class that its siblings share::
     class Likelihood(Algorithm):
         period: Duration = timedelta(hours=1)
 
-A component in a module below its kind's package is found without being imported anywhere.
+A component in a module below its kind's package needs no import anywhere else.
 """
 
 import importlib
@@ -36,8 +36,8 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from fleet2d.component_class import ComponentClass
 from fleet2d.errors import ScenarioError
-from fleet2d.outside import BrokenModule, import_class, written_path
-from fleet2d.problems import did_you_mean, problem, problem_at, rewritten, shown, unknown_key
+from fleet2d.outside import BrokenModule, class_path, import_class
+from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, shown, unknown_key
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -57,7 +57,7 @@ PACKAGES = {
 
 
 class Settings(BaseModel):
-    """A group of configuration keys: frozen, and unknown keys are errors that name the known."""
+    """A frozen group of configuration keys; the error about an unknown key lists the known ones."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False
@@ -67,20 +67,20 @@ class Settings(BaseModel):
     @classmethod
     def _name_known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if isinstance(data, Mapping):
-            _refuse_truth(data, cls.model_fields)
+            _refuse_booleans(data, cls.model_fields)
         try:
             return handler(data)
         except ValidationError as error:
-            raise rewritten(error, lambda line: cls._explain(line, data)) from None
+            raise rewrite(error, lambda line: cls._explain(line, data)) from None
 
     @classmethod
     def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:
-        """Say which keys are known, and how the list is written that a key wants."""
-        kind, (key, *inner) = line["type"], line["loc"] or ("",)
-        if kind == "extra_forbidden" and not inner:
+        """Return an error with the list of known keys, or an example of the list that is wanted."""
+        kind, (key, *inner_keys) = line["type"], line["loc"] or ("",)
+        if kind == "extra_forbidden" and not inner_keys:
             line["type"] = unknown_key(key, cls.model_fields)
-        absent = kind == "missing" and len(inner) == 1 and isinstance(inner[0], int)
-        if absent or (kind in ("tuple_type", "too_long") and not inner):
+        lacks_item = kind == "missing" and len(inner_keys) == 1 and isinstance(inner_keys[0], int)
+        if lacks_item or (kind in ("tuple_type", "too_long") and not inner_keys):
             example = _example(cls, str(key))
             if example and isinstance(data, Mapping):
                 line["type"] = problem(
@@ -99,33 +99,34 @@ class Settings(BaseModel):
 _NUMBERS = (int, float, int | None, float | None)
 
 
-def _refuse_truth(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> None:
-    """Refuse true and false where a number is wanted; Pydantic takes them for 1 and 0.
+def _refuse_booleans(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> None:
+    """Refuse true and false as values of numbers, which Pydantic would read as 1 and 0.
 
     Raises:
-        ValidationError: There is one.
+        ValidationError: There is such a value.
     """
     for key, value in data.items():
         if isinstance(value, bool) and key in fields and fields[key].annotation in _NUMBERS:
-            found = str(value).lower()
-            raise problem_at((key,), f"found {found}; a number is wanted", value)
+            text = str(value).lower()
+            raise problem_at((key,), f"found {text}; a number is wanted", value)
 
 
 def _example(cls: type[Settings], key: str) -> str:
-    """Write a key's example, else its default, if that is a list of numbers."""
+    """Return a key's example, else its default, if that is a list of numbers; else no text."""
     field = cls.model_fields.get(key)
     values = (field.examples or [field.default])[0] if field else None
     if not isinstance(values, tuple | list) or not values:
         return ""
-    plain = all(isinstance(value, int | float) for value in values)
-    return f"[{', '.join(f'{value:g}' for value in values)}]" if plain else ""
+    if not all(isinstance(value, int | float) for value in values):
+        return ""
+    return f"[{', '.join(f'{value:g}' for value in values)}]"
 
 
 class Component(Settings, metaclass=ComponentClass):
     """A part of a scenario that a ``type`` selects.
 
-    Declared fields are configuration and frozen. Anything else that is assigned on an instance is
-    run state: kept, copied with it, and not dumped.
+    Declared fields are configuration and frozen. All other attributes of an instance are run state:
+    they are copied with it, and not dumped.
 
     >>> class Counter(Component):
     ...     limit: int = 3
@@ -139,17 +140,17 @@ class Component(Settings, metaclass=ComponentClass):
     type_name: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Name the class by where it is, until it is registered under a shorter name."""
+        """Set the type name to the path of the class, until it is registered under a name."""
         super().__init_subclass__(**kwargs)
-        cls.type_name = written_path(cls)
+        cls.type_name = class_path(cls)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refuse to change configuration; keep everything else as run state."""
+        """Refuse to change configuration; store all other attributes as run state."""
         cls = type(self)
         if name in cls.model_fields or name in cls.__class_vars__:
-            what = "configuration" if name in cls.model_fields else "a ClassVar"
+            noun = "configuration" if name in cls.model_fields else "a ClassVar"
             raise AttributeError(
-                f"{name} is {what} of {cls.__name__} and can't be changed in a run; keep what "
+                f"{name} is {noun} of {cls.__name__} and can't be changed in a run; store what "
                 "changes in another attribute"
             )
         if name in cls.__private_attributes__:
@@ -191,25 +192,25 @@ def register(kind: str, name: str, *, aliases: Iterable[str] = ()) -> Callable[[
 
 
 def lookup(kind: str, name: str) -> type[Component]:
-    """Find a component class by its registered name, alias, entry point or 'package.module:Class'.
+    """Return a component class by its name, an alias, its entry point or 'package.module:Class'.
 
-    Modules named in a scenario are looked for in the scenario's own folder first, then among the
+    Modules named in a scenario are searched in the scenario's own folder first, then among the
     installed ones. 'folder/package.module:Class' names the folder.
 
     Raises:
-        ScenarioError: nothing of that name, or it can't be imported, or is of another kind.
+        ScenarioError: there is none of that name, or it can't be imported, or is of another kind.
     """
     if ":" in name:
-        return _checked(kind, name, import_class(name))
-    if (found := _registered(kind, name)) is not None:
-        return found
+        return _check_class(kind, name, import_class(name))
+    if (cls := _registered(kind, name)) is not None:
+        return cls
     _import_builtins(kind, name)
-    if (found := _registered(kind, name)) is not None:
-        return found
+    if (cls := _registered(kind, name)) is not None:
+        return cls
     for entry in _plugins(kind):
         if entry.name != name:
             continue
-        cls = _checked(kind, name, import_class(entry.value, is_plugin=True))
+        cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
         cls.type_name = name
         return cls
     known = sorted(components(kind))
@@ -228,13 +229,13 @@ def lookup(kind: str, name: str) -> type[Component]:
 def components(kind: str) -> dict[str, type[Component]]:
     """Return every component of a kind, registered or from an entry point, by name, sorted."""
     _import_builtins(kind)
-    found = {e.name: lookup(kind, e.name) for e in _plugins(kind)} | _REGISTRY.get(kind, {})
-    return dict(sorted(found.items()))
+    plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind)}
+    return dict(sorted((plugins | _REGISTRY.get(kind, {})).items()))
 
 
 def _plugins(kind: str) -> "Iterable[EntryPoint]":
-    """Return what installed packages declare of a kind."""
-    from importlib.metadata import entry_points  # slow to import, and seldom needed
+    """Return the components of a kind that installed packages declare."""
+    from importlib.metadata import entry_points  # slow to import, and seldom used
 
     return entry_points(group=f"fleet2d.{kind}")
 
@@ -254,7 +255,7 @@ def _registered(kind: str, name: str) -> type[Component] | None:
 
 
 def _import_builtins(kind: str, name: str | None = None) -> None:
-    """Import a kind's modules; when a module is called ``name``, nothing beyond it."""
+    """Import a kind's modules, or, if there is one called ``name``, only that module."""
     if kind in _COMPLETE or kind not in PACKAGES:
         return
     package = importlib.import_module(PACKAGES[kind])
@@ -270,37 +271,37 @@ def _import_builtins(kind: str, name: str | None = None) -> None:
     _COMPLETE.add(kind)
 
 
-def _checked(kind: str, name: str, found: object) -> type[Component]:
-    if not (isinstance(found, type) and issubclass(found, Component) and found.kind == kind):
+def _check_class(kind: str, name: str, cls: object) -> type[Component]:
+    if not (isinstance(cls, type) and issubclass(cls, Component) and cls.kind == kind):
         raise ScenarioError(
             f"{name!r} is not a {kind}: it must be a class derived from the "
             f"{kind} base class of fleet2d"
         )
-    if not found.__pydantic_complete__ and found.model_rebuild(raise_errors=False) is not True:
+    if not cls.__pydantic_complete__ and cls.model_rebuild(raise_errors=False) is not True:
         raise ScenarioError(
             f"{name!r} has a field whose type can't be found: import it in its module, not only "
             "for type checkers"
         )
-    if missing := sorted(getattr(found, "__abstractmethods__", ())):
-        raise ScenarioError(f"{name!r} is not a whole {kind}: it lacks {', '.join(missing)}")
-    return found
+    if methods := sorted(getattr(cls, "__abstractmethods__", ())):
+        raise ScenarioError(f"{name!r} is not a whole {kind}: it lacks {', '.join(methods)}")
+    return cls
 
 
 class Codec:
-    """Declares how a field is read from a mapping and written as one."""
+    """Declares how a field is read from a mapping and dumped to one."""
 
     def validate(self, value: Any, info: ValidationInfo) -> Any:
-        """Build the value that a mapping describes."""
+        """Return the value that a mapping describes."""
         raise NotImplementedError
 
     def dump(self, value: Any, info: SerializationInfo) -> dict[str, Any]:
-        """Write the value as a mapping that validates to an equal one."""
+        """Return a mapping that validates to an equal value."""
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Validate and dump by this class alone."""
+        """Return a schema that validates and dumps by the methods of this class."""
         return core_schema.with_info_plain_validator_function(
             self.validate,
             serialization=core_schema.plain_serializer_function_ser_schema(
@@ -320,7 +321,7 @@ class OneOf(Codec):
     kind: str
 
     def validate(self, value: Any, info: ValidationInfo) -> Component:
-        """Build the component that a mapping describes."""
+        """Return the component that a mapping describes."""
         if isinstance(value, Component):
             if value.kind != self.kind:
                 raise problem(f"found a {type(value).__name__}; a {self.kind} is wanted")
@@ -337,12 +338,12 @@ class OneOf(Codec):
                 raise ScenarioError(f"'type' is needed to tell which {self.kind} this is: {known}")
             cls = lookup(self.kind, name)
         except ScenarioError as error:
-            once = error.why if isinstance(error, BrokenModule) else ""
-            raise problem_at(("type",), str(error), name, once) from error
+            group = error.cause if isinstance(error, BrokenModule) else ""
+            raise problem_at(("type",), str(error), name, group) from error
         return cls.model_validate(fields, context=info.context)
 
     def dump(self, value: Component, info: SerializationInfo) -> dict[str, Any]:
-        """Write the component as a mapping that validates to an equal one."""
+        """Return a mapping that validates to an equal component."""
         fields = value.model_dump(
             mode=info.mode,
             context=info.context,
@@ -354,5 +355,5 @@ class OneOf(Codec):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Leave a mark that `fleet2d.scenario.schema` replaces by all types of the kind."""
+        """Return a mark that `fleet2d.scenario.schema` replaces by all types of the kind."""
         return {"x-kind": self.kind}

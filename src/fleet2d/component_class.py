@@ -1,4 +1,4 @@
-"""The class of component classes: what is wrong with a declaration, in plain words."""
+"""The metaclass of components: clear errors about the declaration of their fields."""
 
 import json
 import re
@@ -15,12 +15,12 @@ else:
 
 
 class ComponentClass(ModelMetaclass):
-    """Says in plain words what is wrong with the fields of a component class."""
+    """The metaclass of components, which explains errors in the declaration of fields."""
 
     def __new__(
         cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any
     ) -> type:
-        """Make the class.
+        """Create the class.
 
         Raises:
             TypeError: a field is declared in a way that can't be configuration.
@@ -40,10 +40,10 @@ def _wrong_field(name: str, namespace: Mapping[str, Any], error: PydanticUserErr
     key = attribute[1] or attribute[2]
     value = namespace.get(key)
     kind = "str | None" if value is None else type(value).__name__
-    written = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
-    if len(written) > 40 or isinstance(value, PurePath):
-        written = "…"
+    literal = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    if len(literal) > 40 or isinstance(value, PurePath):
+        literal = "…"
     return (
-        f"{name}.{key} has no type: write `{key}: {kind} = {written}` for configuration, "
-        f"`{key}: ClassVar[{kind}] = {written}` for a constant"
+        f"{name}.{key} has no type: write `{key}: {kind} = {literal}` for configuration, "
+        f"`{key}: ClassVar[{kind}] = {literal}` for a constant"
     )

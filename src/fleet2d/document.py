@@ -1,4 +1,4 @@
-"""Read one YAML file into plain data that remembers where each value was written."""
+"""Read a YAML file into plain data, and the place where each value is written."""
 
 import re
 from dataclasses import dataclass, field
@@ -14,21 +14,21 @@ from fleet2d.problems import Location, did_you_mean
 from fleet2d.yaml_tree import NodeError, Walk, compose
 
 Keys = tuple[str, ...]
-"""The path of a value in a scenario; the places in a list are written as keys, too."""
+"""The path of a value in a scenario; indices of lists are text, too."""
 
 
 @dataclass
 class Document:
-    """Plain data, and for each of its key paths where it was written, like 'home.yaml:12'."""
+    """Plain data, and for each of its key paths where it is written, like 'home.yaml:12'."""
 
     data: dict[str, Any] = field(default_factory=dict)
     places: dict[Keys, str] = field(default_factory=dict)
 
     def place(self, location: Location) -> str:
-        """Return where a key was written, or where the nearest key around it was.
+        """Return where a key is written, or the nearest key around it.
 
-        Of a mapping that something else has changed since, it tells that, too: what is wrong with
-        the whole may come from there.
+        For a mapping it also names the files and overrides that change it: an error about the
+        mapping may be due to these.
 
         Example:
             >>> document = Document()
@@ -38,14 +38,14 @@ class Document:
             "home.yaml:4, changed by override 'users.bo.type=schedule'"
         """
         keys = tuple(map(str, location))
-        around = (keys[:n] for n in range(len(keys), -1, -1))
-        nearest = next((outer for outer in around if outer in self.places), None)
+        parents = (keys[:n] for n in range(len(keys), -1, -1))
+        nearest = next((parent for parent in parents if parent in self.places), None)
         if nearest is None:
             return ""
         place, depth = self.places[nearest], len(nearest)
-        inner = (where for key, where in self.places.items() if key[:depth] == nearest)
-        first = {_file(where): where for where in reversed(list(inner))}
-        changes = [where for file, where in first.items() if file not in ("", _file(place))][::-1]
+        inner_places = [inner for key, inner in self.places.items() if key[:depth] == nearest]
+        first = {_file(inner): inner for inner in reversed(inner_places)}
+        changes = [inner for file, inner in first.items() if file not in ("", _file(place))][::-1]
         if not depth or not changes:
             return place
         return f"{place}, changed by {' and '.join(changes)}" if place else changes[0]
@@ -60,22 +60,26 @@ def _file(place: str) -> str:
     return re.sub(r":\d+$", "", place)
 
 
-def read_document(path: Path, shown: str | None = None) -> Document:
-    """Read a YAML file; ``shown`` is what messages call it.
+def read_document(path: Path, title: str | None = None) -> Document:
+    """Read a YAML file.
+
+    Args:
+        path: The file.
+        title: Its name in messages; None: its path.
 
     Raises:
         ScenarioError: the file can't be read, or is not a YAML mapping; with file and line.
     """
-    shown = shown or str(path)
+    title = title or str(path)
     document = Document()
-    document.data = parse_yaml(_read_text(path, shown), path.parent, shown, document.places)
+    document.data = parse_yaml(_read_text(path, title), path.parent, title, document.places)
     if document.data is None:
         raise ScenarioError(
-            f"{shown} is empty; a scenario that changes nothing reads: extends: bundled:base"
+            f"{title} is empty; a scenario that changes nothing reads: extends: bundled:base"
         )
     if not isinstance(document.data, dict):
         raise ScenarioError(
-            f"{shown}: a scenario is a mapping (simulation: …, floorplan: …); this is "
+            f"{title}: a scenario is a mapping (simulation: …, floorplan: …); this is "
             + (
                 "a list"
                 if isinstance(document.data, list)
@@ -85,13 +89,19 @@ def read_document(path: Path, shown: str | None = None) -> Document:
     return document
 
 
-def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | None = None) -> Any:
-    """Parse YAML text; note the place of each value in ``places``.
+def parse_yaml(text: str, folder: Path, title: str, places: dict[Keys, str] | None = None) -> Any:
+    """Return YAML text as plain data, read by YAML 1.2.
 
-    Booleans are true and false only, 12:30 is text, a key twice is an error: YAML 1.2 and no traps.
+    Booleans are true and false only, 12:30 is text, and a key twice is an error.
 
     >>> parse_yaml("{start: 12:30, light: on, tolerance: 1e-3}", Path(), "example")
     {'start': '12:30', 'light': 'on', 'tolerance': 0.001}
+
+    Args:
+        text: The text.
+        folder: The folder that relative paths in the text start from.
+        title: The name of the text in messages.
+        places: Where the place of each value is added; None: nowhere.
 
     Raises:
         ScenarioError: the text is not YAML; with file and line.
@@ -100,19 +110,19 @@ def parse_yaml(text: str, folder: Path, shown: str, places: dict[Keys, str] | No
         node = compose(text)
         if node is None:
             return None
-        return _Builder(folder, shown, {} if places is None else places).build(node, ())
+        return _Builder(folder, title, {} if places is None else places).build(node, ())
     except yaml.MarkedYAMLError as error:
         line = (
             f":{error.problem_mark.line + 1}" if error.problem_mark and places is not None else ""
         )
-        raise ScenarioError(f"{shown}{line}: not valid YAML: {_plainly(error)}") from error
+        raise ScenarioError(f"{title}{line}: not valid YAML: {_explain(error)}") from error
     except NodeError as error:
         line = f":{error.node.start_mark.line + 1}" if places is not None else ""
-        raise ScenarioError(f"{shown}{line}: {error}") from None
+        raise ScenarioError(f"{title}{line}: {error}") from None
     except (yaml.YAMLError, RecursionError) as error:
-        raise ScenarioError(f"{shown}: not valid YAML: {one_line(error, 200)}") from error
+        raise ScenarioError(f"{title}: not valid YAML: {one_line(error, 200)}") from error
     except InputError as error:
-        raise ScenarioError(f"{shown}: {error}") from None
+        raise ScenarioError(f"{title}: {error}") from None
 
 
 _YAML_ERRORS = (
@@ -129,31 +139,31 @@ _YAML_ERRORS = (
     (r"another document", "a scenario is one document: remove the line '---'"),
     (r"could not find expected ':'", "check the line before: a key ends with ':'"),
 )  # fmt: skip
-"""What PyYAML says, and what it means to who wrote the file; the first that fits."""
+"""Patterns of PyYAML's messages, and clearer messages for them; the first match counts."""
 
 
-def _plainly(error: yaml.MarkedYAMLError) -> str:
-    """Say what is wrong with a YAML text as a person would."""
-    said = " ".join(part for part in (error.problem, error.context) if part)
+def _explain(error: yaml.MarkedYAMLError) -> str:
+    """Return a clear message about an error in a YAML text."""
+    message = " ".join(part for part in (error.problem, error.context) if part)
     mark = error.context_mark or error.problem_mark
-    for pattern, meaning in _YAML_ERRORS:
-        if found := re.search(pattern, said):
-            return meaning.format(*found.groups(), line=mark.line + 1 if mark else 1)
-    return said
+    for pattern, clear_message in _YAML_ERRORS:
+        if match := re.search(pattern, message):
+            return clear_message.format(*match.groups(), line=mark.line + 1 if mark else 1)
+    return message
 
 
-def _read_text(path: Path, shown: str) -> str:
+def _read_text(path: Path, title: str) -> str:
     try:
         return read_bytes(path, FILE_BYTES, ScenarioError).decode("utf-8-sig")
     except FileNotFoundError:
         near = [str(p) for p in sorted(path.parent.glob("*.y*ml"))] if path.parent.is_dir() else []
-        raise ScenarioError(f"there is no file {shown}{did_you_mean(path, near)}") from None
+        raise ScenarioError(f"there is no file {title}{did_you_mean(path, near)}") from None
     except IsADirectoryError:
-        raise ScenarioError(f"{shown} is a folder; name the YAML file in it") from None
+        raise ScenarioError(f"{title} is a folder; name the YAML file in it") from None
     except UnicodeDecodeError as error:
-        raise ScenarioError(f"{shown} is not a text file (byte {error.start})") from None
+        raise ScenarioError(f"{title} is not a text file (byte {error.start})") from None
     except OSError as error:
-        raise ScenarioError(f"can't read {shown}: {error.strerror}") from error
+        raise ScenarioError(f"can't read {title}: {error.strerror}") from error
 
 
 @dataclass
@@ -161,15 +171,15 @@ class _Builder:
     """Turns a tree of YAML nodes into plain data."""
 
     folder: Path
-    shown: str
+    title: str
     places: dict[Keys, str]
     open_nodes: list[yaml.Node] = field(default_factory=list)
     walk: Walk = field(default_factory=Walk)
 
     def build(self, node: yaml.Node, location: Keys) -> Any:
-        """Build a node's value; note where it starts."""
-        self.places.setdefault(location, f"{self.shown}:{node.start_mark.line + 1}")
-        self.walk.take(node, self.open_nodes)
+        """Return the value of a node, and add its place to `places`."""
+        self.places.setdefault(location, f"{self.title}:{node.start_mark.line + 1}")
+        self.walk.enter(node, self.open_nodes)
         if isinstance(node, yaml.ScalarNode):
             value = self.walk.scalar(node)
             return Text(value, self.folder) if isinstance(value, str) else value
@@ -184,8 +194,8 @@ class _Builder:
     def _mapping(self, node: yaml.MappingNode, location: Keys) -> dict[str, Any]:
         result = {}
         for key, value in self.walk.pairs(node):
-            inner = (*location, key.value)
-            self.places.pop(inner, None)
-            result[key.value] = self.build(value, inner)
-            self.places[inner] = f"{self.shown}:{key.start_mark.line + 1}"
+            path = (*location, key.value)
+            self.places.pop(path, None)
+            result[key.value] = self.build(value, path)
+            self.places[path] = f"{self.title}:{key.start_mark.line + 1}"
         return result

@@ -1,11 +1,11 @@
-"""What can go wrong, as a small tree: catch :class:`Fleet2DError` for all of it."""
+"""Exceptions: catch :class:`Fleet2DError` for all of them."""
 
-# Characters of a line of a message; what is longer echoes input, and is cut in its middle.
+# A longer line of a message quotes input, and is shortened to its head and tail [characters].
 _LONGEST, _HEAD, _TAIL = 1000, 600, 300
 
 
 class Fleet2DError(Exception):
-    """Base of every error that Fleet2D raises on purpose.
+    """Base of all errors that Fleet2D raises.
 
     Example:
         >>> len(str(Fleet2DError("x" * 10**6)))
@@ -13,7 +13,7 @@ class Fleet2DError(Exception):
     """
 
     def __init__(self, *args: object) -> None:
-        """Cut lines that no one could read."""
+        """Shorten very long lines of the message."""
         super().__init__(*(_cut(arg) if isinstance(arg, str) else arg for arg in args))
 
 
@@ -27,7 +27,7 @@ def _cut(text: str) -> str:
 
 
 class InputError(Fleet2DError):
-    """What the user gave is wrong; the message says what, where, and what to do."""
+    """The user's input is wrong; the message says what, where, and what to do."""
 
 
 class ScenarioError(InputError):
@@ -39,7 +39,7 @@ class FloorPlanError(InputError):
 
 
 class PlacementError(InputError):
-    """An entity can't stand or go where it was told to."""
+    """An entity can't stand or go at the place that it was sent to."""
 
 
 class ComponentError(Fleet2DError):
@@ -47,7 +47,7 @@ class ComponentError(Fleet2DError):
 
 
 class NoWayError(ComponentError):
-    """There is no way to a place at present; a shut door may be why."""
+    """There is no way to a place at present, for example because a door is shut."""
 
 
 class ArtifactError(Fleet2DError):

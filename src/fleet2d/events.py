@@ -1,4 +1,4 @@
-"""Events: what happens in a run, as its tables, its algorithms and its scripts hear of it."""
+"""Events: what happens in a run, for its tables, algorithms and scripts."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -18,12 +18,12 @@ class EventKind(StrEnum):
     A behavior that records others declares them by `records` in its class.
     """
 
-    # Of cameras.
+    # Cameras
     USER_LOST = "user_lost"
     USER_SEEN = "user_seen"
     ROBOT_LOST = "robot_lost"
     ROBOT_SEEN = "robot_seen"
-    # Of people.
+    # People
     ACTIVITY = "activity"
     CAME_HOME = "came_home"
     KNOWN = "known"
@@ -31,7 +31,7 @@ class EventKind(StrEnum):
     REACTS = "reacts"
     UNKNOWN = "unknown"
     USES = "uses"
-    # Of robots.
+    # Robots
     APPROACHES = "approaches"
     BATTERY = "battery"
     CALLED = "called"
@@ -56,7 +56,7 @@ class EventKind(StrEnum):
     RETRACES = "retraces"
     VISITS = "visits"
     WAY_BLOCKED = "way_blocked"
-    # Of the home.
+    # The home
     LOCKED = "locked"
     MOVED = "moved"
     OPENED = "opened"
@@ -79,13 +79,13 @@ CHANGES = frozenset(
 
 
 class Event(NamedTuple):
-    """Something that happened.
+    """An event.
 
     Attributes:
-        step: When.
+        step: The step at which it happened.
         entity: Name of the body or object that it happened to; empty for the home.
         event: Its kind: one of EventKind, or one that a behavior declares.
-        detail: What else there is to say; of a camera's event, who was seen or lost.
+        detail: Details by kind; for a camera's event, the person or robot seen or lost.
     """
 
     step: int
@@ -100,14 +100,14 @@ class Event(NamedTuple):
 
 
 class EventSink(Protocol):
-    """What takes the events of a run: its tables, the history of algorithms, a script."""
+    """A receiver of the events of a run: its tables, the history of algorithms, a script."""
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Take events, in the order in which they became known, not by step."""
+        """Receive events, in the order in which they became known, not by step."""
 
 
 class Listener:
-    """A function that takes the events of a run."""
+    """A function that receives the events of a run."""
 
     def __init__(self, function: Callable[[Sequence[Event]], None]) -> None:
         self.function = function
@@ -118,45 +118,46 @@ class Listener:
 
 
 class EventStream:
-    """The events of a run: each is made once, and handed to all sinks.
+    """The events of a run, passed on to all sinks.
 
     Attributes:
-        sinks: Who takes them.
+        sinks: The receivers.
+        CAPACITY: Number of the newest events that `since` can return.
     """
 
-    KEPT = 1 << 16
+    CAPACITY = 1 << 16
 
     def __init__(self, sinks: Iterable[EventSink] = ()) -> None:
         self.sinks = list(sinks)
-        self._recent: deque[Event] = deque(maxlen=self.KEPT)
-        self._dropped_until = 0  # every event from this step on is still there
+        self._recent: deque[Event] = deque(maxlen=self.CAPACITY)
+        self._first_step = 0  # all events from this step on are in `_recent`
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out functions that listen: they belong to who called, not to the run."""
+        """Leave out the functions: they belong to the caller, not to the run."""
         sinks = [sink for sink in self.sinks if not isinstance(sink, Listener)]
         return {**self.__dict__, "sinks": sinks}
 
     def emit(self, events: Sequence[Event]) -> None:
-        """Hand events to all sinks."""
+        """Pass events on to all sinks."""
         if not events:
             return
-        excess = len(self._recent) + len(events) - self.KEPT
+        excess = len(self._recent) + len(events) - self.CAPACITY
         if excess > 0:
-            dropped = islice(chain(self._recent, events), excess)
-            self._dropped_until = max(self._dropped_until, *(e.step + 1 for e in dropped))
+            oldest = islice(chain(self._recent, events), excess)
+            self._first_step = max(self._first_step, *(e.step + 1 for e in oldest))
         self._recent.extend(events)
         for sink in self.sinks:
             sink.take_events(events)
 
     def since(self, step: int) -> list[Event]:
-        """Return the events from a step on, in order of step.
+        """Return the events from a step on, in the order of their steps.
 
         Raises:
-            InputError: Those of that step are no longer kept.
+            InputError: Too many events have happened since that step.
         """
-        if step < self._dropped_until:
+        if step < self._first_step:
             raise InputError(
-                f"events from step {self._dropped_until} on are kept, not from step {step}: ask"
+                f"events from step {self._first_step} on are kept, not from step {step}: ask"
                 " more often, or read the table 'events'"
             )
         return sorted((e for e in self._recent if e.step >= step), key=lambda e: (e.step, e.rank))

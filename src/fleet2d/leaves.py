@@ -1,6 +1,6 @@
-"""What shows and judges runs: named from above, so that what is shown knows nothing of it.
+"""Modules that show and judge runs, registered at run time: lower packages can't import them.
 
-A few methods of `Run` and `FloorPlan` hand over to it. Everything else works without.
+Only a few methods of `Run` and `FloorPlan` need them.
 """
 
 from collections.abc import Callable
@@ -10,49 +10,49 @@ from fleet2d.errors import InputError
 
 
 class Views(Protocol):
-    """What draws and shows runs and floor plans; `fleet2d.viewer.notebook` does."""
+    """A module that draws and shows runs and floor plans, like `fleet2d.viewer.notebook`."""
 
     def draw_run(self, run: Any, at: str | int | None, axes: Any, theme: str) -> Any:
-        """Return a figure of a run, or of a moment of it."""
+        """Return a figure of a run, or of one moment of it."""
 
     def draw_plan(self, plan: Any, axes: Any, theme: str) -> Any:
         """Return a figure of a floor plan."""
 
     def plan_png(self, plan: Any) -> bytes | None:
-        """Return a picture of a floor plan, if one can be drawn."""
+        """Return a picture of a floor plan as PNG; None if none can be drawn."""
 
     def run_html(self, run: Any) -> str:
-        """Return a run as a notebook shows it."""
+        """Return the HTML of a run for a notebook."""
 
     def run_widget(self, run: Any, height: int) -> Any:
         """Return the page of a run as a widget of a height [pixels]."""
 
 
 class Judges(Protocol):
-    """What judges finished runs; `fleet2d.engine.reproduce` does."""
+    """A module that judges finished runs, like `fleet2d.engine.reproduce`."""
 
     def judge_again(self, run: Any, expectation: Any, name: str) -> Any:
-        """Return the verdict on what is expected of a run."""
+        """Return the verdict on an expectation of a run."""
 
 
-_load: list[Callable[[], Views]] = []
+_load_views: list[Callable[[], Views]] = []
 _load_judges: list[Callable[[], Judges]] = []
 
 
 def register_judges(load: Callable[[], Judges]) -> None:
-    """Name what judges finished runs from now on.
+    """Register the module that judges finished runs.
 
     Args:
-        load: Returns it; called when something is judged.
+        load: Returns the module; called when it is needed.
     """
     _load_judges[:] = [load]
 
 
 def judges() -> Judges:
-    """Return what judges finished runs.
+    """Return the module that judges finished runs.
 
     Raises:
-        InputError: There is nothing.
+        InputError: None is registered.
     """
     if not _load_judges:
         raise InputError("nothing is registered that could judge a run")
@@ -60,23 +60,23 @@ def judges() -> Judges:
 
 
 def register_views(load: Callable[[], Views]) -> None:
-    """Name what shows runs and homes from now on.
+    """Register the module that shows runs and floor plans.
 
     Args:
-        load: Returns it; called when something is shown.
+        load: Returns the module; called when it is needed.
     """
-    _load[:] = [load]
+    _load_views[:] = [load]
 
 
 def views() -> Views:
-    """Return what shows runs and homes.
+    """Return the module that shows runs and floor plans.
 
     Raises:
-        InputError: There is none, or it needs a library that isn't installed.
+        InputError: None is registered, or it needs a library that isn't installed.
     """
-    if not _load:
+    if not _load_views:
         raise InputError("nothing is registered that could show this")
     try:
-        return _load[0]()
+        return _load_views[0]()
     except ModuleNotFoundError as error:
         raise InputError(f"showing this needs {error.name}, which is not installed") from None

@@ -1,7 +1,8 @@
 """Colours that all pictures, films and pages share.
 
-The colours of bodies are told apart with any kind of colour blindness (after Paul Tol's vibrant and
-muted schemes), on a light and on a dark ground. Rooms are pale, so that words are legible on them.
+The colours of bodies can be distinguished with any kind of colour blindness (after Paul Tol's
+vibrant and muted schemes), on a light and on a dark background. Rooms are pale, so that text on
+them is legible.
 """
 
 from types import MappingProxyType
@@ -12,7 +13,7 @@ VIEW_COLOR = "#ffd23f"
 VIEW_EDGE = "#b98900"
 DOOR_COLOR = "#8a5a2b"
 DEEPER = 1.9
-"""A lane of a timeline is a few pixels high: its rooms are so many times as far from white."""
+"""Factor of a room colour's distance from white in a timeline, whose lanes are thin."""
 
 ROOM_COLORS = MappingProxyType(
     {
@@ -50,12 +51,12 @@ ACCENT_COLOR = "#c8452f"
 
 
 def room_color(kind: str) -> str:
-    """Return the colour of a room of a type on a floor plan, such as ``#c9dcf2``."""
+    """Return the colour of a type of room on a floor plan, such as ``#c9dcf2``."""
     return ROOM_COLORS.get(kind, OTHER_COLOR)
 
 
 def deep_color(kind: str) -> str:
-    """Return the colour of a room of a type in a lane of a timeline.
+    """Return the colour of a type of room in a timeline.
 
     >>> deep_color("bedroom")
     '#98bce6'
@@ -67,6 +68,6 @@ def deep_color(kind: str) -> str:
 
 
 def body_color(number: int, *, robot: bool) -> str:
-    """Return the colour of the robot or user of a number."""
+    """Return the colour of a robot or user by its number."""
     colors = ROBOT_COLORS if robot else USER_COLORS
     return colors[number % len(colors)]

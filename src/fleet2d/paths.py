@@ -1,4 +1,4 @@
-"""Text and file names that know the folder of the file they were written in."""
+"""Text and paths from a scenario, with the folder of the file that they are written in."""
 
 from pathlib import Path
 from typing import Annotated, Self
@@ -9,7 +9,7 @@ from fleet2d.problems import problem, shown
 
 
 class Text(str):
-    """A string from a scenario that knows the folder of the file it was written in."""
+    """A string from a scenario, with the folder of its file."""
 
     __slots__ = ("folder",)
     folder: Path
@@ -21,12 +21,12 @@ class Text(str):
         return self
 
     def __getnewargs__(self) -> tuple[str, Path]:  # type: ignore[override]
-        """Keep the folder in copies and pickles."""
+        """Preserve the folder in copies and pickles."""
         return str(self), self.folder
 
 
 def folder_of(text: object) -> Path:
-    """Return the folder that relative paths in ``text`` start from.
+    """Return the folder that a relative path starts from.
 
     >>> folder_of(Text("plan.json", Path("/homes")))
     PosixPath('/homes')
@@ -39,8 +39,8 @@ def _resolve_path(value: object) -> Path:
         raise problem(f"found {shown(value)}; the path of a file is wanted")
     path = (folder_of(value) / Path(value).expanduser()).resolve()
     if not path.is_file():
-        what = "a folder, not a file" if path.is_dir() else "no such file"
-        raise problem(f"{what}: {path}")
+        reason = "a folder, not a file" if path.is_dir() else "no such file"
+        raise problem(f"{reason}: {path}")
     return path
 
 

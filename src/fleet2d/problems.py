@@ -1,4 +1,4 @@
-"""Errors that validators raise: in plain words, about a key, with the nearest valid name."""
+"""Errors that validators raise: a message about a key, with the nearest valid name."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
@@ -14,25 +14,27 @@ Location = tuple[int | str, ...]
 _PYDANTIC_ERRORS = frozenset(get_args(core_schema.ErrorType))
 
 
-def problem(message: str, once: str = "") -> PydanticCustomError:
-    """Make the error that a validator raises to say ``message`` about its value, word for word.
+def problem(message: str, group: str = "") -> PydanticCustomError:
+    """Return the error that a validator raises about its value.
 
-    Of several with the same ``once``, only the first is told.
+    Args:
+        message: The message, shown as it is.
+        group: Of several errors with the same group, only the first is shown.
     """
-    return PydanticCustomError("problem", "{message}", {"message": message, "once": once})
+    return PydanticCustomError("problem", "{message}", {"message": message, "group": group})
 
 
 def problem_at(
-    location: Location, message: str, found: object = None, once: str = ""
+    location: Location, message: str, value: object = None, group: str = ""
 ) -> ValidationError:
-    """Make the error that a validator raises about a key below its own value."""
+    """Return the error that a validator raises about a key within its value; see `problem`."""
     return ValidationError.from_exception_data(
-        "", [InitErrorDetails(type=problem(message, once), loc=location, input=found)]
+        "", [InitErrorDetails(type=problem(message, group), loc=location, input=value)]
     )
 
 
 def unknown_key(key: object, known: Iterable[str]) -> PydanticCustomError:
-    """Make the error about a key that is not among the known ones."""
+    """Return the error about a key that is not among the known ones."""
     names = sorted(known)
     return PydanticCustomError(
         "unknown_key",
@@ -46,7 +48,7 @@ def unknown_key(key: object, known: Iterable[str]) -> PydanticCustomError:
     )
 
 
-def rewritten(
+def rewrite(
     error: ValidationError, change: Callable[[InitErrorDetails], InitErrorDetails]
 ) -> ValidationError:
     """Return the same error with ``change`` applied to each of its lines."""
@@ -55,10 +57,10 @@ def rewritten(
         kind, context = line["type"], line.get("ctx", {})
         details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
         if kind not in _PYDANTIC_ERRORS:
-            # Last, so that nothing in the finished message is taken for a place to fill.
-            filled = {key: context[key] for key in context if key != "message"}
+            # The message comes last: braces within it are no placeholders.
+            context = {key: context[key] for key in context if key != "message"}
             details["type"] = PydanticCustomError(
-                kind, "{message}", {**filled, "message": line["msg"]}
+                kind, "{message}", {**context, "message": line["msg"]}
             )
         lines.append(change(details))
     return ValidationError.from_exception_data(error.title, lines)
@@ -77,8 +79,20 @@ def did_you_mean(name: object, known: Iterable[object]) -> str:
     return f": did you mean {near[0]!r}?" if near else "."
 
 
+def suggest(name: object, known: Iterable[object], intro: str = "There are") -> str:
+    """Return the end of a message about an unknown name: the nearest known name, and all of them.
+
+    >>> suggest("sped", ["speed", "radius"])
+    ": did you mean 'speed'? There are: speed, radius"
+    >>> suggest("hall", [], "It has")
+    '. It has: none'
+    """
+    names = [str(k) for k in known]
+    return f"{did_you_mean(name, names)} {intro}: {', '.join(names) or 'none'}"
+
+
 def shown(value: object) -> str:
-    """Write a found value for a message: text in quotes, everything else as it is.
+    """Return a value as text for a message: text in quotes, everything else as it is.
 
     >>> shown("fast"), shown(3)
     ("'fast'", '3')
@@ -87,7 +101,7 @@ def shown(value: object) -> str:
 
 
 def _brief(value: object) -> str:
-    """Write a value that isn't text; of a huge number only how long it is."""
+    """Return a value as text; of a huge number or a long list only its size."""
     if isinstance(value, int) and value.bit_length() > 200:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, list | tuple) and len(value) > 20:

@@ -11,11 +11,11 @@ from typing import Any
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from fleet2d.problems import problem_at, rewritten, unknown_key
+from fleet2d.problems import problem_at, rewrite, unknown_key
 
 
 def split_short_form(data: Any, body_fields: Iterable[str]) -> Any:
-    """Move the fields of an entity's only behavior, written beside its body's, into ``behaviors``.
+    """Move the fields of an entity's only behavior from beside its body's into ``behaviors``.
 
     >>> split_short_form({"type": "meander", "radius": 0.2, "pause": 3}, ["radius"])
     {'radius': 0.2, 'behaviors': [{'type': 'meander', 'pause': 3}]}
@@ -54,14 +54,14 @@ class ShortForm:
             try:
                 return validate_long(long)
             except ValidationError as error:
-                raise error if long is data else rewritten(error, move) from None
+                raise error if long is data else rewrite(error, move) from None
 
         return core_schema.no_info_wrap_validator_function(validate, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Leave the body's keys as a mark: `fleet2d.scenario.schema` makes short forms of it."""
+        """Return a mark with the body's keys, for `fleet2d.scenario.schema` to add short forms."""
         long = handler(schema)
         body = dict(handler.resolve_ref_schema(long)["properties"])
         kind = body.pop("behaviors")["items"]["x-kind"]

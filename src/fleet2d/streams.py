@@ -1,8 +1,7 @@
 """Random streams: one for each component and purpose, addressed by step.
 
 A draw is a function of (seed, component's path in the scenario, purpose, step, number of the draw).
-It depends neither on the order in which components run, nor on which others there are, nor on how
-often they drew.
+It doesn't depend on the order in which components run, on other components, or on their draws.
 """
 
 import hashlib
@@ -17,7 +16,7 @@ T = TypeVar("T")
 
 
 def stream_key(seed: int, path: str, purpose: str) -> np.uint64:
-    """Return the key of a stream, e.g. of ``stream_key(4, "users.ana", "spot")``.
+    """Return the key of a stream, e.g. ``stream_key(4, "users.ana", "spot")``.
 
     Example:
         >>> hex(stream_key(4, "users.ana", "spot"))

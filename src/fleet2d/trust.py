@@ -1,4 +1,4 @@
-"""Whose code may run: none of a stored run or of a stranger's scenario, unless it is named."""
+"""Which code may run: none of a stored run or of a foreign scenario, unless the user trusts it."""
 
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -10,13 +10,13 @@ from typing import Any, Self
 
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
 
-# Files that a message lists.
+# Files that a message lists, at most.
 _MOST_LISTED = 20
 
 
 @dataclass(frozen=True)
 class Trust:
-    """The files and folders whose code may run, all absolute and without links.
+    """The files and folders whose code may run: absolute paths, with links resolved.
 
     Example:
         >>> trust = Trust.of(["/etc"])
@@ -32,12 +32,12 @@ class Trust:
         """Return the trust in files and folders.
 
         Raises:
-            InputError: One isn't there.
+            InputError: One doesn't exist.
         """
         files, folders = set(), []
         for path in map(Path, paths):
             if not path.exists():
-                raise InputError(f"{path} can't be trusted, for it isn't there")
+                raise InputError(f"{path} can't be trusted: there is no such file or folder")
             if path.is_dir():
                 folders.append(path.resolve())
             else:
@@ -46,16 +46,19 @@ class Trust:
 
     def allows(self, path: Path) -> bool:
         """Whether the code in a file may run."""
-        real = path.resolve()
-        return real in self.files or any(real.is_relative_to(folder) for folder in self.folders)
+        path = path.resolve()
+        return path in self.files or any(path.is_relative_to(folder) for folder in self.folders)
 
 
 _TRUST: ContextVar[Trust | None] = ContextVar("trust", default=None)
 
 
 @contextmanager
-def restricted(trust: Trust) -> Iterator[None]:
-    """Let no module be imported for a scenario that isn't trusted or loaded already."""
+def restrict(trust: Trust | None) -> Iterator[None]:
+    """Within the context, import only trusted modules for scenarios; None: all modules.
+
+    Modules that are loaded already can be used in any case.
+    """
     token = _TRUST.set(trust)
     try:
         yield
@@ -64,36 +67,26 @@ def restricted(trust: Trust) -> Iterator[None]:
 
 
 @contextmanager
-def of_others(trust: Trust | None = None) -> Iterator[None]:
-    """Restrict what is read from a stored run: to what the command line or a caller trusts."""
-    with restricted(_TRUST.get() or trust or Trust()):
+def restrict_stored(trust: Trust | None = None) -> Iterator[None]:
+    """Restrict what is read from a stored run to what the command line, else the caller, trusts."""
+    with restrict(_TRUST.get() or trust or Trust()):
         yield
 
 
 def current_trust() -> Trust | None:
-    """Return what is trusted now; None where all code is the user's own."""
+    """Return what is trusted now; None: all code."""
     return _TRUST.get()
 
 
-@contextmanager
-def under(trust: Trust | None) -> Iterator[None]:
-    """Restrict as another process did, of which `current_trust` was sent."""
-    token = _TRUST.set(trust)
-    try:
-        yield
-    finally:
-        _TRUST.reset(token)
-
-
 def check_trust(name: str, files: Sequence[Path]) -> None:
-    """Refuse to import a component of a scenario's own whose files aren't trusted.
+    """Refuse to import a user's own component whose files aren't trusted.
 
     Args:
         name: The component, as the scenario names it.
         files: The files that would run.
 
     Raises:
-        ScenarioError: One is not trusted.
+        ScenarioError: A file is not trusted.
     """
     trust = _TRUST.get()
     if trust is None:
@@ -103,54 +96,54 @@ def check_trust(name: str, files: Sequence[Path]) -> None:
             raise ScenarioError(f"{name!r} would run {file}: name it by --trust if you trust it")
 
 
-def check_code(what: str, content: object) -> None:
-    """List the code that a scenario or a study would run, unless all of it may run now.
+def check_code(title: str, content: object) -> None:
+    """Refuse a scenario or a study that would run code that isn't trusted.
 
     Args:
-        what: What is to be run, for the message.
-        content: It as plain data.
+        title: The scenario or study, for the message.
+        content: Its plain data.
 
     Raises:
-        ScenarioError: Something would run that isn't trusted; nothing has run.
+        ScenarioError: The message lists the code; none of it has run.
     """
     trust = _TRUST.get()
-    if trust is not None and (refusal := _refusal(what, content, trust)):
+    if trust is not None and (refusal := _refusal(title, content, trust)):
         raise ScenarioError(refusal)
 
 
 def refuse_untrusted(directory: Path, scenario: Mapping[str, Any], trust: Trust) -> None:
-    """List the code that a stored scenario would run, unless all of it is trusted.
+    """Refuse a stored scenario that would run code that isn't trusted.
 
     Raises:
-        RunDirectoryError: Something would run that isn't trusted; nothing has run.
+        RunDirectoryError: The message lists the code; none of it has run.
     """
     if refusal := _refusal(str(directory), scenario, trust):
         raise RunDirectoryError(refusal)
 
 
-def _refusal(what: str, content: object, trust: Trust) -> str:
-    """Return what there is to say of code that isn't trusted; empty if all of it is."""
-    foreign = {file: names for file, names in code_of(content).items() if not trust.allows(file)}
-    if not foreign:
+def _refusal(title: str, content: object, trust: Trust) -> str:
+    """Return the message about code that isn't trusted; empty if there is none."""
+    code = {file: keys for file, keys in code_of(content).items() if not trust.allows(file)}
+    if not code:
         return ""
     lines = [
-        f"  {file} ({', '.join(names[:3])}{', …' * (len(names) > 3)})"
-        for file, names in list(foreign.items())[:_MOST_LISTED]
+        f"  {file} ({', '.join(keys[:3])}{', …' * (len(keys) > 3)})"
+        for file, keys in list(code.items())[:_MOST_LISTED]
     ]
-    if len(foreign) > _MOST_LISTED:
-        lines.append(f"  … {len(foreign) - _MOST_LISTED} more")
-    named = " ".join(f"--trust {shlex.quote(str(file))}" for file in list(foreign)[:_MOST_LISTED])
+    if len(code) > _MOST_LISTED:
+        lines.append(f"  … {len(code) - _MOST_LISTED} more")
+    options = " ".join(f"--trust {shlex.quote(str(file))}" for file in list(code)[:_MOST_LISTED])
     return "\n".join(
         [
-            f"{what} has components of its own, which would run:",
+            f"{title} has components of its own, which would run:",
             *lines,
-            f"None of it has run. Read it; if you trust it, and what it imports, say so: {named}",
+            f"None of it has run. Read it; if you trust it, and what it imports, say so: {options}",
         ]
     )
 
 
 def code_of(scenario: object) -> dict[Path, list[str]]:
-    """Return the files that a scenario would run and that aren't loaded, and what names them.
+    """Return the files that a scenario would run and that aren't loaded, each with the keys of it.
 
     Example:
         >>> code_of({"algorithms": {"share": {"type": "/home/ana/mine:Share"}}})
@@ -160,33 +153,33 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
     from fleet2d.paths import folder_of
 
     code: dict[Path, list[str]] = {}
-    for where, name in _types(scenario, ()):
+    for key, name in _class_paths(scenario, ()):
         path = name.rpartition(":")[0].removesuffix(".py")
-        written, slash, module = path.rpartition("/")
+        parent, slash, module = path.rpartition("/")
         try:
-            files = files_of((folder_of(name) / (written + slash)).resolve(), module)
+            files = files_of((folder_of(name) / (parent + slash)).resolve(), module)
         except (OSError, ValueError):
-            continue  # no path at all: it is refused where it is imported
+            continue  # it is no path: the import will fail
         for file in files:
-            code.setdefault(file, []).append(where)
+            code.setdefault(file, []).append(key)
     return code
 
 
-def _types(value: object, where: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Yield every text that may name a component of a scenario's own, with its place."""
+def _class_paths(value: object, keys: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    """Yield every text that may be the path of a user's own component, after its key."""
     if isinstance(value, Mapping):
         for key, entry in value.items():
-            if key != "extends":  # files of data, such as bundled:base, whose own types are listed
-                yield from _types(entry, (*where, str(key)))
+            if key != "extends":  # a file of data, such as bundled:base, which is merged already
+                yield from _class_paths(entry, (*keys, str(key)))
     elif isinstance(value, list | tuple):
         for index, entry in enumerate(value):
-            yield from _types(entry, (*where, str(index)))
-    elif isinstance(value, str) and _names_code(value):
-        yield ".".join(where), value
+            yield from _class_paths(entry, (*keys, str(index)))
+    elif isinstance(value, str) and _is_class_path(value):
+        yield ".".join(keys), value
 
 
-def _names_code(text: str) -> bool:
-    """Whether a text is written as a component of a scenario's own is: 'folder/module:Class'."""
+def _is_class_path(text: str) -> bool:
+    """Whether a text has the form of a path of a user's own component: 'folder/module:Class'."""
     path, colon, qualname = text.rpartition(":")
     module = path.removesuffix(".py").rpartition("/")[2]
     parts = (*module.split("."), *qualname.split("."))

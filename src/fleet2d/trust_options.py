@@ -1,4 +1,4 @@
-"""The options `--trust` and `--trust-dir` of every command that could run a scenario's code."""
+"""The options `--trust` and `--trust-dir` of all commands that may run a scenario's own code."""
 
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.trust import Trust, restricted
+from fleet2d.trust import Trust, restrict
 
 TrustFiles = Annotated[
     list[Path] | None,
@@ -20,10 +20,10 @@ TrustFolders = Annotated[
 
 
 def trust_of(files: list[Path] | None, folders: list[Path] | None) -> Trust:
-    """Return what `--trust` and `--trust-dir` name.
+    """Return the trust in the files of `--trust` and the folders of `--trust-dir`.
 
     Raises:
-        InputError: One isn't there, or is the other kind.
+        InputError: A path doesn't exist, or is a folder instead of a file or vice versa.
     """
     for path in files or ():
         if path.is_dir():
@@ -34,12 +34,12 @@ def trust_of(files: list[Path] | None, folders: list[Path] | None) -> Trust:
     return Trust.of([*(files or ()), *(folders or ())])
 
 
-def restricting(
+def restrict_to(
     files: list[Path] | None, folders: list[Path] | None
 ) -> AbstractContextManager[None]:
     """Return a context in which only code that `--trust` and `--trust-dir` name may run.
 
     Raises:
-        InputError: One isn't there, or is the other kind.
+        InputError: See `trust_of`.
     """
-    return restricted(trust_of(files, folders))
+    return restrict(trust_of(files, folders))

@@ -1,7 +1,7 @@
-"""Quantities as people write them: types for the fields of a configuration.
+"""Physical quantities with units: types for the fields of a configuration.
 
-Each type takes a bare number in SI units (angles: degrees) or text with a unit, is exact while it
-converts, and refuses what is not finite. Models dump to JSON in the canonical spelling.
+Each type reads a number in SI units (angles: degrees) or text with a unit, converts it exactly, and
+refuses values that are not finite. Models dump to JSON in the canonical spelling.
 """
 
 import math
@@ -17,6 +17,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, PlainSerializer, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from fleet2d.errors import ScenarioError
 from fleet2d.paths import InputPath, Text, folder_of
 from fleet2d.problems import problem, shown
 
@@ -41,10 +42,11 @@ __all__ = [
     "parse_duration",
     "parse_time_of_day",
     "problem",
+    "whole_steps",
 ]
 
 LONGEST_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
-MOST_DIGITS = 400  # of a number; a fraction with a million would fill the memory
+MOST_DIGITS = 400  # of a number: fractions with very many digits would fill the memory
 MICROSECOND = timedelta(microseconds=1)
 
 # Exponents are short on purpose: Fraction("1e999999999") would fill the memory.
@@ -55,7 +57,7 @@ _TIME_OF_DAY = re.compile(r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:\.\d{1,6})?))?")
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity: how it is written, and how that becomes a number in its base unit."""
+    """A physical quantity, its base unit, and the size of its units in base units, by spelling."""
 
     name: str
     base: str
@@ -63,10 +65,10 @@ class Quantity:
     examples: tuple[str, ...]
 
     def parse(self, value: object) -> Fraction:
-        """Convert a number, text with units, or a mapping of units to numbers; exactly.
+        """Return the exact value in base units of a number, a text, or a mapping {unit: number}.
 
         Raises:
-            PydanticCustomError: what was found, and how the quantity is written.
+            PydanticCustomError: it can't be read; the message shows how the quantity is written.
         """
         if isinstance(value, str):
             return self._parse_text(value)
@@ -89,11 +91,11 @@ class Quantity:
             position = part.end()
         return total
 
-    def _number(self, value: object, found: object) -> Fraction:
+    def _number(self, value: object, source: object) -> Fraction:
         if isinstance(value, bool) or not isinstance(value, Real | Decimal):
-            raise self._unreadable(found)
+            raise self._unreadable(source)
         try:
-            # repr, because who wrote 0.1 meant one tenth and not the nearest binary fraction
+            # By repr, 0.1 is one tenth, not the nearest binary fraction.
             exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
         except OverflowError:
             raise problem(f"found {shown(value)}; {self.name} is a finite number") from None
@@ -101,33 +103,33 @@ class Quantity:
             raise problem(f"found {shown(value)}; {self.name} is a finite number")
         return Fraction(exact)
 
-    def _unit(self, unit: object, found: object) -> Fraction:
+    def _unit(self, unit: object, source: object) -> Fraction:
         factor = self.units.get(str(unit))
         if factor is None:
             raise problem(
-                f"unknown unit {str(unit)!r} in {shown(found)}: {self.name} is written "
+                f"unknown unit {str(unit)!r} in {shown(source)}: {self.name} is written "
                 f"like {self._examples()}"
             )
         return factor
 
-    def _unreadable(self, found: object) -> PydanticCustomError:
-        number = f"a number in {self.base}, or " if self.base else "a number, or "
-        return problem(
-            f"found {shown(found)}; {self.name} is wanted: {number}like {self._examples()}"
-        )
+    def _unreadable(self, value: object) -> PydanticCustomError:
+        return problem(f"found {shown(value)}; {self.name} is wanted: {self._forms()}")
+
+    def _forms(self) -> str:
+        unit = f" in {self.base}" if self.base else ""
+        return f"a number{unit}, or like {self._examples()}"
 
     def _examples(self) -> str:
         return ", ".join(f"'{example}'" for example in self.examples)
 
     def schema(self, **more: Any) -> WithJsonSchema:
-        """Describe the quantity for JSON Schema; ``x-quantity`` is its short name."""
+        """Return the JSON Schema of the quantity; ``x-quantity`` is its short name."""
         kinds: list[dict[str, Any]] = [{"type": "number"}, {"type": "string"}]
         if "mapping" in more:
             kinds.append(more.pop("mapping"))
-        number = f"a number in {self.base}, or " if self.base else "a number, or "
         return WithJsonSchema(
             {
-                "description": f"{self.name}: {number}like {self._examples()}",
+                "description": f"{self.name}: {self._forms()}",
                 "x-quantity": self.name.split(" ", 1)[1] + (f" [{self.base}]" if self.base else ""),
                 "anyOf": kinds,
                 "examples": list(self.examples),
@@ -137,11 +139,11 @@ class Quantity:
 
 
 def _spellings(**units: tuple[Fraction | int, str]) -> dict[str, Fraction]:
-    """Unfold {canonical: (factor, other spellings)} into {spelling: factor}."""
+    """Return the factor of each spelling from {canonical spelling: (factor, synonyms)}."""
     return {
         spelling: Fraction(factor)
-        for canonical, (factor, others) in units.items()
-        for spelling in (canonical, *others.split())
+        for canonical, (factor, synonyms) in units.items()
+        for spelling in (canonical, *synonyms.split())
     }
 
 
@@ -198,6 +200,32 @@ def micros(duration: timedelta) -> int:
     return duration // MICROSECOND
 
 
+def whole_steps(
+    duration: timedelta, step_us: int, key: str, error: type[Exception] = ScenarioError
+) -> int:
+    """Return the number of steps in a duration.
+
+    Args:
+        duration: A multiple of the step.
+        step_us: The length of a step [us].
+        key: The key of the duration, for the message.
+        error: The type of the exception.
+
+    Raises:
+        ScenarioError: It is no multiple, or 0; an exception of the type `error`.
+
+    >>> whole_steps(timedelta(minutes=1), 500_000, "period")
+    120
+    """
+    steps, rest = divmod(micros(duration), step_us)
+    if rest or steps < 1:
+        raise error(
+            f"{key} is {format_duration(duration)}, which is no multiple of simulation.step"
+            f" ({step_us / 1e6:g} s): choose a multiple"
+        )
+    return steps
+
+
 def parse_duration(value: object) -> timedelta:
     """Read a duration: a timedelta, a number of seconds, text, or {unit: number}.
 
@@ -211,7 +239,7 @@ def parse_duration(value: object) -> timedelta:
         seconds = DURATION.parse(value)
         count = round(seconds * 10**6)
         if seconds and not count:
-            raise problem(f"found {shown(value)}; a duration is told to the microsecond")
+            raise problem(f"found {shown(value)}; the shortest duration is 1 microsecond")
         if abs(count) > micros(LONGEST_DURATION):
             raise problem(f"found {shown(value)}; 1000 years is the longest duration")
         value = timedelta(microseconds=count)
@@ -268,11 +296,11 @@ def format_time_of_day(value: timedelta) -> str:
     >>> format_time_of_day(timedelta(hours=7, minutes=30))
     '07:30'
     """
-    minutes, rest = divmod(micros(value), 60 * 10**6)
+    minutes, seconds_us = divmod(micros(value), 60 * 10**6)
     clock = f"{minutes // 60:02}:{minutes % 60:02}"
-    if not rest:
+    if not seconds_us:
         return clock
-    return f"{clock}:{Decimal(rest).scaleb(-6):09f}".rstrip("0").rstrip(".")
+    return f"{clock}:{Decimal(seconds_us).scaleb(-6):09f}".rstrip("0").rstrip(".")
 
 
 def _to_float(quantity: Quantity) -> BeforeValidator:
@@ -285,11 +313,11 @@ def _to_float(quantity: Quantity) -> BeforeValidator:
     return BeforeValidator(parse)
 
 
-def _limit(holds: Callable[[Any], bool], wanted: str) -> AfterValidator:
+def _limit(is_valid: Callable[[Any], bool], rule: str) -> AfterValidator:
     def check(value: Any) -> Any:
-        if not holds(value):
-            found = format_duration(value) if isinstance(value, timedelta) else f"{value:g}"
-            raise problem(f"found {found}; {wanted}")
+        if not is_valid(value):
+            text = format_duration(value) if isinstance(value, timedelta) else f"{value:g}"
+            raise problem(f"found {text}; {rule}")
         return value
 
     return AfterValidator(check)

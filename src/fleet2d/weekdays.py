@@ -1,4 +1,4 @@
-"""Days of the week, and the names that people give to several of them."""
+"""Days of the week, and names for groups of them."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -13,19 +13,20 @@ Days = Literal[
     "daily", "weekdays", "weekend",
     "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
 ]  # fmt: skip
-"""A name of one or several days of the week."""
+"""The name of a day or of a group of days of the week."""
 OnDays = Days | Annotated[tuple[Days, ...], Field(min_length=1)]
-"""One name of days of the week, or a list of them."""
+"""One such name, or a list of them."""
 
 
 def weekdays_of(names: str | Sequence[str] | None) -> set[int]:
-    """Return the days of the week that names stand for, 0 is Monday; None stands for no day.
+    """Return days of the week by their names, 0 is Monday; None: no day.
 
     >>> sorted(weekdays_of(["weekend", "friday"])), weekdays_of(None)
     ([4, 5, 6], set())
     """
-    listed = () if names is None else (names,) if isinstance(names, str) else names
-    return {day for name in listed for day in _days_of(name)}
+    if isinstance(names, str):
+        names = (names,)
+    return {day for name in names or () for day in _days_of(name)}
 
 
 def _days_of(name: str) -> Sequence[int]:

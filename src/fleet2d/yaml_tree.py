@@ -1,7 +1,7 @@
 """YAML as trees of nodes, of a bounded size and depth: the one reader of all YAML.
 
-Scalars are those of YAML 1.2: booleans are true and false only, 12:30 is text. An alias is the node
-that it stands for, so who walks a tree counts what comes of it: see `Tally`.
+Scalars are those of YAML 1.2: booleans are true and false only, 12:30 is text. An alias is the same
+node as its anchor, so few nodes can stand for very many values: `Walk` counts these.
 """
 
 import re
@@ -12,12 +12,12 @@ import yaml
 from fleet2d.bounds import DEPTH, VALUES, one_line
 from fleet2d.errors import InputError
 
-# Of a shorter text all nodes fit into memory, whatever they are.
+# All nodes of a shorter text fit into memory [characters].
 _SHORT = 1 << 20
-# libyaml calls itself for each level of a text, without end: as many it may.
+# libyaml recurses for each level of a text: so many levels don't overflow the stack.
 _SHALLOW = 2000
-# Of a longer text PyYAML's own parser, which says better what is wrong, would take too long.
-_TOLD_WELL = 100_000
+# PyYAML's own parser has better messages, but is too slow for a longer text [characters].
+_SLOW_TO_EXPLAIN = 100_000
 
 
 class Loader(yaml.SafeLoader):
@@ -25,7 +25,7 @@ class Loader(yaml.SafeLoader):
 
 
 class _FastLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """The same in C, where PyYAML comes with it."""
+    """The same loader in C, if PyYAML was built with it."""
 
 
 Pair = tuple[yaml.ScalarNode, yaml.Node]
@@ -67,7 +67,7 @@ def _construct_timestamp(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> Any:
     try:
         return loader.construct_yaml_timestamp(node)
     except (ValueError, AttributeError):
-        return node.value  # 2026-02-31, or a tagged text: text, which the model refuses
+        return node.value  # such as 2026-02-31: text, which the model refuses
 
 
 Loader.add_constructor(f"{TAG}int", _construct_int)
@@ -75,7 +75,7 @@ Loader.add_constructor(f"{TAG}timestamp", _construct_timestamp)
 
 
 class NodeError(InputError):
-    """Something is wrong with a node of a YAML text.
+    """An error in a node of a YAML text.
 
     Attributes:
         node: The node.
@@ -99,7 +99,7 @@ def compose(text: str) -> yaml.Node | None:
             _check_events(text)
         return _composed(_FastLoader(text))
     except yaml.YAMLError:
-        if len(text) > _TOLD_WELL:
+        if len(text) > _SLOW_TO_EXPLAIN:
             raise
     return _composed(Loader(text))
 
@@ -115,7 +115,7 @@ def _composed(loader: Any) -> yaml.Node | None:
 
 
 def _check_events(text: str) -> None:
-    """Refuse a text of too many levels or values before anything is built of it."""
+    """Refuse a text of too many levels or values before its nodes are built."""
     depth = values = 0
     most_depth, most_values = DEPTH.most, VALUES.most
     for event in yaml.parse(text, Loader=_FastLoader):
@@ -145,87 +145,91 @@ def parse(text: str) -> Any:
     return None if node is None else _plain(node, [], Walk())
 
 
-def _plain(node: yaml.Node, above: list[yaml.Node], walk: "Walk") -> Any:
-    walk.take(node, above)
+def _plain(node: yaml.Node, parents: list[yaml.Node], walk: "Walk") -> Any:
+    walk.enter(node, parents)
     if isinstance(node, yaml.ScalarNode):
         return walk.scalar(node)
-    inside = [*above, node]
+    path = [*parents, node]
     if isinstance(node, yaml.MappingNode):
-        return {key.value: _plain(value, inside, walk) for key, value in walk.pairs(node)}
-    return [_plain(item, inside, walk) for item in node.value]
+        return {key.value: _plain(value, path, walk) for key, value in walk.pairs(node)}
+    return [_plain(item, path, walk) for item in node.value]
 
 
 class Walk:
-    """Walks a tree: counts what comes of it, aliases unfolded, and reads scalars and mappings."""
+    """A walk through a tree: reads its values, and counts them, once for each alias."""
 
     def __init__(self) -> None:
-        """Count nothing yet."""
+        """Start with no values."""
         self._values, self._most_values, self._most_depth = 0, VALUES.most, DEPTH.most
         self._scalars = Loader("")
         self._pairs: dict[int, dict[str, Pair] | None] = {}
 
-    def take(self, node: yaml.Node, above: list[yaml.Node]) -> None:
-        """Count a node below others.
+    def enter(self, node: yaml.Node, parents: list[yaml.Node]) -> None:
+        """Count a node.
+
+        Args:
+            node: The node.
+            parents: The nodes that contain it, outermost first.
 
         Raises:
             NodeError: It contains itself.
-            InputError: There are too many.
+            InputError: There are too many values or levels.
         """
         self._values += 1
         if self._values > self._most_values:
             VALUES.check(self._values, "it", least="more than ")
-        if len(above) >= self._most_depth:
-            DEPTH.check(len(above) + 1, "it", least="at least ")
-        if any(node is outer for outer in above):
+        if len(parents) >= self._most_depth:
+            DEPTH.check(len(parents) + 1, "it", least="at least ")
+        if any(node is parent for parent in parents):
             raise NodeError(node, "a value can't contain itself")
 
     def scalar(self, node: yaml.ScalarNode) -> Any:
         """Return the value of a scalar.
 
         Raises:
-            NodeError: Its tag says that it is something else than it is.
+            NodeError: It has an unknown tag, or can't be read as what its tag says.
         """
-        kind, found = node.tag.removeprefix(TAG), one_line(node.value)
+        kind, text = node.tag.removeprefix(TAG), one_line(node.value)
         if node.tag not in _PLAIN:
             raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
         try:
             return self._scalars.construct_object(node)
         except (ValueError, LookupError, TypeError, AttributeError, OverflowError):
-            more = f" of {len(node.value)} characters" if len(node.value) > len(found) else ""
-            raise NodeError(node, f"{found!r}{more} is no {kind} that can be read") from None
+            size = f" of {len(node.value)} characters" if len(node.value) > len(text) else ""
+            raise NodeError(node, f"{text!r}{size} is no {kind} that can be read") from None
 
     def pairs(self, node: yaml.MappingNode) -> list[Pair]:
         """Return the keys and values of a mapping, those that it merges from others ('<<') first.
 
         Raises:
-            NodeError: A key is no text or is there twice, or what is merged is no mapping.
+            NodeError: A key is no text or is there twice, or a merged value is no mapping.
         """
         return list(self._pairs_of(node).values())
 
     def _pairs_of(self, node: yaml.MappingNode) -> dict[str, Pair]:
         if id(node) in self._pairs:
-            known = self._pairs[id(node)]
-            if known is None:
+            pairs = self._pairs[id(node)]
+            if pairs is None:
                 raise NodeError(node, "a value can't contain itself")
-            return known
-        self._pairs[id(node)] = None  # under way
-        own: dict[str, Pair] = {}
+            return pairs
+        self._pairs[id(node)] = None  # in progress
+        keys: dict[str, Pair] = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise NodeError(key, "a key must be plain text")
-            if key.value in own:
-                line = own[key.value][0].start_mark.line + 1
+            if key.value in keys:
+                line = keys[key.value][0].start_mark.line + 1
                 raise NodeError(key, f"the key {one_line(key.value)!r} is already in line {line}")
-            own[key.value] = (key, value)
-        found: dict[str, Pair] = {}
-        for name, (key, value) in list(own.items()):
+            keys[key.value] = (key, value)
+        pairs = {}
+        for name, (key, value) in list(keys.items()):
             if key.tag == MERGE:
-                del own[name]
+                del keys[name]
                 sources = value.value if isinstance(value, yaml.SequenceNode) else [value]
-                for source in reversed(sources):  # what the first says holds
+                for source in reversed(sources):  # the first source takes precedence
                     if not isinstance(source, yaml.MappingNode):
                         raise NodeError(source, "'<<' merges a mapping, or a list of mappings")
-                    found.update(self._pairs_of(source))
-        found.update(own)
-        self._pairs[id(node)] = found
-        return found
+                    pairs.update(self._pairs_of(source))
+        pairs.update(keys)
+        self._pairs[id(node)] = pairs
+        return pairs

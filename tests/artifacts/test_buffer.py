@@ -19,7 +19,7 @@ def of(*columns: Column) -> TableBuffer:
     return TableBuffer(TableSpec("t", columns))
 
 
-def test_append_copies_what_it_is_given() -> None:
+def test_append_copies_its_arguments() -> None:
     buffer = TableBuffer(POSES)
     step = np.arange(3)
 
@@ -62,12 +62,12 @@ def test_many_small_appends_grow_the_buffer() -> None:
 
 def test_fill_stops_at_the_limit_and_says_where() -> None:
     buffer = TableBuffer(POSES, limit=4)
-    checked = buffer.check({"step": np.arange(6), "x": np.zeros(6)})
+    batch = buffer.check({"step": np.arange(6), "x": np.zeros(6)})
 
-    assert 4 == buffer.fill(checked, 0)
+    assert 4 == buffer.fill(batch, 0)
     assert buffer.is_full
     assert [0, 1, 2, 3] == buffer.take(reuse=True)["step"].values.tolist()
-    assert 6 == buffer.fill(checked, 4)
+    assert 6 == buffer.fill(batch, 4)
     assert [4, 5] == buffer.take()["step"].values.tolist()
 
 
@@ -94,7 +94,7 @@ def test_deepcopy_shares_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "told"),
+    ("columns", "message"),
     [
         ({"step": np.arange(3)}, "lacks x"),
         ({"step": np.arange(3), "x": np.zeros(3), "z": 1}, "has no column z"),
@@ -105,16 +105,16 @@ def test_deepcopy_shares_nothing() -> None:
         ({"step": np.arange(3), "x": np.array([0, np.nan, 0])}, "declare it nullable"),
     ],
 )
-def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], told: str) -> None:
+def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], message: str) -> None:
     buffer = TableBuffer(POSES)
 
-    with pytest.raises(ArtifactError, match=told):
+    with pytest.raises(ArtifactError, match=message):
         buffer.append(**columns)
     assert 0 == buffer.rows
 
 
 @pytest.mark.parametrize(
-    ("column", "values", "told"),
+    ("column", "values", "message"),
     [
         (Column("c", "int32"), [2**31], "beyond int32"),
         (Column("c", "int64"), np.array([2**63], np.uint64), "beyond int64"),
@@ -130,8 +130,8 @@ def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], told: s
         (Column("c", "int64"), np.ma.masked_array([1, 2], [True, False]), "declare it nullable"),
     ],
 )
-def test_append_refuses_values_that_do_not_fit(column: Column, values: Any, told: str) -> None:
-    with pytest.raises(ArtifactError, match=f"table 't', column 'c': .*{told}"):
+def test_append_refuses_values_that_do_not_fit(column: Column, values: Any, message: str) -> None:
+    with pytest.raises(ArtifactError, match=f"table 't', column 'c': .*{message}"):
         of(column).append(c=values)
 
 

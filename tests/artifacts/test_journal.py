@@ -24,7 +24,7 @@ ROWS = rows_of_every_kind(500)
 LATE = TableSpec("late", (Column("step", "step"), Column("what", "category", nullable=True)))
 
 
-def begun(directory: Path, commits: int = 5, **options: Any) -> RunStore:
+def begin_run(directory: Path, commits: int = 5, **options: Any) -> RunStore:
     """A run that commits every hundred rows, and then goes on with rows that it doesn't commit."""
     store = RunStore(directory, [EVERY_KIND], **options)
     store.open()
@@ -38,7 +38,7 @@ def begun(directory: Path, commits: int = 5, **options: Any) -> RunStore:
     return store
 
 
-def killed(store: RunStore) -> Path:
+def kill(store: RunStore) -> Path:
     """End a run as the end of its process would: nothing more is written, the lock goes."""
     assert store._ledger is not None
     store._ledger.journal.close()
@@ -48,7 +48,7 @@ def killed(store: RunStore) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("values", "ramps", "how"),
+    ("values", "ramps", "encoding"),
     [
         (np.zeros(1000), False, RUNS),
         (np.repeat([1.0, np.nan, -0.0], 400), False, RUNS),
@@ -61,10 +61,10 @@ def killed(store: RunStore) -> Path:
         (np.array([-(2**63), 2**63 - 1, 5] * 500), True, RAW),
     ],
 )
-def test_arrays_come_back_to_the_last_bit(values: Any, ramps: bool, how: str) -> None:
-    kept = encode(values, ramps=ramps)
-    assert how == kept[0]
-    back = decode(kept, values.dtype, len(values))
+def test_arrays_come_back_to_the_last_bit(values: Any, ramps: bool, encoding: str) -> None:
+    encoded = encode(values, ramps=ramps)
+    assert encoding == encoded[0]
+    back = decode(encoded, values.dtype, len(values))
     assert values.tobytes() == back.tobytes()
     assert values.dtype == back.dtype
 
@@ -76,9 +76,9 @@ def test_few_bytes_can_not_ask_for_all_memory() -> None:
 
 @pytest.mark.parametrize("flush_rows", [30, 250, 2**17])
 def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: int) -> None:
-    store = begun(tmp_path / "run", flush_rows=flush_rows)
+    store = begin_run(tmp_path / "run", flush_rows=flush_rows)
     store.append("every_kind", **part(ROWS, 0, 50))
-    run = open_run(killed(store))
+    run = open_run(kill(store))
     whole = run_of(stored(part(ROWS, 0, 500)))
 
     assert "running" == run.status
@@ -95,7 +95,7 @@ def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: in
 @pytest.mark.parametrize("flush_rows", [30, 250, 2**17])
 @pytest.mark.parametrize("undone", [0, 2])
 def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone: int) -> None:
-    expected = begun(None, flush_rows=flush_rows).close()  # type: ignore[arg-type]
+    expected = begin_run(None, flush_rows=flush_rows).close()  # type: ignore[arg-type]
     ends = []
     store = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=flush_rows)
     store.open()
@@ -106,7 +106,7 @@ def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone
         if k >= 2:
             store.append("late", step=[k], what=[None if k % 2 else f"word {k}"])
         ends.append(store.commit(k))
-    ledger = Ledger(killed(store))
+    ledger = Ledger(kill(store))
     ledger.lock()
     commit = ends[4 - undone]
     again = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=flush_rows)
@@ -123,7 +123,7 @@ def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone
 
 def test_a_cut_or_damaged_journal_reads_up_to_the_last_whole_commit(tmp_path: Path) -> None:
     """What a power cut leaves: the file ends anywhere, or holds anything behind what was synced."""
-    directory = killed(begun(tmp_path / "run"))
+    directory = kill(begin_run(tmp_path / "run"))
     path = directory / FOLDER / JOURNAL_NAME
     content = path.read_bytes()
     rng = np.random.default_rng(3)
@@ -145,7 +145,7 @@ def test_a_cut_or_damaged_journal_reads_up_to_the_last_whole_commit(tmp_path: Pa
 
 
 def test_a_flipped_byte_ends_the_journal_before_it(tmp_path: Path) -> None:
-    directory = killed(begun(tmp_path / "run"))
+    directory = kill(begin_run(tmp_path / "run"))
     path = directory / FOLDER / JOURNAL_NAME
     content = path.read_bytes()
     for at in range(0, len(content), 997):
@@ -161,7 +161,7 @@ def test_what_is_no_journal_has_no_commit(tmp_path: Path) -> None:
 
 
 def test_one_run_has_one_writer(tmp_path: Path) -> None:
-    store = begun(tmp_path / "run")
+    store = begin_run(tmp_path / "run")
     with pytest.raises(RunDirectoryError, match=f"being written by process {os.getpid()} on"):
         Ledger(tmp_path / "run").lock()
     store.close()
@@ -188,9 +188,9 @@ def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
         )
         for _ in range(5)
     ]
-    said = sorted(process.communicate(timeout=60)[0].strip() for process in processes)
-    assert 1 == said.count("mine")
-    assert 4 == said.count("RunDirectoryError")
+    outputs = sorted(process.communicate(timeout=60)[0].strip() for process in processes)
+    assert 1 == outputs.count("mine")
+    assert 4 == outputs.count("RunDirectoryError")
 
 
 def test_a_run_in_memory_commits_nothing() -> None:
@@ -201,7 +201,7 @@ def test_a_run_in_memory_commits_nothing() -> None:
 def test_a_full_disk_keeps_what_was_committed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = begun(tmp_path / "run", commits=3)
+    store = begin_run(tmp_path / "run", commits=3)
     store.append("every_kind", **part(ROWS, 300, 400))
 
     def refuse(*_: Any) -> None:

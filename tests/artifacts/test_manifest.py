@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fleet2d.artifacts.manifest import Manifest, file_record, plain, versions
+from fleet2d.artifacts.manifest import InputRecord, Manifest, input_record, plain, versions
 from fleet2d.errors import RunDirectoryError
 
 
@@ -58,7 +58,7 @@ def test_plain_has_words_for_what_models_hold() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "is damaged"),
         ('{"format": 1, "status": "comp', "is damaged"),
@@ -69,24 +69,24 @@ def test_plain_has_words_for_what_models_hold() -> None:
         ("\x00\xff", "is damaged"),
     ],
 )
-def test_damaged_manifest_is_named(tmp_path: Path, text: str, told: str) -> None:
+def test_damaged_manifest_is_named(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "manifest.json").write_bytes(text.encode("latin-1"))
 
-    with pytest.raises(RunDirectoryError, match=told):
+    with pytest.raises(RunDirectoryError, match=message):
         Manifest.read(tmp_path)
 
 
-def test_file_record_hashes_the_bytes(tmp_path: Path) -> None:
+def test_input_record_hashes_the_bytes(tmp_path: Path) -> None:
     (tmp_path / "plan.json").write_bytes(b"walls")
 
-    record = file_record(tmp_path / "plan.json")
-    expected = {"path": str(tmp_path / "plan.json"), "sha256": hashlib.sha256(b"walls").hexdigest()}
-    assert expected == record
+    path = tmp_path / "plan.json"
+    expected = InputRecord(path=str(path), sha256=hashlib.sha256(b"walls").hexdigest())
+    assert expected == input_record(path)
 
 
 def test_versions_name_all_that_numbers_depend_on() -> None:
-    found = versions()
+    names = versions()
 
     expected = {"fleet2d", "numpy", "platform", "pyarrow", "python", "shapely"}
-    assert expected == found.keys()
-    assert np.__version__ == found["numpy"]
+    assert expected == names.keys()
+    assert np.__version__ == names["numpy"]

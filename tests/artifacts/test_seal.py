@@ -49,11 +49,11 @@ def test_runs_of_every_format_are_read(version: int) -> None:
     assert 0 < stored_run.arrow("events").num_rows
     assert 0 < stored_run.metrics["distance"]["ana"]
     assert "kitchen" in {room.type for room in stored_run.plan.rooms}
-    found = verify_run(FIXTURES / f"v{version}")
-    assert found.same
-    assert [] == found.foreign
-    assert (version == 1) == (found.digest is None)
-    assert (version == 1) == bool(found.notes)
+    verification = verify_run(FIXTURES / f"v{version}")
+    assert verification.same
+    assert [] == verification.foreign
+    assert (version == 1) == (verification.digest is None)
+    assert (version == 1) == bool(verification.notes)
 
 
 def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
@@ -78,7 +78,7 @@ def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
             continue
         path.write_bytes(content)
         try:
-            found = verify_run(run)
+            verification = verify_run(run)
         except RunDirectoryError as error:
             assert path.name == "manifest.json"
             assert "damaged" in str(error) or "later Fleet2D" in str(error)
@@ -87,9 +87,9 @@ def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
             assert "no digest" in str(error)
         else:
             name = path.relative_to(run).as_posix()
-            named = [each for each in found.differing if each.startswith(name)]
-            assert named or not found.same, (name, how, at)
-            assert named, (name, found)
+            names = [key for key in verification.differing if key.startswith(name)]
+            assert names or not verification.same, (name, how, at)
+            assert names, (name, verification)
         path.write_bytes(contents[path])
     assert verify_run(run).same
 
@@ -115,9 +115,9 @@ def test_a_changed_field_is_named(run: Path, change: Any, field: str) -> None:
 
 def test_a_table_may_not_hide_from_the_seal(run: Path) -> None:
     edited(run, lambda m: m["seal"]["files"].pop("events.parquet"))
-    found = verify_run(run).differing
-    assert "manifest.json: seal" in found
-    assert "events.parquet" in found
+    differing = verify_run(run).differing
+    assert "manifest.json: seal" in differing
+    assert "events.parquet" in differing
 
 
 def test_missing_and_foreign_files_are_named(run: Path) -> None:
@@ -127,9 +127,9 @@ def test_missing_and_foreign_files_are_named(run: Path) -> None:
     (run / "picture.png").write_text("a picture is no harm")
     (run / "ltp.parquet").unlink(missing_ok=True)
     (run / "ltp.parquet").symlink_to(FIXTURES / f"v{FORMAT}" / "ltp.parquet")
-    found = verify_run(run)
-    assert "is missing" == found.differing["events.parquet"]
-    assert ["learned/more.npz", "more.parquet"] == found.foreign
+    verification = verify_run(run)
+    assert "is missing" == verification.differing["events.parquet"]
+    assert ["learned/more.npz", "more.parquet"] == verification.foreign
     assert any("more.parquet" in note for note in open_run(run).notes)
     assert "more" not in open_run(run).tables
 
@@ -153,9 +153,9 @@ def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path: Path) -> None:
 
 def test_the_seal_covers_a_run_of_plain_tables(tmp_path: Path) -> None:
     stored(rows_of_every_kind(50), directory=tmp_path / "run")
-    found = verify_run(tmp_path / "run")
-    assert found.same
-    assert 64 == len(found.digest or "")
+    verification = verify_run(tmp_path / "run")
+    assert verification.same
+    assert 64 == len(verification.digest or "")
 
 
 # Manifests
@@ -239,7 +239,7 @@ ODD = [
 
 def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """All keys of a nested content."""
-    found = [where]
+    paths = [where]
     entries = (
         content.items()
         if isinstance(content, dict)
@@ -248,8 +248,8 @@ def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         else ()
     )
     for key, value in entries:
-        found += places(value, (*where, key))
-    return found
+        paths += places(value, (*where, key))
+    return paths
 
 
 def test_no_edited_manifest_gives_a_traceback(run: Path) -> None:
@@ -276,8 +276,8 @@ def test_no_edited_manifest_gives_a_traceback(run: Path) -> None:
 
 
 def use_run(directory: Path) -> None:
-    found = open_run(directory)
-    _ = found.plan, found.metrics, found.digest, repr(found)
-    for name in found.tables:
-        _ = found.tables[name]
-    found.verify()
+    run = open_run(directory)
+    _ = run.plan, run.metrics, run.digest, repr(run)
+    for name in run.tables:
+        _ = run.tables[name]
+    run.verify()

@@ -10,7 +10,7 @@ from fleet2d.artifacts import ArtifactSettings
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"),
+    ("value", "expected"),
     [
         ("off", "off"),
         (False, "off"),  # YAML 1.1 reads a bare `off` so
@@ -19,8 +19,8 @@ from fleet2d.artifacts import ArtifactSettings
         (timedelta(hours=2), timedelta(hours=2)),
     ],
 )
-def test_trajectories_take_off_every_step_or_a_duration(given: Any, expected: Any) -> None:
-    assert expected == ArtifactSettings(trajectories=given).trajectories
+def test_trajectories_take_off_every_step_or_a_duration(value: Any, expected: Any) -> None:
+    assert expected == ArtifactSettings(trajectories=value).trajectories
 
 
 def test_default_is_every_simulated_hour_and_all_else() -> None:
@@ -33,10 +33,10 @@ def test_default_is_every_simulated_hour_and_all_else() -> None:
     assert settings.outputs
 
 
-@pytest.mark.parametrize("given", ["sometimes", "5 m", True, -1, "0 s"])
-def test_trajectories_refuse_anything_else(given: Any) -> None:
+@pytest.mark.parametrize("value", ["sometimes", "5 m", True, -1, "0 s"])
+def test_trajectories_refuse_anything_else(value: Any) -> None:
     with pytest.raises(ValidationError):
-        ArtifactSettings(trajectories=given)
+        ArtifactSettings(trajectories=value)
 
 
 def test_every_field_is_described() -> None:

@@ -126,7 +126,7 @@ def test_table_may_be_added_later_and_again(tmp_path: Path) -> None:
 
 
 def test_table_with_the_name_of_another_is_refused() -> None:
-    with pytest.raises(ArtifactError, match="name yours otherwise"):
+    with pytest.raises(ArtifactError, match="choose another name"):
         opened(None).add_table(TableSpec("poses", (Column("y", "bool"),)))
 
 

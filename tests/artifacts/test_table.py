@@ -10,14 +10,16 @@ from .tables import EVERY_KIND
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("", "int32"), "no name"),
         (("x", "float32"), "unknown kind 'float32'"),
     ],
 )
-def test_column_refuses_what_it_cannot_be(arguments: tuple[str, str], told: str) -> None:
-    with pytest.raises(ArtifactError, match=told):
+def test_column_without_name_or_of_unknown_kind_is_refused(
+    arguments: tuple[str, str], message: str
+) -> None:
+    with pytest.raises(ArtifactError, match=message):
         Column(*arguments)  # type: ignore[arg-type]
 
 

@@ -29,7 +29,7 @@ from fleet2d.logs import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.specification import read_specification
-from fleet2d.trust import Trust, restricted
+from fleet2d.trust import Trust, restrict
 
 RUN = Path(__file__).parents[1] / "fixtures" / "runs" / "v2"
 
@@ -122,7 +122,7 @@ def _persona() -> Any:
 
 def _safely(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
     def wrapped(path: Path) -> Any:
-        with restricted(Trust()):
+        with restrict(Trust()):
             return read(path)
 
     return wrapped
@@ -145,7 +145,7 @@ def _read_run(path: Path) -> None:
         for name in run.tables:
             _ = run.tables[name]
         _ = run.plan
-        with restricted(Trust()):
+        with restrict(Trust()):
             for body in run.manifest["entities"]["users"][:2]:
                 _ = run.path(body)
     finally:

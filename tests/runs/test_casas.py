@@ -33,7 +33,7 @@ def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # no
 
 
 def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    with pytest.raises(RunDirectoryError, match="give its scenario objects that sense"):
+    with pytest.raises(RunDirectoryError, match="add objects that sense to its scenario"):
         write_casas(run(scenario("1 min")), tmp_path / "log.txt")
 
 

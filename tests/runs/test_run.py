@@ -140,7 +140,7 @@ def test_crashed_run_opens_with_what_is_whole(tmp_path: Path) -> None:
     assert "every_kind.parquet.partial" in run.notes[1]
     with pytest.raises(ArtifactError, match="nothing to compare"):
         run.verify()
-    with pytest.raises(ArtifactError, match="It has none"):
+    with pytest.raises(ArtifactError, match="It has: none"):
         run.arrow("every_kind")
     store.discard()
 

@@ -132,7 +132,7 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
         (["simulation.step=2 h", "simulation.duration=1 h"],
          "simulation.duration: 1 h is shorter than one step, 2 h"),
         (["simulation.start=2026-01-05T00:00:00Z"], "simulation.start: found 2026-01-05T00:00:00+00"
-         ":00; the clock on the home's wall is wanted, without a time zone"),
+         ":00; a local time without a time zone is wanted"),
         (["simulation.start=20260105"],
          "simulation.start: found 20260105; a date and time is wanted"),
         (["simulation.start=2026-02-31"], "simulation.start: found '2026-02-31'; a date and time"),
@@ -180,7 +180,7 @@ def test_all_errors_of_a_file_are_told_with_their_lines(home: Path) -> None:
 
 
 def test_unknown_keyword_is_refused(home: Path) -> None:
-    assert "unknown argument 'sed': did you mean 'seed'? Known are: start," in said(home, sed=3)
+    assert "unknown argument 'sed': did you mean 'seed'? There are: start," in said(home, sed=3)
 
 
 def test_empty_scenario_names_what_is_missing() -> None:

@@ -36,7 +36,7 @@ _TYPES = {
 
 
 def schema_of(spec: TableSpec) -> pa.Schema:
-    """Return the Arrow schema, which carries all that the spec says."""
+    """Return the Arrow schema of a table; its metadata holds the whole spec."""
     fields = [
         pa.field(column.name, _TYPES[column.kind], column.nullable, _metadata(column))
         for column in spec.columns
@@ -45,7 +45,7 @@ def schema_of(spec: TableSpec) -> pa.Schema:
 
 
 def spec_of(schema: pa.Schema) -> TableSpec:
-    """Return the spec that a schema of ours carries.
+    """Return the spec that the metadata of a schema holds.
 
     Raises:
         ArtifactError: The schema is not one that `schema_of` made.
@@ -70,14 +70,14 @@ def _metadata(column: Column) -> dict[str, str]:
 
 
 def _column_of(field: pa.Field) -> Column:
-    said = {key.decode(): value.decode() for key, value in field.metadata.items()}
+    metadata = {key.decode(): value.decode() for key, value in field.metadata.items()}
     return Column(
         field.name,
-        cast(Kind, said["kind"]),  # Column refuses what is none
-        unit=said.get("unit", ""),
+        cast(Kind, metadata["kind"]),  # Column refuses an unknown kind
+        unit=metadata.get("unit", ""),
         nullable=field.nullable,
-        categories=tuple(json.loads(said.get("categories", "[]"))),
-        description=said.get("description", ""),
+        categories=tuple(json.loads(metadata.get("categories", "[]"))),
+        description=metadata.get("description", ""),
     )
 
 
@@ -90,9 +90,7 @@ def table_of(
     """Return chunks, each with its number of rows, as one Arrow table."""
     columns = []
     for column in spec.columns:
-        names: Sequence[str] = column.categories
-        if column.is_growing:
-            names = words[column.name].listed()
+        names = words[column.name].in_order() if column.is_growing else column.categories
         dictionary = _strings(names) if column.kind == "category" else None
         parts = [_array_of(chunk[column.name], column, dictionary) for chunk, _ in chunks]
         columns.append(pa.chunked_array(parts, _TYPES[column.kind]))
@@ -107,7 +105,7 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
         np.cumsum(chunk.lengths, out=ends[1:])
         if ends[-1] > MOST_TEXT:
             raise ArtifactError(
-                f"{column.name} is more than 2 GiB of text at once: put out less at a time"
+                f"{column.name} is more than 2 GiB of text at once: append fewer rows at a time"
             )
         # A cast of large strings would do, but it imports pyarrow.compute: a tenth of a second.
         text = pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(np.ascontiguousarray(chunk.values))
@@ -164,7 +162,7 @@ def chunks_of(
 
 
 def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> ColumnChunk:
-    """Bring an Arrow array to the form that is hashed: nulls are zero."""
+    """Convert an Arrow array to the form that is hashed: nulls are zero."""
     if not len(array):
         return empty_chunk(column)
     valid = array.is_valid().to_numpy(zero_copy_only=False) if column.nullable else None
@@ -185,26 +183,26 @@ def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> Co
 
 
 def _codes_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> Any:
-    """Return codes into the column's own dictionary, whatever dictionary the array has."""
+    """Return the codes of an array in the dictionary of the column, whatever the array's own is."""
     if not pa.types.is_dictionary(array.type):
         array = array.dictionary_encode()
-    local = array.dictionary.to_pylist()
-    if local == list(column.categories):
+    names = array.dictionary.to_pylist()
+    if names == list(column.categories):
         return array.indices.fill_null(0).to_numpy(zero_copy_only=False)
-    known: dict[str, int] = {name: code for code, name in enumerate(column.categories)}
+    code_of: dict[str, int] = {name: code for code, name in enumerate(column.categories)}
     codes = array.indices.fill_null(-1).to_numpy(zero_copy_only=False)
     used, first = np.unique(codes[codes >= 0], return_index=True)
-    own = np.zeros(len(local) + 1, np.int32)  # the last one is for -1, a missing value
+    column_codes = np.zeros(len(names) + 1, np.int32)  # the last one is for -1, a missing value
     for code in used[np.argsort(first, kind="stable")]:
-        name = local[code]
-        if not column.is_growing and name not in known:
+        name = names[code]
+        if not column.is_growing and name not in code_of:
             raise ArtifactError(f"column {column.name!r} has no category {name!r}")
-        own[code] = words[column.name][name] if column.is_growing else known[name]
-    return own[codes]
+        column_codes[code] = words[column.name][name] if column.is_growing else code_of[name]
+    return column_codes[codes]
 
 
 class ParquetTable:
-    """One table's file on its way: written as `NAME.parquet.partial`, renamed when whole."""
+    """The file of a table that is being written: `NAME.parquet.partial` until it is complete."""
 
     def __init__(self, directory: Path, spec: TableSpec) -> None:
         """Create the partial file.
@@ -235,7 +233,7 @@ class ParquetTable:
         self._writer.write_table(table, row_group_size=max(rows, 1))
 
     def finish(self) -> None:
-        """End the file and see it onto the disk; it keeps its partial name."""
+        """Complete the file and flush it to the disk; it keeps its partial name."""
         if self._is_published:
             return
         self._writer.close()
@@ -252,14 +250,14 @@ class ParquetTable:
             self._is_published = True
 
     def abandon(self) -> None:
-        """Let go of the file, which stays partial."""
+        """Close the file, which stays partial."""
         try:
             self._writer.close()
         except OSError:  # the disk is still full
             self._writer.is_open = False
 
     def empty(self) -> bool:
-        """Give back the disk space of a file that is lost; return whether that worked."""
+        """Free the disk space of a file that is lost; return whether that worked."""
         try:
             os.truncate(self.partial, 0)
         except OSError:
@@ -268,7 +266,7 @@ class ParquetTable:
 
 
 def read_parquet(path: Path) -> pa.Table:
-    """Read a table; its categories are whole, in their order, and the same in every chunk.
+    """Read a table as `with_categories` returns it.
 
     Raises:
         ArtifactError: The file is missing, cut off or otherwise damaged.
@@ -283,7 +281,7 @@ def read_parquet(path: Path) -> pa.Table:
 
 
 def read_row_groups(path: Path) -> Iterator[pa.Table]:
-    """Yield a table a row group at a time, the first without rows, so that memory stays small."""
+    """Yield a table without rows, then its row groups, so that memory stays small."""
     with _opened(path) as file:
         yield file.schema_arrow.empty_table()
         for group in range(file.num_row_groups):
@@ -325,27 +323,21 @@ def _damaged(path: Path, error: Exception) -> ArtifactError:
 
 
 def with_categories(table: pa.Table) -> pa.Table:
-    """Give every chunk of a category column the same dictionary: all categories, in order."""
-    spec = spec_of(table.schema)
-    for i, column in enumerate(spec.columns):
+    """Give every chunk of a category column the same dictionary: all categories, in order.
+
+    Raises:
+        ArtifactError: The table was not stored by Fleet2D, or holds an unknown category.
+    """
+    for i, column in enumerate(spec_of(table.schema).columns):
         if column.kind != "category":
             continue
-        words = {column.name: Words()}
-        arrays = table.column(i).chunks
-        codes = [_codes_of(array, column, words) for array in arrays]
-        names = words[column.name].listed() if column.is_growing else column.categories
-        dictionary = pa.array(names, pa.string())
-        parts = [
-            pa.DictionaryArray.from_arrays(
-                pa.array(own, pa.int32(), mask=_missing(array)), dictionary
-            )
-            for own, array in zip(codes, arrays, strict=True)
-        ]
-        table = table.set_column(
-            i, table.schema.field(i), pa.chunked_array(parts, _TYPES["category"])
-        )
+        # The dictionary of the first chunk comes first in the unified one.
+        no_codes = _wrapped(np.empty(0, np.int32), pa.int32(), None)
+        first = pa.DictionaryArray.from_arrays(no_codes, _strings(column.categories))
+        chunks = pa.chunked_array([first, *table.column(i).chunks]).unify_dictionaries().chunks
+        if not column.is_growing and len(chunks[0].dictionary) > len(column.categories):
+            name = chunks[0].dictionary[len(column.categories)]
+            raise ArtifactError(f"column {column.name!r} has no category {name.as_py()!r}")
+        values = pa.chunked_array(chunks[1:], _TYPES["category"])
+        table = table.set_column(i, table.schema.field(i), values)
     return table
-
-
-def _missing(array: pa.Array) -> Any:
-    return array.is_null().to_numpy(zero_copy_only=False) if array.null_count else None

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from fleet2d.artifacts.chunk import (
     Chunk,
     ColumnChunk,
-    Words,
     empty_chunk,
     encode_strings,
     encode_words,
+    new_words,
 )
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
@@ -24,10 +24,18 @@ FLUSH_ROWS = 2**17
 
 _FIRST_CAPACITY = 256
 _NOT_A_TIME = np.iinfo(np.int64).min
+# NumPy's kinds of values that a kind of column takes; integers by default.
+_ACCEPTED = {"float64": "fiu", "bool": "b", "time": "iuM"}
 
 
-class Checked(NamedTuple):
-    """Rows that fit the table, before they are copied into it."""
+class Batch(NamedTuple):
+    """Rows that fit the table, before they are copied into it.
+
+    Attributes:
+        rows: Number of rows.
+        values: Of each column an array or a list, (rows,), or a scalar that stands for all rows.
+        valid: Of each column which values are not missing, bool (rows,), or True for all.
+    """
 
     rows: int
     values: dict[str, Any]
@@ -38,21 +46,21 @@ class TableBuffer:
     """Collects rows of one table, at most `limit` of them, in arrays that grow as needed."""
 
     def __init__(self, spec: TableSpec, limit: int = FLUSH_ROWS) -> None:
-        """Start empty; memory is taken only when rows come."""
+        """Create an empty buffer; memory is allocated with the first rows."""
         self.spec = spec
         self.limit = limit
         self.rows = 0
-        self.words = {column.name: Words() for column in spec.columns if column.is_growing}
+        self.words = new_words(spec)
         self._capacity = 0
-        self._needed = _FIRST_CAPACITY
+        self._first_capacity = _FIRST_CAPACITY
         self._values: dict[str, Any] = {}
         self._valid: dict[str, NDArray[np.bool_]] = {}
         self._names = frozenset(spec.names)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the room that is kept free for more rows."""
-        values = {name: kept[: self.rows] for name, kept in self._values.items()}
-        valid = {name: kept[: self.rows] for name, kept in self._valid.items()}
+        """Leave out the memory that is reserved for more rows."""
+        values = {name: column[: self.rows] for name, column in self._values.items()}
+        valid = {name: column[: self.rows] for name, column in self._valid.items()}
         return {**self.__dict__, "_capacity": self.rows, "_values": values, "_valid": valid}
 
     @property
@@ -69,16 +77,16 @@ class TableBuffer:
         Raises:
             ArtifactError: The columns don't fit the table, or the rows don't fit the limit.
         """
-        checked = self.check(columns)
-        if self.rows + checked.rows > self.limit:
+        batch = self.check(columns)
+        if self.rows + batch.rows > self.limit:
             raise ArtifactError(
-                f"table {self.spec.name!r}: {checked.rows} rows are more than the "
+                f"table {self.spec.name!r}: {batch.rows} rows are more than the "
                 f"{self.limit - self.rows} that still fit: append less at a time"
             )
-        self.fill(checked, 0)
+        self.fill(batch, 0)
 
-    def check(self, columns: Mapping[str, Any]) -> Checked:
-        """Bring columns to the table's types; nothing is kept yet.
+    def check(self, columns: Mapping[str, Any]) -> Batch:
+        """Convert columns to the table's types; the buffer is not changed yet.
 
         Raises:
             ArtifactError: A column is missing, unknown, of another length or type, out of range,
@@ -91,88 +99,83 @@ class TableBuffer:
         rows = -1
         for column in self.spec.columns:
             try:
-                kept, there = _checked(column, columns[column.name])
+                values[column.name], valid[column.name] = _convert(column, columns[column.name])
             except ArtifactError as error:
                 raise ArtifactError(
                     f"table {self.spec.name!r}, column {column.name!r}: {error}"
                 ) from error
-            values[column.name], valid[column.name] = kept, there
-            length = _length(kept)
+            length = _length(values[column.name])
             if length >= 0 and rows >= 0 and length != rows:
                 raise ArtifactError(
                     f"table {self.spec.name!r}: column {column.name!r} has {length} values where "
                     f"others have {rows}: give all columns one length"
                 )
             rows = max(rows, length)
-        return Checked(1 if rows < 0 else rows, values, valid)
+        return Batch(1 if rows < 0 else rows, values, valid)
 
-    def fill(self, checked: Checked, start: int) -> int:
-        """Copy rows in from `start` on, as many as fit; return where the rest starts."""
-        stop = min(checked.rows, start + self.limit - self.rows)
+    def fill(self, batch: Batch, start: int) -> int:
+        """Copy the rows of a batch from `start` on; return the first one that doesn't fit."""
+        stop = min(batch.rows, start + self.limit - self.rows)
         a, b = self.rows, self.rows + stop - start
         self._make_room(b)
         for column in self.spec.columns:
-            name, given = column.name, checked.values[column.name]
-            kept = self._values[name]
-            if isinstance(kept, np.ndarray):
-                kept[a:b] = given if np.ndim(given) == 0 else given[start:stop]
+            name, values = column.name, batch.values[column.name]
+            buffered = self._values[name]
+            if isinstance(buffered, np.ndarray):
+                buffered[a:b] = values if np.ndim(values) == 0 else values[start:stop]
             else:
-                del kept[a:]  # what an interrupted call may have left
-                kept.extend([given] * (b - a) if not isinstance(given, list) else given[start:stop])
+                del buffered[a:]  # an interrupted call may have added some
+                is_list = isinstance(values, list)
+                buffered.extend(values[start:stop] if is_list else [values] * (b - a))
             if column.nullable and name in self._valid:
-                there = checked.valid[name]
-                self._valid[name][a:b] = there if np.ndim(there) == 0 else there[start:stop]
+                valid = batch.valid[name]
+                self._valid[name][a:b] = valid if np.ndim(valid) == 0 else valid[start:stop]
         self.rows = b
         return stop
 
     def take(self, *, reuse: bool = False) -> Chunk:
-        """Hand out the rows and empty the buffer.
+        """Return the rows and empty the buffer.
 
         Args:
-            reuse: The caller is done with the arrays before the next append, so the same memory
-                may collect the next rows.
+            reuse: Whether the next rows may overwrite the arrays that are returned: the caller no
+                longer needs them by then.
         """
         chunk = self.peek()
         self.rows = 0
         if not reuse:
-            self._needed = max(self._needed, self._capacity)  # likely needed again
+            # The next rows are likely to be as many.
+            self._first_capacity = max(self._first_capacity, self._capacity)
             self._capacity, self._values, self._valid = 0, {}, {}
         for column in self.spec.columns:
             if column.takes_strings:
                 self._values[column.name] = []
         return chunk
 
-    def learn_words(self, words: Mapping[str, Words]) -> None:
-        """Enter words in the order of their codes, before rows are encoded that hold them."""
-        for name, known in words.items():
-            for word in known.listed():
-                self.words[name][word]  # looking a new word up enters it
-
     def peek(self, start: int = 0) -> Chunk:
-        """Return the rows from `start` on, which stay here; arrays are not copied."""
+        """Return the rows from `start` on, without removing them; arrays are not copied."""
         return {column.name: self._rows_of(column, start) for column in self.spec.columns}
 
     def _rows_of(self, column: Column, start: int) -> ColumnChunk:
         """Encode what one column holds from row `start` on."""
         if self.rows <= start:
             return empty_chunk(column)
-        kept = self._values[column.name][start : self.rows]
+        values = self._values[column.name][start : self.rows]
         if column.kind == "string":
-            return encode_strings(kept, column.nullable)
+            return encode_strings(values, column.nullable)
         if column.is_growing:
-            return encode_words(kept, self.words[column.name], column.nullable)
+            return encode_words(values, self.words[column.name], column.nullable)
         if not column.nullable:
-            return ColumnChunk(kept)
+            return ColumnChunk(values)
         valid = self._valid[column.name][start : self.rows]
         if not valid.all():
-            kept[~valid] = 0
-        return ColumnChunk(kept, valid)
+            values[~valid] = 0
+        return ColumnChunk(values, valid)
 
     def _make_room(self, rows: int) -> None:
-        """Let at least `rows` rows fit, doubling so that many small appends stay cheap."""
+        """Allocate memory for `rows` rows or more; it doubles, so that small appends are cheap."""
         if rows <= self._capacity and self._values:
             return
-        capacity = min(self.limit, max(rows, 2 * self._capacity, self._needed))
+        capacity = min(self.limit, max(rows, 2 * self._capacity, self._first_capacity))
         for column in self.spec.columns:
             if column.takes_strings:
                 self._values.setdefault(column.name, [])
@@ -203,81 +206,70 @@ def _grow(
     arrays[name] = longer
 
 
-def _checked(column: Column, given: Any) -> tuple[Any, Any]:
-    """Return the values as array, list or scalar, and which of them are there."""
+def _convert(column: Column, values: Any) -> tuple[Any, Any]:
+    """Return values as array, list or scalar, and which of them are not missing (True: all)."""
     if column.takes_strings:
-        return _checked_strings(column, given), True
-    mask = np.ma.getmaskarray(given) if isinstance(given, np.ma.MaskedArray) else None
-    values = np.ma.getdata(given) if mask is not None else np.asarray(given)
+        return _as_strings(column, values), True
+    valid = None
+    if isinstance(values, np.ma.MaskedArray):
+        valid = ~np.ma.getmaskarray(values)
+        values = np.ma.getdata(values)
+    values = np.asarray(values)
     if values.ndim > 1:
         raise ArtifactError(f"has {values.ndim} dimensions: give one value per row")
     if not values.size:
         return np.empty(0, DTYPES[column.kind]), True
-    valid = None if mask is None else ~mask
-    if column.kind == "float64":
-        if values.dtype.kind not in "fiu":
-            raise ArtifactError(f"holds {values.dtype}, not float64: convert it first")
-        there = ~np.isnan(values) if values.dtype.kind == "f" else None
-    elif column.kind == "bool":
-        if values.dtype.kind != "b":
-            raise ArtifactError(f"holds {values.dtype}, not bool: convert it first")
-        there = None
+    if values.dtype.kind not in _ACCEPTED.get(column.kind, "iu"):
+        noun = column.kind if column.kind in ("float64", "bool") else "integers"
+        raise ArtifactError(f"holds {values.dtype}, not {noun}: convert it first")
+    if values.dtype.kind == "M":
+        values = values.astype("datetime64[us]", copy=False).view(np.int64)
+        present = values != _NOT_A_TIME
     else:
-        values, there = _checked_integers(column, values, valid)
-    if there is not None:
-        valid = there if valid is None else valid & there
+        present = _check_values(column, values, values if valid is None else values[valid])
+    if present is not None:
+        valid = present if valid is None else valid & present
     if not column.nullable and valid is not None and not valid.all():
         raise ArtifactError("has missing values (NaN, NaT, -1 or masked): declare it nullable")
     return values, True if valid is None else valid
 
 
-def _checked_integers(column: Column, values: Any, valid: Any) -> tuple[Any, Any]:
-    """Check type and range of integers, times and codes; return which are there if not all."""
-    if column.kind == "time" and values.dtype.kind == "M":
-        values = values.astype("datetime64[us]", copy=False).view(np.int64)
-        return values, values != _NOT_A_TIME
-    if values.dtype.kind not in "iu":
-        raise ArtifactError(f"holds {values.dtype}, not integers: convert it first")
+def _check_values(column: Column, values: Any, unmasked: Any) -> Any:
+    """Check the range of values; return which are neither NaN nor -1 where these mean missing."""
+    if values.dtype.kind == "f":
+        return ~np.isnan(values)
     dtype = DTYPES[column.kind]
     if column.kind != "category":
-        if not np.can_cast(values.dtype, dtype) and values.size:
-            seen = values if valid is None else values[valid]
-            if seen.size and not _fits(seen, dtype):
+        if not np.can_cast(values.dtype, dtype) and unmasked.size:
+            bounds = np.iinfo(dtype)
+            if int(unmasked.min()) < bounds.min or int(unmasked.max()) > bounds.max:
                 raise ArtifactError(f"holds numbers beyond {dtype}: declare it int64")
-        return values, None
-    there = values >= 0 if column.nullable else None
-    seen = values if valid is None else values[valid]
+        return None
     lowest = -1 if column.nullable else 0
-    if seen.size and not (lowest <= seen.min() and seen.max() < len(column.categories)):
+    if unmasked.size and not lowest <= unmasked.min() <= unmasked.max() < len(column.categories):
         raise ArtifactError(
-            f"has code {int(seen.min())} or {int(seen.max())}: "
+            f"has code {int(unmasked.min())} or {int(unmasked.max())}: "
             f"there are {len(column.categories)} categories"
         )
-    return values, there
+    return values >= 0 if column.nullable else None
 
 
-def _length(kept: Any) -> int:
-    """Return the number of values, or -1 for a scalar."""
-    if isinstance(kept, np.ndarray):
-        return -1 if kept.ndim == 0 else len(kept)
-    return len(kept) if isinstance(kept, list) else -1
-
-
-def _fits(values: Any, dtype: np.dtype[Any]) -> bool:
-    bounds = np.iinfo(dtype)
-    return int(values.min()) >= bounds.min and int(values.max()) <= bounds.max
-
-
-def _checked_strings(column: Column, given: Any) -> Any:
+def _as_strings(column: Column, strings: Any) -> Any:
     """Return one string (or None), or a list of them."""
-    if isinstance(given, np.ndarray):
-        given = given.tolist()  # a scalar if it has no dimension
-    if given is not None and not isinstance(given, str):
-        given = list(given)
-    strings = given if isinstance(given, list) else [given]
-    strange = set(map(type, strings)) - {str}
-    if strange == {type(None)} and not column.nullable:
+    if isinstance(strings, np.ndarray):
+        strings = strings.tolist()  # a scalar if it has no dimension
+    if strings is not None and not isinstance(strings, str):
+        strings = list(strings)
+    types = set(map(type, strings if isinstance(strings, list) else [strings])) - {str}
+    if types == {type(None)} and not column.nullable:
         raise ArtifactError("has missing values (None): declare it nullable")
-    if strange - {type(None)}:
+    if strange := types - {type(None)}:
         raise ArtifactError(f"holds {strange.pop().__name__}, not strings: convert it first")
-    return given
+    return strings
+
+
+def _length(values: Any) -> int:
+    """Return the number of values, or -1 for a scalar."""
+    if isinstance(values, np.ndarray):
+        return -1 if values.ndim == 0 else len(values)
+    return len(values) if isinstance(values, list) else -1

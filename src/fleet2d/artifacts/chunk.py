@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.table import DTYPES, Column
+from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
 
 
@@ -17,7 +17,7 @@ class ColumnChunk(NamedTuple):
 
     Attributes:
         values: Numbers or category codes, (n,), 0 where missing; for strings their UTF-8 bytes.
-        valid: Which values are there, (n,) bool; None if the column isn't nullable.
+        valid: Which values are not missing, (n,) bool; None if the column isn't nullable.
         lengths: Bytes of each string, (n,) int64; None for every other kind.
     """
 
@@ -34,20 +34,30 @@ class Words(dict[str | None, int]):
 
     Example:
         >>> words = Words()
-        >>> words["on"], words["off"], words["on"], words.listed()
+        >>> words["on"], words["off"], words["on"], words.in_order()
         (0, 1, 0, ['on', 'off'])
     """
 
     def __missing__(self, word: str | None) -> int:
-        """Enter a word that was not there."""
+        """Enter a new word."""
         if not isinstance(word, str):
             raise ArtifactError(f"{word!r} is no string")
         self[word] = code = len(self) - (None in self)
         return code
 
-    def listed(self) -> list[str]:
-        """All words in the order of their codes."""
+    def enter(self, words: Iterable[str]) -> None:
+        """Enter words in the order of their codes."""
+        for word in words:
+            self[word]  # looking a new word up enters it
+
+    def in_order(self) -> list[str]:
+        """Return all words in the order of their codes."""
         return [word for word in self if word is not None]
+
+
+def new_words(spec: TableSpec) -> dict[str, Words]:
+    """Return an empty dictionary for each column of a table whose dictionary grows."""
+    return {column.name: Words() for column in spec.columns if column.is_growing}
 
 
 def empty_chunk(column: Column) -> ColumnChunk:
@@ -60,20 +70,19 @@ def empty_chunk(column: Column) -> ColumnChunk:
 
 def encode_strings(strings: Sequence[str | None], nullable: bool) -> ColumnChunk:
     """Turn strings into their UTF-8 bytes and the length of each."""
-    valid = _are_there(strings) if nullable else None
     encoded = [string.encode() if string else b"" for string in strings]
     lengths = np.fromiter(map(len, encoded), np.int64, len(encoded))
-    return ColumnChunk(np.frombuffer(b"".join(encoded), np.uint8), valid, lengths)
+    values = np.frombuffer(b"".join(encoded), np.uint8)
+    return ColumnChunk(values, _valid(strings) if nullable else None, lengths)
 
 
 def encode_words(strings: Sequence[str | None], words: Words, nullable: bool) -> ColumnChunk:
     """Turn strings into codes, entering new ones into `words`."""
-    valid = _are_there(strings) if nullable else None
     if nullable:
         words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
     codes = np.fromiter(map(words.__getitem__, strings), np.int32, len(strings))
-    return ColumnChunk(codes, valid)
+    return ColumnChunk(codes, _valid(strings) if nullable else None)
 
 
-def _are_there(strings: Sequence[str | None]) -> NDArray[np.bool_]:
+def _valid(strings: Sequence[str | None]) -> NDArray[np.bool_]:
     return np.fromiter((string is not None for string in strings), np.bool_, len(strings))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, new_words
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.errors import ArtifactError
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 class TableDigest:
-    """SHA-256 of a table's content, taken chunk by chunk.
+    """SHA-256 of a table's content, computed chunk by chunk.
 
-    Values, validity and string lengths of a column have a hash each, so that it doesn't matter
-    where one chunk ends and the next begins.
+    Values, validity and string lengths of a column have a hash each, so the digest doesn't depend
+    on where one chunk ends and the next begins.
     """
 
     def __init__(self, spec: TableSpec) -> None:
@@ -33,7 +33,7 @@ class TableDigest:
         self._columns = [_ColumnDigest(column) for column in spec.columns]
 
     def update(self, chunk: Chunk, rows: int) -> None:
-        """Take in the next `rows` rows."""
+        """Add the next `rows` rows."""
         for column in self._columns:
             column.update(chunk[column.name])
         self.rows += rows
@@ -50,30 +50,30 @@ class TableDigest:
                 column.kind,
                 column.nullable,
                 digest.hexdigest(
-                    words[column.name].listed()
+                    words[column.name].in_order()
                     if words and column.is_growing
                     else column.categories
                 ),
             )
             for column, digest in zip(self.spec.columns, self._columns, strict=True)
         ]
-        return _sha256_of([self.spec.name, self.rows, columns])
+        return sha256_of([self.spec.name, self.rows, columns])
 
 
 class _ColumnDigest:
-    """The hashes of one column: its values, which are there, and how long strings are."""
+    """The hashes of one column: its values, their validity, and the lengths of strings."""
 
     def __init__(self, column: Column) -> None:
         self.name = column.name
         self._hashes = [hashlib.sha256() for _ in range(3)]
 
     def update(self, chunk: ColumnChunk) -> None:
-        for kept, values in zip(self._hashes, chunk, strict=True):
+        for hasher, values in zip(self._hashes, chunk, strict=True):
             if values is not None and len(values):
-                kept.update(_little_endian(values))
+                hasher.update(_little_endian(values))
 
     def hexdigest(self, categories: Sequence[str]) -> str:
-        return _sha256_of([[kept.hexdigest() for kept in self._hashes], list(categories)])
+        return sha256_of([[hasher.hexdigest() for hasher in self._hashes], list(categories)])
 
 
 def run_digest(tables: Mapping[str, str]) -> str:
@@ -83,7 +83,7 @@ def run_digest(tables: Mapping[str, str]) -> str:
         >>> run_digest({"a": "1", "b": "2"}) == run_digest({"b": "2", "a": "1"})
         True
     """
-    return _sha256_of(sorted(tables.items()))
+    return sha256_of(sorted(tables.items()))
 
 
 def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
@@ -91,7 +91,7 @@ def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
 
     Args:
         table: A table as read back from a run.
-        spec: What the table should be; None takes it from the table's own schema.
+        spec: What the table should be; None: what its schema says.
 
     Raises:
         ArtifactError: The table's columns are not those of the spec.
@@ -100,7 +100,7 @@ def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
 
 
 def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> str:
-    """Return the digest of a table that comes in parts, row after row."""
+    """Return the digest of a table that comes in parts, in the order of its rows."""
     from fleet2d.artifacts.arrow import chunks_of, spec_of
 
     digest: TableDigest | None = None
@@ -109,11 +109,11 @@ def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> s
         if digest is None:
             spec = spec or spec_of(part.schema)
             digest = TableDigest(spec)
-            words = {column.name: Words() for column in spec.columns if column.is_growing}
+            words = new_words(spec)
         for chunk, rows in chunks_of(part, digest.spec, words):
             digest.update(chunk, rows)
     if digest is None:
-        raise ValueError("a table needs at least one part, if only one without rows")
+        raise ValueError("a table needs at least one part, even if it has no rows")
     return digest.hexdigest(words)
 
 
@@ -127,9 +127,14 @@ def digest_of_file(path: Path) -> str | None:
         return None
 
 
-def changed_tables(stored: Mapping[str, str], digest_of: Callable[[str], str | None]) -> list[str]:
-    """Return the tables whose digest is not the stored one."""
-    return [name for name, digest in stored.items() if digest_of(name) != digest]
+def changed_tables(digests: Mapping[str, str], digest_of: Callable[[str], str | None]) -> list[str]:
+    """Return the names of the tables whose digest is not the stored one.
+
+    Args:
+        digests: The stored digests by name.
+        digest_of: Returns the present digest of a table.
+    """
+    return [name for name, digest in digests.items() if digest_of(name) != digest]
 
 
 def _little_endian(values: NDArray[Any]) -> memoryview:
@@ -137,6 +142,7 @@ def _little_endian(values: NDArray[Any]) -> memoryview:
     return values.view(np.uint8).data
 
 
-def _sha256_of(content: Any) -> str:
-    """Hash nested lists of strings and numbers, unambiguously."""
-    return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()
+def sha256_of(content: Any) -> str:
+    """Return the SHA-256 of plain JSON data, whatever the order of its keys."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()

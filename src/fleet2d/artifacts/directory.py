@@ -1,4 +1,4 @@
-"""The run directory: whether it can be used, making it, and taking it back."""
+"""The run directory: check that it can be used, create it, and remove it again."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 
 def check_run_directory(directory: Path) -> None:
-    """Say early, and without writing, that a directory can't take a run.
+    """Check, without writing, that a run can be stored in a directory.
 
     Raises:
-        RunDirectoryError: It exists and holds something, is a file, or can't be made.
+        RunDirectoryError: It exists and isn't empty, is a file, or can't be created.
     """
     try:
         if directory.is_dir():
@@ -47,37 +47,35 @@ def _check_writable(directory: Path, nearest: Path) -> None:
 
 
 def make_directories(directory: Path) -> list[Path]:
-    """Make a directory and its parents; return those that were missing, outermost first.
+    """Create a directory and its parents; return those that were missing, outermost first.
 
     Raises:
-        OSError: One can't be made; none is left behind.
+        OSError: One can't be created; those created before it are removed again.
     """
-    missing = [path for path in (directory, *directory.parents) if not path.is_dir()]
-    made: list[Path] = []
+    missing = [path for path in (directory, *directory.parents) if not path.is_dir()][::-1]
     try:
-        for path in reversed(missing):
+        for path in missing:
             path.mkdir(exist_ok=True)
-            made.append(path)
     except OSError:
-        remove_directories(made)
+        remove_directories(missing)
         raise
-    return made
+    return missing
 
 
-def remove_directories(made: list[Path]) -> None:
-    """Remove directories that `make_directories` made, as far as they are empty."""
-    for path in reversed(made):
+def remove_directories(directories: list[Path]) -> None:
+    """Remove those of some directories, outermost first, that exist and are empty."""
+    for path in reversed(directories):
         with suppress(OSError):
             path.rmdir()
 
 
 def is_disk_full(error: OSError) -> bool:
-    """Whether an error means that nothing more fits on the disk, or in one's share of it."""
+    """Whether an error means that the disk, or the user's quota, is full."""
     return error.errno in _FULL
 
 
 def cannot_write(directory: Path, error: OSError) -> Fleet2DError:
-    """Return what to tell the user when a run directory can't be made."""
+    """Return the error to raise when a run directory can't be created."""
     if is_disk_full(error):
         return ArtifactError(
             f"the disk is full: {directory} can't be made; free some space or choose another --out"

@@ -1,6 +1,6 @@
-"""Files that survive a crash: the few calls to the operating system by which a run is stored.
+"""Files that survive a crash: the few calls to the operating system that store a run.
 
-Everything that a run writes goes through these functions, so that tests can let each fail.
+All that a run writes goes through these functions, so that tests can make each of them fail.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 PARTIAL = ".partial"
-"""What the name of a file ends in until the file is whole."""
+"""Suffix of a file's name until the file is complete."""
 
 
 def write_all(handle: int, content: bytes) -> None:
@@ -25,16 +25,16 @@ def write_all(handle: int, content: bytes) -> None:
 
 
 def sync(handle: int) -> None:
-    """See what was written to an open file onto the disk.
+    """Flush an open file to the disk.
 
     Raises:
-        OSError: The disk failed; what was written since the last call may be lost.
+        OSError: The disk failed; bytes written since the last call may be lost.
     """
     os.fsync(handle)
 
 
 def sync_directory(directory: Path) -> None:
-    """See the names in a directory onto the disk, where the system can do that."""
+    """Flush the names in a directory to the disk, where the system can do that."""
     if os.name != "posix":
         return
     handle = os.open(directory, os.O_RDONLY)
@@ -44,22 +44,22 @@ def sync_directory(directory: Path) -> None:
         os.close(handle)
 
 
-def replace(path: Path, by: Path) -> None:
-    """Give the file `by` the name `path`, at one stroke."""
-    by.replace(path)
+def replace(path: Path, new: Path) -> None:
+    """Rename the file `new` to `path`, atomically."""
+    new.replace(path)
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file at one stroke: after a crash it is as before, or whole.
+    """Write a file atomically: after a crash it has the old content or the new one.
 
     Raises:
-        OSError: It can't be written; what was there before still is.
+        OSError: It can't be written; the old content is unchanged.
 
     Example:
         >>> import tempfile
         >>> file = Path(tempfile.mkdtemp()) / "plan.json"
         >>> write_atomically(file, b"{}")
-        >>> file.read_text(), [other.name for other in file.parent.iterdir()]
+        >>> file.read_text(), [path.name for path in file.parent.iterdir()]
         ('{}', ['plan.json'])
     """
     partial = path.with_name(f"{path.name}{PARTIAL}")

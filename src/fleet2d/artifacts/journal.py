@@ -1,8 +1,8 @@
 """The journal of a run: all rows so far in one file that survives the end of the process.
 
-The file is a row of frames, each with its length and checksum: `table` names a table and its
-columns, `rows` holds rows of one, `commit` says that everything before it belongs together. It
-only grows; what comes after the last whole commit was cut off by a crash, and is left out.
+The file is a sequence of frames, each with its length and checksum: `table` describes a table,
+`rows` holds rows of a table, and `commit` ends a group of frames that belong together. The file is
+only appended to; readers ignore all that follows the last complete commit, which a crash cut off.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from typing import Any, BinaryIO, Literal, NamedTuple
 import numpy as np
 
 from fleet2d.artifacts import files
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, new_words
 from fleet2d.artifacts.encoding import RAW, Encoded, decode, encode
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
 
 FOLDER = "unfinished"
-"""The folder in a run directory of what is needed until the run is complete."""
+"""The folder in a run directory for files that are needed until the run is complete."""
 JOURNAL_NAME = "journal"
 MAGIC = b"fleet2d journal 1\n"
 
@@ -33,19 +33,19 @@ Kind = Literal["table", "rows", "commit"]
 _KINDS: tuple[Kind, ...] = ("table", "rows", "commit")
 # Kind, bytes of the description, bytes of the arrays, checksum of all three and of both.
 _HEADER = struct.Struct("<BIQI")
-# Frames that wait for a commit are written once they take so much memory [bytes].
-_WAITING = 1 << 22
-# Rows in one frame at most: a few damaged bytes must not ask for all memory.
+# Size of the frames that are written at once, unless a commit comes before [bytes].
+_BUFFER_BYTES = 1 << 22
+# Rows in one frame at most: a few damaged bytes must not request all memory.
 _MOST_ROWS = 1 << 20
 
 
 class Commit(NamedTuple):
-    """What belongs together: a run up to a step.
+    """A commit: all rows of a run up to a step.
 
     Attributes:
-        step: Every row before this step is there.
-        rows: How many rows each table has.
-        end: Where in the journal that is [bytes].
+        step: The first step of which rows may be missing.
+        rows: Number of rows of each table, by name.
+        end: Position in the journal [bytes].
     """
 
     step: int
@@ -54,8 +54,8 @@ class Commit(NamedTuple):
 
 
 @dataclass
-class _Known:
-    """A table in the journal: its number, its rows, and the words of its dictionaries so far."""
+class _LoggedTable:
+    """A table in the journal: its number, its rows, and the size of its dictionaries so far."""
 
     number: int
     spec: TableSpec
@@ -68,21 +68,25 @@ class JournalWriter:
 
     Attributes:
         path: The file.
-        end: Where the last commit ends [bytes].
+        end: Position where the last commit ends [bytes].
     """
 
     def __init__(self, path: Path, start: int = 0) -> None:
-        """Create the file, or go on behind a commit whose rows are added anew by `replay`.
+        """Create the file, or continue after a commit, whose rows are then passed to `replay`.
+
+        Args:
+            path: The file.
+            start: Where the commit ends [bytes]; 0: create the file.
 
         Raises:
             OSError: The file can't be written.
         """
         self.path, self.end = path, start
-        self._tables: dict[str, _Known] = {}
-        self._waiting: list[bytes] = []
+        self._tables: dict[str, _LoggedTable] = {}
+        self._buffer: list[bytes] = []
         self._size = 0
-        how = os.O_WRONLY if start else os.O_WRONLY | os.O_CREAT | os.O_EXCL
-        self._handle = os.open(path, how, 0o666)
+        flags = os.O_WRONLY if start else os.O_WRONLY | os.O_CREAT | os.O_EXCL
+        self._handle = os.open(path, flags, 0o666)
         try:
             if start:
                 os.ftruncate(self._handle, start)
@@ -95,25 +99,25 @@ class JournalWriter:
             raise
 
     def replay(self, entry: Entry) -> None:
-        """Take note of what the file holds already."""
-        known = self._tables.setdefault(
-            entry.spec.name, _Known(len(self._tables), entry.spec, 0, {})
+        """Count rows that are in the file already."""
+        table = self._tables.setdefault(
+            entry.spec.name, _LoggedTable(len(self._tables), entry.spec, 0, {})
         )
-        known.rows += entry.rows
-        known.words = {name: len(words) for name, words in entry.words.items()}
+        table.rows += entry.rows
+        table.words = {name: len(words) for name, words in entry.words.items()}
 
     def add(self, spec: TableSpec, chunk: Chunk, rows: int, words: Mapping[str, Words]) -> None:
-        """Append rows, which count from the next commit on.
+        """Append rows; readers see them after the next commit.
 
         Raises:
             OSError: They can't be written.
         """
-        known = self._tables.get(spec.name)
-        if known is None:
-            known = self._tables[spec.name] = _Known(len(self._tables), spec, 0, {})
+        table = self._tables.get(spec.name)
+        if table is None:
+            table = self._tables[spec.name] = _LoggedTable(len(self._tables), spec, 0, {})
             self._append("table", asdict(spec), [])
         arrays: list[bytes] = []
-        described = []
+        columns = []
         for column in spec.columns:
             ramps = column.kind in ("step", "time")
             parts: list[list[Any] | None] = []
@@ -121,72 +125,74 @@ class JournalWriter:
                 if values is None:
                     parts.append(None)
                     continue
-                how, runs, content = encode(values, ramps=ramps and values.dtype != np.bool_)
-                parts.append([how, runs, sum(map(len, content))])
+                encoding, runs, content = encode(values, ramps=ramps and values.dtype != np.bool_)
+                parts.append([encoding, runs, sum(map(len, content))])
                 arrays += content
-            described.append(parts)
-        added = {}
-        for name, kept in words.items():
-            listed = kept.listed()
-            added[name] = listed[known.words.get(name, 0) :]
-            known.words[name] = len(listed)
-        known.rows += rows
-        what = {"table": known.number, "rows": rows, "columns": described, "words": added}
-        self._append("rows", what, arrays)
+            columns.append(parts)
+        added_words = {}
+        for name, dictionary in words.items():
+            all_words = dictionary.in_order()
+            added_words[name] = all_words[table.words.get(name, 0) :]
+            table.words[name] = len(all_words)
+        table.rows += rows
+        size = {"table": table.number, "rows": rows}
+        self._append("rows", {**size, "columns": columns, "words": added_words}, arrays)
 
     def commit(self, step: int) -> Commit:
-        """Say that everything so far belongs together, and hand it to the system.
+        """Commit all rows so far, and write them to the file.
+
+        Args:
+            step: The first step of which rows may be missing.
 
         Raises:
-            OSError: It can't be written; the last commit stands.
+            OSError: It can't be written; the commit before it is still the last one.
         """
-        rows = {name: known.rows for name, known in self._tables.items()}
+        rows = {name: table.rows for name, table in self._tables.items()}
         self._append("commit", {"step": step, "rows": rows}, [])
         self._write()
         self.end = os.lseek(self._handle, 0, os.SEEK_CUR)
         return Commit(step, rows, self.end)
 
     def sync(self) -> None:
-        """See the journal onto the disk: it survives a power cut then, not only a crash."""
+        """Flush the journal to the disk, so that it survives a power cut, not only a crash."""
         files.sync(self._handle)
 
     def close(self, *, undo: bool = False) -> None:
-        """Let go of the file; after a failed write, cut off what was written since the commit."""
+        """Close the file; with `undo`, remove what was written since the last commit."""
         if self._handle < 0:
             return
         try:
             if undo:
                 os.ftruncate(self._handle, self.end)
         except OSError:
-            pass  # a reader leaves it out anyway
+            pass  # readers ignore it anyway
         finally:
             os.close(self._handle)
             self._handle = -1
 
-    def _append(self, kind: Kind, what: Mapping[str, Any], arrays: list[bytes]) -> None:
-        described = json.dumps(what, separators=(",", ":")).encode()
+    def _append(self, kind: Kind, description: Mapping[str, Any], arrays: list[bytes]) -> None:
+        text = json.dumps(description, separators=(",", ":")).encode()
         content = b"".join(arrays)
         number = _KINDS.index(kind)
-        check = _checksum(number, described, content)
-        self._waiting += [_HEADER.pack(number, len(described), len(content), check)]
-        self._waiting += [described, content]
-        self._size += len(described) + len(content)
-        if self._size > _WAITING:
+        header = _HEADER.pack(number, len(text), len(content), _checksum(number, text, content))
+        self._buffer += [header, text, content]
+        self._size += len(text) + len(content)
+        if self._size > _BUFFER_BYTES:
             self._write()
 
     def _write(self) -> None:
-        content = b"".join(self._waiting)
-        self._waiting, self._size = [], 0
+        content = b"".join(self._buffer)
+        self._buffer, self._size = [], 0
         files.write_all(self._handle, content)
 
 
 class Entry(NamedTuple):
-    """Rows of a table as they stand in a journal.
+    """Rows of a table in a journal.
 
     Attributes:
         spec: The table.
         chunk: The rows.
-        rows: How many.
+        rows: Their number.
         words: The dictionaries of columns whose dictionary grows, up to these rows.
     """
 
@@ -202,11 +208,11 @@ def last_commit(path: Path) -> Commit | None:
     Raises:
         ArtifactError: The file can't be read, or is no journal.
     """
-    found = None
-    for kind, what, _, end in _frames(path):
+    commit = None
+    for kind, description, _, end in _frames(path):
         if kind == "commit":
-            found = Commit(int(what["step"]), dict(what["rows"]), end)
-    return found
+            commit = Commit(int(description["step"]), dict(description["rows"]), end)
+    return commit
 
 
 def read_journal(path: Path, end: int) -> Iterator[Entry]:
@@ -214,32 +220,32 @@ def read_journal(path: Path, end: int) -> Iterator[Entry]:
 
     Args:
         path: The file.
-        end: Where the commit ends, as `last_commit` says.
+        end: Position where the commit ends [bytes].
 
     Raises:
-        ArtifactError: The file can't be read, or doesn't hold what it says.
+        ArtifactError: The file can't be read, or is damaged.
     """
     specs: list[TableSpec] = []
     words: list[dict[str, Words]] = []
     try:
-        for kind, what, content, stop in _frames(path):
+        for kind, description, content, stop in _frames(path):
             if stop > end:
                 break
             if kind == "table":
-                specs.append(_spec_of(what))
-                words.append({c.name: Words() for c in specs[-1].columns if c.is_growing})
+                specs.append(_spec_of(description))
+                words.append(new_words(specs[-1]))
             if kind == "rows":
-                spec, known = specs[what["table"]], words[what["table"]]
-                for name, added in what["words"].items():
-                    for word in added:
-                        known[name][word]  # looking a new word up enters it
-                yield Entry(spec, _chunk_of(spec, what, content), what["rows"], known)
+                spec, dictionaries = specs[description["table"]], words[description["table"]]
+                for name, added_words in description["words"].items():
+                    dictionaries[name].enter(added_words)
+                chunk = _chunk_of(spec, description, content)
+                yield Entry(spec, chunk, description["rows"], dictionaries)
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise ArtifactError(f"{path} is damaged ({error}): run the scenario again") from error
 
 
 def _frames(path: Path) -> Iterator[tuple[Kind, Any, bytes, int]]:
-    """Yield kind, description, arrays and end of each whole frame, up to the first cut-off one."""
+    """Yield kind, description, arrays and end of each frame, up to the first incomplete one."""
     try:
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
@@ -254,53 +260,56 @@ def _frames(path: Path) -> Iterator[tuple[Kind, Any, bytes, int]]:
 def _whole_frames(file: BinaryIO) -> Iterator[tuple[Kind, Any, bytes, int]]:
     size = os.fstat(file.fileno()).st_size
     while len(header := file.read(_HEADER.size)) == _HEADER.size:
-        number, described, arrays, check = _HEADER.unpack(header)
-        if number >= len(_KINDS) or file.tell() + described + arrays > size:
+        number, text_bytes, array_bytes, checksum = _HEADER.unpack(header)
+        if number >= len(_KINDS) or file.tell() + text_bytes + array_bytes > size:
             return
-        what, content = file.read(described), file.read(arrays)
-        if _checksum(number, what, content) != check:
+        text, content = file.read(text_bytes), file.read(array_bytes)
+        if _checksum(number, text, content) != checksum:
             return
         try:
-            understood = json.loads(what)
+            description = json.loads(text)
         except (ValueError, RecursionError):
             return
-        yield _KINDS[number], understood, content, file.tell()
+        yield _KINDS[number], description, content, file.tell()
 
 
-def _checksum(number: int, described: bytes, content: bytes) -> int:
-    return zlib.crc32(content, zlib.crc32(described, number + len(described)))
+def _checksum(number: int, text: bytes, content: bytes) -> int:
+    return zlib.crc32(content, zlib.crc32(text, number + len(text)))
 
 
-def _spec_of(what: Mapping[str, Any]) -> TableSpec:
-    columns = [Column(**{**c, "categories": tuple(c["categories"])}) for c in what["columns"]]
-    return TableSpec(what["name"], tuple(columns), what["description"])
+def _spec_of(description: Mapping[str, Any]) -> TableSpec:
+    columns = [
+        Column(**{**column, "categories": tuple(column["categories"])})
+        for column in description["columns"]
+    ]
+    return TableSpec(description["name"], tuple(columns), description["description"])
 
 
-def _chunk_of(spec: TableSpec, what: Mapping[str, Any], content: bytes) -> Chunk:
-    chunk, at, rows = {}, 0, int(what["rows"])
+def _chunk_of(spec: TableSpec, description: Mapping[str, Any], content: bytes) -> Chunk:
+    chunk, position, rows = {}, 0, int(description["rows"])
     if not 0 <= rows <= _MOST_ROWS:
         raise ValueError(f"{rows} rows at once")
-    for column, parts in zip(spec.columns, what["columns"], strict=True):
-        kept: list[Encoded | None] = []
+    for column, parts in zip(spec.columns, description["columns"], strict=True):
+        arrays: list[Encoded | None] = []
         for part in parts:
             if part is None:
-                kept.append(None)
+                arrays.append(None)
                 continue
-            how, runs, size = part
-            kept.append((how, runs, [content[at : at + size]]))
-            at += size
-        chunk[column.name] = _column_of(column, kept, rows)
+            encoding, runs, size = part
+            arrays.append((encoding, runs, [content[position : position + size]]))
+            position += size
+        chunk[column.name] = _column_of(column, arrays, rows)
     return chunk
 
 
-def _column_of(column: Column, kept: list[Encoded | None], rows: int) -> ColumnChunk:
-    values, valid, lengths = kept
+def _column_of(column: Column, arrays: list[Encoded | None], rows: int) -> ColumnChunk:
+    values, valid, lengths = arrays
     assert values is not None
     flags = None if valid is None else decode(valid, np.dtype(np.bool_), rows)
     if lengths is None:
         return ColumnChunk(decode(values, DTYPES[column.kind], rows), flags)
     sizes = decode(lengths, np.dtype(np.int64), rows)
     if values[0] != RAW:
-        raise ValueError(f"text is kept as {values[0]!r}")
+        raise ValueError(f"text is encoded as {values[0]!r}")
     text = decode(values, np.dtype(np.uint8), int(sizes.sum()))
     return ColumnChunk(text, flags, sizes)

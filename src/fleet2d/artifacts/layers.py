@@ -1,4 +1,4 @@
-"""Layers of cells as tables: a row for each cell that differs from what the others hold."""
+"""Layers of cells as tables: a row for each cell that differs from the layer's fill value."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 PREFIX = "layer."
 EVERYWHERE = -1
-"""Row and column of the entry that says what all cells hold that have none of their own."""
+"""Row and column of the entry that holds the fill value: of all cells without an entry."""
 
 KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64"}
 
@@ -36,13 +36,13 @@ def layer_table(layer: Layer) -> TableSpec:
 
 
 def layer_rows(layer: Layer) -> dict[str, NDArray[Any]]:
-    """Return the rows of a layer as it is now: columns row, column and value."""
+    """Return the present values of a layer as rows: columns row, column and value."""
     values, fill = layer.values, np.array(layer.fill)
-    other = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
-    row, column = np.nonzero(other)
+    differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
+    row, column = np.nonzero(differs)
     kind = {"bool": np.bool_, "int64": np.int64, "float64": np.float64}[KINDS[layer.dtype.kind]]
     return {
         "row": np.concatenate([[EVERYWHERE], row]).astype(np.int32),
         "column": np.concatenate([[EVERYWHERE], column]).astype(np.int32),
-        "value": np.concatenate([[fill.astype(kind)], values[other].astype(kind)]),
+        "value": np.concatenate([[fill.astype(kind)], values[differs].astype(kind)]),
     }

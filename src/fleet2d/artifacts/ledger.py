@@ -1,4 +1,4 @@
-"""What an unfinished run keeps beside its tables: the lock, the journal, the checkpoint."""
+"""The files of an unfinished run beside its tables: the lock, the journal, the checkpoint."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from fleet2d.artifacts.journal import (
 from fleet2d.artifacts.lock import RunLock
 
 CHECKPOINT_NAME = "checkpoint"
-# The journal is seen onto the disk this often [s]; the system keeps it through a crash anyway.
+# How often the journal is flushed to the disk [s]: so much is lost in a power cut, at most. A crash
+# of the process loses none of it.
 SYNC_S = 5.0
 
 
@@ -29,14 +30,14 @@ class Ledger:
     """The folder `unfinished` of a run directory, and the right to write there.
 
     Attributes:
-        folder: Where it is.
-        journal: All rows so far; there once the ledger has begun.
+        folder: The path of that folder.
+        journal: All rows so far; set by `begin` and `go_on`.
     """
 
     journal: JournalWriter
 
     def __init__(self, directory: Path) -> None:
-        """Touch nothing yet."""
+        """Create no file yet: `begin` and `go_on` do."""
         self.directory, self.folder = directory, directory / FOLDER
         self._lock: RunLock | None = None
         self._has_journal = False
@@ -44,20 +45,20 @@ class Ledger:
 
     @property
     def checkpoint(self) -> Path:
-        """The file of the last checkpoint, if there is one."""
+        """The path of the last checkpoint, if there is one."""
         return self.folder / CHECKPOINT_NAME
 
     def lock(self) -> None:
-        """Take the right to write.
+        """Acquire the right to write.
 
         Raises:
             RunDirectoryError: Another process has it.
-            OSError: The lock can't be made.
+            OSError: The lock file can't be created.
         """
         self._lock = self._lock or RunLock(self.directory)
 
     def begin(self) -> None:
-        """Lock the directory and begin a journal, in the place of any that is there.
+        """Lock the directory and begin a new journal, which replaces an old one.
 
         Raises:
             RunDirectoryError: Another process is writing there.
@@ -70,7 +71,7 @@ class Ledger:
         self._set_journal(JournalWriter(self.folder / JOURNAL_NAME))
 
     def go_on(self, commit: Commit | None) -> Iterator[Entry]:
-        """Cut the journal off behind a commit, and yield the rows that stay.
+        """Truncate the journal after a commit, and yield the rows before it.
 
         Raises:
             ArtifactError: The journal is damaged.
@@ -88,6 +89,10 @@ class Ledger:
     def commit(self, step: int, *, sync: bool = False) -> Commit:
         """Commit all rows so far.
 
+        Args:
+            step: The step before which they are.
+            sync: Whether to flush the journal to the disk now.
+
         Raises:
             OSError: They can't be written.
         """
@@ -99,20 +104,20 @@ class Ledger:
         return commit
 
     def keep_checkpoint(self, content: bytes) -> None:
-        """Replace the checkpoint at one stroke; the rows that it names must be synced before.
+        """Replace the checkpoint atomically; the rows that it refers to must be synced before.
 
         Raises:
-            OSError: It can't be written; the one before stands.
+            OSError: It can't be written; the checkpoint before it is unchanged.
         """
         write_atomically(self.checkpoint, content)
         sync_directory(self.folder)
 
     def end(self, *, keep: bool = False, undo: bool = False) -> None:
-        """Let go of the run directory.
+        """Close the journal and release the run directory.
 
         Args:
-            keep: Whether the run is to be gone on with; else the folder is removed.
-            undo: Whether a write failed, so that what it left is cut off.
+            keep: Whether the run can be resumed later; else the folder is removed.
+            undo: Whether to remove what was written since the last commit, as after a failed write.
         """
         if self._has_journal:
             self.journal.close(undo=undo)
@@ -121,7 +126,7 @@ class Ledger:
         self.release()
 
     def release(self) -> None:
-        """Give back the right to write."""
+        """Release the right to write, if it is held."""
         if self._lock is not None:
             self._lock.release()
             self._lock = None
@@ -131,7 +136,7 @@ class Ledger:
 
 
 def remove_leftovers(directory: Path) -> None:
-    """Remove what a complete run no longer needs, and nothing else."""
+    """Remove the files that a complete run no longer needs, and no others."""
     folder = directory / FOLDER
     for name in (JOURNAL_NAME, CHECKPOINT_NAME, f"{CHECKPOINT_NAME}{PARTIAL}"):
         with suppress(OSError):
@@ -141,28 +146,15 @@ def remove_leftovers(directory: Path) -> None:
 
 
 def columns_of(entry: Entry) -> dict[str, object]:
-    """Return the rows of a journal in the form in which a store takes them."""
+    """Return the rows of a journal's entry as columns that `RunStore.append` takes."""
+    from fleet2d.artifacts.arrow import table_of
+
+    table = table_of([(entry.chunk, entry.rows)], entry.spec, entry.words)
     columns: dict[str, object] = {}
     for column in entry.spec.columns:
-        values, valid, lengths = entry.chunk[column.name]
-        if lengths is not None:
-            ends = np.cumsum(lengths).tolist()
-            text = values.tobytes()
-            strings = [text[a:b].decode() for a, b in zip([0, *ends[:-1]], ends, strict=True)]
-            columns[column.name] = _with_gaps(strings, valid)
-        elif column.is_growing:
-            words = entry.words[column.name].listed()
-            columns[column.name] = _with_gaps(
-                [words[code] for code in values.tolist()] if words else [""] * entry.rows, valid
-            )
-        elif valid is None:
-            columns[column.name] = values
+        values, valid, _ = entry.chunk[column.name]
+        if column.takes_strings:
+            columns[column.name] = table[column.name].to_pylist()
         else:
-            columns[column.name] = np.ma.MaskedArray(values, ~valid)
+            columns[column.name] = values if valid is None else np.ma.MaskedArray(values, ~valid)
     return columns
-
-
-def _with_gaps(strings: list[str], valid: object) -> list[str | None]:
-    if not isinstance(valid, np.ndarray):
-        return list(strings)
-    return [string if there else None for string, there in zip(strings, valid, strict=True)]

@@ -22,8 +22,8 @@ LOCK_NAME = "run.lock"
 class RunLock:
     """The right to write in a run directory.
 
-    Where the system has advisory locks, the lock goes when its process ends, however that is. A
-    lock file that is left over is no hindrance then.
+    Where the system has advisory locks, the lock ends with its process, even if that is killed; a
+    lock file that remains doesn't prevent a new lock then.
 
     Example:
         >>> import tempfile
@@ -37,16 +37,16 @@ class RunLock:
     """
 
     def __init__(self, directory: Path) -> None:
-        """Take the lock.
+        """Acquire the lock.
 
         Raises:
-            RunDirectoryError: Another process has it.
-            OSError: The file can't be made.
+            RunDirectoryError: Another process holds it.
+            OSError: The file can't be created.
         """
         self.path = directory / LOCK_NAME
         while True:
             self._handle = self._open(directory)
-            # The file may have gone with its run between opening and locking it.
+            # Another process may have removed the file between opening and locking it.
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(self._handle), self.path.stat()):
                     break
@@ -59,27 +59,26 @@ class RunLock:
         try:
             handle = os.open(self.path, flags, 0o666)
         except FileExistsError as error:
-            raise self._taken(directory) from error
+            raise self._locked_error(directory) from error
         if HAS_LOCKS:
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 os.close(handle)
-                raise self._taken(directory) from error
+                raise self._locked_error(directory) from error
         return handle
 
-    def _taken(self, directory: Path) -> RunDirectoryError:
+    def _locked_error(self, directory: Path) -> RunDirectoryError:
         writer = ""
         with suppress(OSError, ValueError):
             writer = self.path.read_text(encoding="utf-8")[:200].strip()
-        by = writer or "another process"
         return RunDirectoryError(
-            f"{directory} is being written by {by}: wait until it is done, or choose another"
-            " directory"
+            f"{directory} is being written by {writer or 'another process'}: wait until it is"
+            " done, or choose another directory"
         )
 
     def release(self) -> None:
-        """Give the lock back; once is enough."""
+        """Release the lock, if it is held."""
         if self._handle < 0:
             return
         with suppress(OSError):

@@ -24,20 +24,20 @@ from fleet2d.errors import RunDirectoryError
 from fleet2d.problems import did_you_mean
 
 FORMAT = 2
-"""Version of the run directory's layout; a reader refuses a later one."""
+"""Version of the layout of run directories; a reader refuses a later one."""
 
 FILE_NAME = "manifest.json"
 
-# Problems of one manifest that a message names.
-_MOST_TOLD = 5
-# Characters of a wrong value that a message shows.
-_MOST_SHOWN = 60
+# Problems of one manifest that a message lists, at most.
+_MOST_PROBLEMS = 5
+# Characters of a wrong value that a message quotes, at most.
+_MOST_CHARACTERS = 60
 
 Status = Literal["running", "complete", "interrupted", "failed"]
 
 
-def _moment(text: str) -> str:
-    """Refuse what is no local time."""
+def _check_time(text: str) -> str:
+    """Refuse text that is no local time."""
     if text:
         dt.datetime.fromisoformat(text)
     return text
@@ -45,7 +45,7 @@ def _moment(text: str) -> str:
 
 Count = Annotated[int, Field(ge=0, lt=2**62)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-# A table's name is its file's: nothing that leads out of the directory.
+# The name of a table is that of its file: it must not lead out of the directory.
 TableName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
 FileName = Annotated[str, Field(pattern=r"^(learned/)?[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
 
@@ -87,19 +87,19 @@ class FileRecord(_Record):
 
 
 class Entities(_Record):
-    """Names of what lives in the home."""
+    """Names of the people and robots in the home."""
 
     users: list[str] = []
     robots: list[str] = []
 
 
 class Seal(_Record):
-    """What the whole run is recognised by; see `fleet2d.artifacts.seal`.
+    """Digests of a whole run; see `fleet2d.artifacts.seal`.
 
     Attributes:
-        digest: Over all below, in one.
+        digest: SHA-256 of `fields` and `files`.
         fields: SHA-256 of each field of the manifest, or of each part of it.
-        files: Each file of the run directory besides the manifest.
+        files: Size and digest of each file of the run directory besides the manifest.
     """
 
     digest: Sha256
@@ -108,29 +108,29 @@ class Seal(_Record):
 
 
 class Manifest(BaseModel):
-    """What `manifest.json` holds. A field that a later version adds has a default.
+    """The content of `manifest.json`. A field that a later version adds has a default.
 
     Attributes:
         format: Version of the layout of the run directory.
         status: `running` until the run is closed; a crash leaves it so.
         scenario: The resolved configuration.
-        seed: The seed that was given or drawn.
+        seed: The seed of the scenario, or the one that was drawn.
         steps: Number of steps simulated.
         step_us: Length of a step [us].
         start: Simulated start, ISO 8601.
         simulated_s: Simulated time [s].
-        entities: Names of what lives in the home, by bucket.
-        versions: What ran it; see `versions`.
-        inputs: Every file that was read, as `file_record` describes it.
-        tables: Per table its rows, digest and columns (name, kind, unit).
+        entities: Names of the users and robots.
+        versions: Versions of the software that ran it; see `versions`.
+        inputs: Path and SHA-256 of every file that was read.
+        tables: Rows, digest and columns (name, kind, unit) of each table, by name.
         digest: Digest of all tables; None until the run is closed.
         wall_s: Wall time by phase [s].
         metrics: Summary of the metrics.
-        notes: Remarks in plain words.
-        interventions: What was done to the run from outside, in order.
-        expectations: What became of what was expected, by name; see `Verdict.content`.
-        resumed: The steps at which it was taken up again after it had ended early.
-        seal: What the whole run is recognised by; None until the run is closed, and in format 1.
+        notes: Remarks for the user.
+        interventions: All interventions from outside, in order.
+        expectations: The verdict on each expectation, by name; see `Verdict.content`.
+        resumed: The steps at which it was resumed after it had ended early.
+        seal: Digests of the whole run; None until the run is closed, and in format 1.
 
     Example:
         >>> Manifest(seed=4).seed
@@ -145,7 +145,7 @@ class Manifest(BaseModel):
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     steps: Count = 0
     step_us: Count = 0
-    start: Annotated[str, AfterValidator(_moment)] = ""
+    start: Annotated[str, AfterValidator(_check_time)] = ""
     simulated_s: Annotated[float, Field(ge=0)] = 0.0
     entities: Entities = Entities()
     versions: dict[str, str] = {}
@@ -161,7 +161,7 @@ class Manifest(BaseModel):
     seal: Seal | None = None
 
     def content(self) -> dict[str, Any]:
-        """Return all of it as plain JSON data."""
+        """Return the manifest as plain JSON data."""
         content: dict[str, Any] = plain(self.model_dump())
         return content
 
@@ -170,7 +170,7 @@ class Manifest(BaseModel):
         return canonical(self.content())
 
     def write(self, directory: Path) -> None:
-        """Replace the manifest of a run directory at one stroke.
+        """Replace the manifest of a run directory atomically.
 
         Raises:
             OSError: The directory can't be written.
@@ -182,16 +182,20 @@ class Manifest(BaseModel):
         """Read the manifest of a run directory.
 
         Raises:
-            RunDirectoryError: There is none, or it can't be understood; what is wrong is named.
+            RunDirectoryError: There is none, or it is not valid; the message says what is wrong.
         """
         return cls.of_content(directory / FILE_NAME, read_content(directory))
 
     @classmethod
     def of_content(cls, path: Path, content: Any) -> Manifest:
-        """Return the manifest that a file's content is.
+        """Return a manifest from the content of its file.
+
+        Args:
+            path: The file, for messages.
+            content: Plain JSON data.
 
         Raises:
-            RunDirectoryError: It is none; what is wrong is named.
+            RunDirectoryError: It is not valid; the message says what is wrong.
         """
         if not isinstance(content, dict) or type(content.get("format")) is not int:
             raise _damaged(path, "it does not say its format")
@@ -200,8 +204,7 @@ class Manifest(BaseModel):
                 f"{path} was written by a later Fleet2D (format {content['format']}, this one "
                 f"reads up to {FORMAT}): update Fleet2D"
             )
-        missing = sorted(_ALWAYS - content.keys())
-        if missing:
+        if missing := sorted(_REQUIRED - content.keys()):
             raise _damaged(path, f"it lacks {', '.join(missing)}")
         try:
             return cls.model_validate(content)
@@ -209,20 +212,21 @@ class Manifest(BaseModel):
             raise _damaged(path, _problems(error)) from None
 
 
-# What the manifest of every version has.
-_ALWAYS = Manifest.model_fields.keys() - {"expectations", "interventions", "resumed", "seal"}
+# The fields that a manifest of every version has.
+_REQUIRED = Manifest.model_fields.keys() - {"expectations", "interventions", "resumed", "seal"}
 
 
 def read_content(directory: Path) -> Any:
-    """Return the content of a run's manifest as JSON has it.
+    """Return the content of a run's manifest as plain JSON data.
 
     Raises:
         RunDirectoryError: There is none, or it is no JSON.
     """
     path = directory / FILE_NAME
     try:
-        regular = is_regular(path)
-        return json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError) if regular else None)
+        if not is_regular(path):
+            raise RunDirectoryError(f"{path} is no file: give the directory of a run")
+        return json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError))
     except FileNotFoundError as error:
         raise RunDirectoryError(
             f"{directory} is no run directory, for it has no {FILE_NAME}: "
@@ -232,14 +236,12 @@ def read_content(directory: Path) -> Any:
         raise RunDirectoryError(f"{path} can't be read: {error.strerror}") from error
 
 
-def json_of(path: Path, text: bytes | None) -> Any:
-    """Return the content of a manifest's text.
+def json_of(path: Path, text: bytes) -> Any:
+    """Return the text of a manifest as plain JSON data.
 
     Raises:
-        RunDirectoryError: It is no JSON, or no file.
+        RunDirectoryError: It is no JSON.
     """
-    if text is None:
-        raise RunDirectoryError(f"{path} is no file: give the directory of a run")
     try:
         return read_json(text)
     except ValueError as error:
@@ -247,31 +249,31 @@ def json_of(path: Path, text: bytes | None) -> Any:
 
 
 def is_regular(path: Path) -> bool:
-    """Whether a path is a file, behind links or not, and no device, pipe or folder.
+    """Whether a path, links followed, is a file, not a device, pipe or folder.
 
     Raises:
-        OSError: There is nothing, or it can't be looked at.
+        OSError: There is no such file, or its state can't be read.
     """
     return stat.S_ISREG(path.stat().st_mode)
 
 
 def canonical(content: Any) -> str:
-    """Return the text that a manifest of some content has, and no other."""
+    """Return the one text that a manifest of some content has."""
     return json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
 def _problems(error: ValidationError) -> str:
-    """Say what is wrong with which fields."""
+    """Return a message that names the wrong fields and what is wrong with each."""
     lines = []
-    for line in error.errors(include_url=False)[:_MOST_TOLD]:
-        where = ".".join(map(str, line["loc"]))
+    for line in error.errors(include_url=False)[:_MOST_PROBLEMS]:
+        key = ".".join(map(str, line["loc"]))
         if line["type"] == "extra_forbidden":
             known = Manifest.model_fields if len(line["loc"]) == 1 else ()
-            lines.append(f"{where} is no field of a manifest{did_you_mean(where, known)}"[:200])
+            lines.append(f"{key} is no field of a manifest{did_you_mean(key, known)}"[:200])
             continue
-        shown = repr(line["input"])
-        shown = shown if len(shown) <= _MOST_SHOWN else f"{shown[:_MOST_SHOWN]}…"
-        lines.append(f"{where}: {line['msg']}, found {shown}"[:300])
+        value = repr(line["input"])
+        value = value if len(value) <= _MOST_CHARACTERS else f"{value[:_MOST_CHARACTERS]}…"
+        lines.append(f"{key}: {line['msg']}, found {value}"[:300])
     more = error.error_count() - len(lines)
     return "; ".join([*lines, *([f"and {more} more"] if more > 0 else [])]).replace(".;", ";")
 
@@ -283,32 +285,30 @@ def _damaged(path: Path, reason: str) -> RunDirectoryError:
     )
 
 
-def file_record(path: Path | str) -> dict[str, str]:
-    """Return `{"path", "sha256"}` of an input file, to be kept in the manifest.
+def input_record(path: Path | str) -> InputRecord:
+    """Return the record of an input file.
 
     Raises:
         OSError: The file can't be read.
     """
     with Path(path).open("rb") as file:
-        return {"path": str(path), "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
+        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+    return InputRecord(path=str(path), sha256=sha256)
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what a run's numbers may depend on.
-
-    A package that is loaded is asked itself: searching the installed packages takes longer than
-    simulating a day.
-    """
-    found = {name: _version(name) for name in ("fleet2d", "numpy", "pyarrow", "shapely")}
+    """Return the versions of all software that the numbers of a run may depend on."""
+    packages = {name: _version(name) for name in ("fleet2d", "numpy", "pyarrow", "shapely")}
     machine = os.uname().machine if hasattr(os, "uname") else "unknown"
     python = ".".join(map(str, sys.version_info[:3]))
-    return {**found, "python": python, "platform": f"{sys.platform} {machine}"}
+    return {**packages, "python": python, "platform": f"{sys.platform} {machine}"}
 
 
 def _version(package: str) -> str:
-    loaded = getattr(sys.modules.get(package), "__version__", None)
-    if isinstance(loaded, str):
-        return loaded
+    # Searching the installed packages takes longer than simulating a day.
+    version = getattr(sys.modules.get(package), "__version__", None)
+    if isinstance(version, str):
+        return version
     from importlib import metadata
 
     try:
@@ -318,7 +318,7 @@ def _version(package: str) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Turn a value into what JSON has words for: NaN and infinity become null.
+    """Convert a value to plain JSON data: NaN and infinity become null.
 
     Example:
         >>> plain({"mean": float("nan"), "at": dt.timedelta(hours=1), 3: (1, 2)})

@@ -1,4 +1,4 @@
-"""The prefix of a run that isn't complete: the rows of its journal up to the last commit."""
+"""The prefix of an unfinished run: the rows of its journal up to the last commit."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 
 class Prefix:
-    """What of a run survives its process.
+    """The rows of an unfinished run that can be read.
 
     Attributes:
-        commit: Up to where.
-        names: The tables.
+        commit: The last commit.
+        names: Names of the tables, sorted.
     """
 
     def __init__(self, path: Path, commit: Commit) -> None:
-        """Read nothing yet; `find` makes prefixes."""
+        """Read nothing yet; `find` creates prefixes."""
         self._path, self.commit = path, commit
         self.names = tuple(sorted(commit.rows))
 

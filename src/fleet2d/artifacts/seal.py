@@ -1,19 +1,18 @@
-"""The seal of a run: one digest over all that it stored, and what differs from it.
+"""The seal of a run: one digest of all that it stored, and the comparison with it.
 
-The seal recognises a run; it is no signature. Who changes a run can seal it anew, and then its
-digest is another: keep the digest elsewhere to be sure of that too.
+A seal is no signature: after a change anybody can seal the run again, with another digest. Keep the
+digest elsewhere to notice that, too.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.digest import changed_tables, digest_of_file, run_digest
+from fleet2d.artifacts.digest import changed_tables, digest_of_file, run_digest, sha256_of
 from fleet2d.artifacts.journal import FOLDER
 from fleet2d.artifacts.lock import LOCK_NAME
 from fleet2d.artifacts.manifest import (
@@ -28,19 +27,19 @@ from fleet2d.artifacts.manifest import (
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import ArtifactError, RunDirectoryError
 
-# Files that may be added to a run later: pictures of it.
+# Files that may be added to a run later.
 _PICTURES = frozenset({"picture.png", "picture.svg"})
 _LEARNED = "learned"
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What was found when a run was compared with its seal.
+    """The result of comparing a run with its seal.
 
     Attributes:
-        differing: Files and fields of the manifest that are not as they were stored, with how.
+        differing: How files and fields of the manifest differ from what was stored, by name.
         foreign: Files in the directory that are no part of the run.
-        notes: What could not be compared, in plain words.
+        notes: Remarks about what could not be compared.
         digest: The seal's digest; None for a run that has none.
     """
 
@@ -51,12 +50,12 @@ class Verification:
 
     @property
     def same(self) -> bool:
-        """Whether all that could be compared is as it was stored."""
+        """Whether all that could be compared is what was stored."""
         return not self.differing
 
 
 def make_seal(manifest: Manifest, directory: Path) -> Seal:
-    """Return the seal of a run whose files are all written but the manifest.
+    """Return the seal of a run of which all files but the manifest are written.
 
     Raises:
         OSError: A file can't be read.
@@ -78,8 +77,8 @@ def verify_run(directory: Path | str) -> Verification:
     """Compare a stored run with its seal, without running or unpacking anything.
 
     Raises:
-        RunDirectoryError: There is no run, or its manifest can't be understood.
-        ArtifactError: The run has no digest, for it was never closed.
+        RunDirectoryError: There is no run, or its manifest is not valid.
+        ArtifactError: The run has no digest: it was never closed.
 
     Example:
         >>> import fleet2d, tempfile
@@ -103,9 +102,8 @@ def verify_run(directory: Path | str) -> Verification:
         text = read_bytes(root / FILE_NAME, FILE_BYTES, RunDirectoryError)
         differing = _differing_fields(root, text, manifest.seal)
         for name, record in manifest.seal.files.items():
-            how = _difference(root / name, record)
-            if how:
-                differing[name] = how
+            if difference := _difference(root / name, record):
+                differing[name] = difference
         differing |= _unsealed_tables(manifest)
         foreign = foreign_files(root, manifest.seal.files.keys() | {FILE_NAME})
     except OSError as error:
@@ -113,18 +111,18 @@ def verify_run(directory: Path | str) -> Verification:
     return Verification(differing, foreign, digest=manifest.seal.digest)
 
 
-def foreign_files(root: Path, own: set[str]) -> list[str]:
-    """Return what is in a run directory besides what belongs there.
+def foreign_files(root: Path, run_files: set[str]) -> list[str]:
+    """Return the files of a run directory that are no part of the run.
 
     Raises:
-        OSError: It can't be read.
+        OSError: The directory can't be read.
     """
     names = {path.name for path in root.iterdir()}
     learned = root / _LEARNED
     if learned.is_dir() and not learned.is_symlink():
         names |= {f"{_LEARNED}/{path.name}" for path in learned.iterdir()}
         names.discard(_LEARNED)
-    return sorted(names - own - _PICTURES - {FOLDER, LOCK_NAME})
+    return sorted(names - run_files - _PICTURES - {FOLDER, LOCK_NAME})
 
 
 def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
@@ -142,7 +140,7 @@ def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
             parts |= {f"{name}.{key}": entry for key, entry in value.items()}
         else:
             parts[name] = value
-    return {name: _sha256_of(value) for name, value in parts.items()}
+    return {name: sha256_of(value) for name, value in parts.items()}
 
 
 def _differing_fields(root: Path, text: bytes, seal: Seal) -> dict[str, str]:
@@ -176,23 +174,23 @@ def _unsealed_tables(manifest: Manifest) -> dict[str, str]:
 
 
 def _without_seal(root: Path, manifest: Manifest) -> Verification:
-    """Compare what there is to compare in a run of format 1: the content of its tables."""
-    stored = {name: table.digest or "" for name, table in manifest.tables.items()}
-    differing = changed_tables(stored, lambda name: digest_of_file(root / f"{name}.parquet"))
-    changed = {f"{name}.parquet": "was changed" for name in differing}
-    if run_digest(stored) != manifest.digest:
-        changed[FILE_NAME] = "was changed"
-    own = {f"{name}.parquet" for name in manifest.tables} | {FILE_NAME, "floorplan.json"}
+    """Compare the content of the tables of a run of format 1, which has no other digests."""
+    digests = {name: table.digest or "" for name, table in manifest.tables.items()}
+    tables = changed_tables(digests, lambda name: digest_of_file(root / f"{name}.parquet"))
+    differing = {f"{name}.parquet": "was changed" for name in tables}
+    if run_digest(digests) != manifest.digest:
+        differing[FILE_NAME] = "was changed"
+    run_files = {f"{name}.parquet" for name in manifest.tables} | {FILE_NAME, "floorplan.json"}
     learned = {f"{_LEARNED}/{name}.npz" for name in manifest.scenario.get("algorithms", {})}
     notes = [
         f"{root} has no seal (format {manifest.format}): the content of its tables was compared,"
         " not its metrics, floor plan, learned state and the rest of the manifest"
     ]
-    return Verification(changed, foreign_files(root, own | learned), notes)
+    return Verification(differing, foreign_files(root, run_files | learned), notes)
 
 
 def _difference(path: Path, record: FileRecord) -> str:
-    """Say how a file differs from what was sealed; empty if it doesn't."""
+    """Return how a file differs from what was sealed; empty if it doesn't."""
     try:
         if path.is_symlink() or not is_regular(path):
             return "is no file any more"
@@ -210,9 +208,4 @@ def _file_record(path: Path) -> FileRecord:
 
 
 def _digest_of(fields: Mapping[str, str], files: Mapping[str, FileRecord]) -> str:
-    return _sha256_of([dict(fields), {name: record.model_dump() for name, record in files.items()}])
-
-
-def _sha256_of(content: Any) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return sha256_of([dict(fields), {name: record.model_dump() for name, record in files.items()}])

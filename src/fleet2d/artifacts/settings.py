@@ -11,7 +11,7 @@ from fleet2d.component import Settings
 from fleet2d.units import PositiveDuration
 
 
-def _off_is_a_word(value: Any) -> Any:
+def _off_as_text(value: Any) -> Any:
     """Undo YAML 1.1, where a bare `off` is the truth value false."""
     return "off" if value is False else value
 
@@ -25,7 +25,7 @@ class ArtifactSettings(Settings):
     """
 
     trajectories: Annotated[
-        PositiveDuration | Literal["off", "every step"], BeforeValidator(_off_is_a_word)
+        PositiveDuration | Literal["off", "every step"], BeforeValidator(_off_as_text)
     ] = Field(
         default=timedelta(hours=1),
         description="Store every entity's pose this often (a multiple of simulation.step), "
@@ -52,7 +52,7 @@ class ArtifactSettings(Settings):
         "run can start from it.",
     )
     checkpoint: Annotated[
-        PositiveDuration | Literal["auto", "off"], BeforeValidator(_off_is_a_word)
+        PositiveDuration | Literal["auto", "off"], BeforeValidator(_off_as_text)
     ] = Field(
         default="auto",
         description="Write the state of the run this often in simulated time, so that `fleet2d "

@@ -1,4 +1,4 @@
-"""The run store: takes rows while a run goes on, and leaves a run directory that can be trusted."""
+"""The run store: collects the rows of a run and writes its directory, safe against crashes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.buffer import FLUSH_ROWS, Checked, TableBuffer
+from fleet2d.artifacts.buffer import FLUSH_ROWS, Batch, TableBuffer
 from fleet2d.artifacts.digest import TableDigest, run_digest
 from fleet2d.artifacts.directory import (
     cannot_write,
@@ -16,7 +16,7 @@ from fleet2d.artifacts.directory import (
     make_directories,
     remove_directories,
 )
-from fleet2d.artifacts.files import sync_directory, write_atomically
+from fleet2d.artifacts.files import PARTIAL, sync_directory, write_atomically
 from fleet2d.artifacts.journal import Commit
 from fleet2d.artifacts.ledger import Ledger, columns_of, remove_leftovers
 from fleet2d.artifacts.lock import LOCK_NAME
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 class RunStore:
     """Tables of a run, in a directory or in memory.
 
-    Files are called `NAME.parquet.partial` until they are whole and on the disk. Only then are
-    they renamed, and only after that does the manifest say that the run is done: however the
-    process ends, a file called `NAME.parquet` is whole.
+    Files are called `NAME.parquet.partial` until they are complete and on the disk. Then they are
+    renamed, and after that the manifest is written with the status of the run: even if the process
+    is killed, a file called `NAME.parquet` is complete.
 
     Attributes:
-        directory: Where the run is stored; None keeps it in memory.
-        manifest: What `manifest.json` will hold. The engine fills it in; status, tables and
-            digest are the store's.
+        directory: The run directory; None: the run is only in memory.
+        manifest: The content of `manifest.json`. The store sets status, tables and digest, the
+            engine all else.
 
     Example:
         >>> from fleet2d.artifacts.table import Column
@@ -60,13 +60,13 @@ class RunStore:
         *,
         flush_rows: int = FLUSH_ROWS,
     ) -> None:
-        """Touch nothing yet: `open` does."""
+        """Write nothing yet: `open` does."""
         self.directory = None if directory is None else Path(directory)
         self.manifest = manifest or Manifest()
         self._root = None if self.directory is None else self.directory.absolute()
         self._flush_rows = flush_rows
         self._tables: dict[str, TableWriter] = {}
-        self._made: list[Path] = []
+        self._new_directories: list[Path] = []
         self._digests: dict[str, str] | None = None
         self._is_open = directory is None
         self._failure: ArtifactError | None = None
@@ -75,32 +75,32 @@ class RunStore:
             self.add_table(spec)
 
     def hash_again(self) -> None:
-        """Make the digests of a run in memory anew from its rows, which a file alone holds."""
+        """Compute the digests of a run in memory again from its rows, after it was unpickled."""
         for entry in self._tables.values():
             entry.hash_again()
 
     def check(self) -> None:
-        """Say, without writing, that the directory can't be used: worth asking before set-up.
+        """Check, without writing, that the directory can be used.
 
         Raises:
-            RunDirectoryError: It exists and holds something, is a file, or can't be written.
+            RunDirectoryError: It exists and isn't empty, is a file, or can't be written.
         """
         if self.directory is not None:
             check_run_directory(self.directory)
 
     def open(self) -> None:
-        """Make the directory and its manifest, with the status `running`.
+        """Create the directory and its manifest, with the status `running`.
 
         Raises:
-            RunDirectoryError: The directory can't be used; nothing is left behind.
+            RunDirectoryError: The directory can't be used; no new file remains.
             ArtifactError: The disk is full.
         """
         if self._is_open or self.directory is None or self._root is None:
             return
         self.check()
         try:
-            self._made = make_directories(self._root)
-            self._take_directory(self._root)
+            self._new_directories = make_directories(self._root)
+            self._lock_directory(self._root)
             self._is_open = True
             self._ledger_of().begin()
             self.manifest.status = "running"
@@ -109,8 +109,8 @@ class RunStore:
             self.discard()
             raise cannot_write(self.directory, error) from error
 
-    def _take_directory(self, root: Path) -> None:
-        """Lock the directory, and see that no other run has begun there since it was checked."""
+    def _lock_directory(self, root: Path) -> None:
+        """Lock the directory, and check that no other run has begun there in the meantime."""
         ledger = self._ledger_of()
         ledger.lock()
         if any(path.name != LOCK_NAME for path in root.iterdir()):
@@ -118,11 +118,11 @@ class RunStore:
             raise RunDirectoryError(f"another run was stored in {self.directory} just now")
 
     def reopen(self, ledger: Ledger, commit: Commit | None) -> None:
-        """Go on in the directory of an unfinished run, behind a commit of its journal.
+        """Continue in the directory of an unfinished run, after a commit of its journal.
 
         Args:
-            ledger: What the run wrote down, locked for this process.
-            commit: Where to go on; None begins anew.
+            ledger: The journal and checkpoint of the run, locked for this process.
+            commit: The commit to continue after; None: start from the beginning.
 
         Raises:
             ArtifactError: The journal is damaged, or the directory can't be written.
@@ -132,16 +132,17 @@ class RunStore:
         with self._writing("the directory"):
             self.manifest.status = "running"
             self.manifest.write(self._root)
-            for path in (*self._root.glob("*.parquet"), *self._root.glob("*.parquet.partial")):
-                path.unlink()  # as they were when the run ended early
+            for path in (*self._root.glob("*.parquet"), *self._root.glob(f"*.parquet{PARTIAL}")):
+                path.unlink()  # the journal has all of their rows
             for entry in ledger.go_on(commit):
                 self.add_table(entry.spec)
                 table = self._tables[entry.spec.name]
-                table.buffer.learn_words(entry.words)
+                for name, words in entry.words.items():
+                    table.buffer.words[name].enter(words.in_order())
                 self._fill(table, table.buffer.check(columns_of(entry)), log=False)
 
     def keep(self, name: str, content: str) -> None:
-        """Write a file beside the tables, at one stroke.
+        """Write a file beside the tables, atomically.
 
         Raises:
             ArtifactError: It can't be written.
@@ -160,11 +161,14 @@ class RunStore:
             self._ledger_of().keep_checkpoint(content)
 
     def commit(self, step: int, *, sync: bool = False) -> Commit | None:
-        """Let all rows so far survive the end of this process; nothing for a run in memory.
+        """Write all rows so far to the journal, so that they survive a crash of the process.
 
         Args:
-            step: The step before which they are.
-            sync: Whether they must survive a power cut too.
+            step: The first step of which rows may be missing.
+            sync: Whether they must survive a power cut, too.
+
+        Returns:
+            The commit; None for a run in memory, which has no journal.
 
         Raises:
             ArtifactError: They can't be written; the run is marked as failed.
@@ -178,28 +182,28 @@ class RunStore:
             return self._ledger_of().commit(step, sync=sync)
 
     def add_table(self, spec: TableSpec) -> None:
-        """Add a table, at any time before the run is closed; one that is there may come again.
+        """Add a table, at any time before the run is closed; the same table may be added again.
 
         Raises:
             ArtifactError: Another table has that name, or the run is closed.
         """
         self._check_usable()
-        known = self._tables.get(spec.name)
-        if known is None:
+        entry = self._tables.get(spec.name)
+        if entry is None:
             buffer = TableBuffer(spec, self._flush_rows)
             self._tables[spec.name] = TableWriter(buffer, TableDigest(spec))
-        elif known.buffer.spec != spec:
+        elif entry.buffer.spec != spec:
             raise ArtifactError(
-                f"there is a table {spec.name!r} with other columns already: name yours otherwise"
+                f"there is a table {spec.name!r} with other columns already: choose another name"
             )
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the tables, as they were added."""
+        """Names of the tables, in the order in which they were added."""
         return tuple(self._tables)
 
     def append(self, table: str, **columns: Any) -> None:
-        """Add rows to a table; arrays are copied, and may be used again.
+        """Add rows to a table; arrays are copied.
 
         Args:
             table: The name of a table that was added.
@@ -216,11 +220,11 @@ class RunStore:
         entry = self._tables[table]
         self._fill(entry, entry.buffer.check(columns))
 
-    def _fill(self, entry: TableWriter, checked: Checked, *, log: bool = True) -> None:
-        """Take rows; those that the journal has already are not logged."""
+    def _fill(self, entry: TableWriter, batch: Batch, *, log: bool = True) -> None:
+        """Add rows to a buffer; without `log` they are not written to the journal."""
         start = 0
-        while start < checked.rows:
-            start = entry.buffer.fill(checked, start)
+        while start < batch.rows:
+            start = entry.buffer.fill(batch, start)
             if not log:
                 entry.logged = entry.buffer.rows
             if entry.buffer.is_full:
@@ -242,10 +246,10 @@ class RunStore:
             raise ArtifactError(f"there is no table {table!r}, only {', '.join(self._tables)}")
         entry = self._tables[table]
         self._flush(entry)
-        return table_of(entry.kept, entry.buffer.spec, entry.buffer.words)
+        return table_of(entry.chunks, entry.buffer.spec, entry.buffer.words)
 
     def close_tables(self) -> dict[str, str]:
-        """Write what waits, make all files whole, and return the digest of each table.
+        """Write all rows, complete all files, and return the digest of each table.
 
         Raises:
             ArtifactError: They can't be written; the run is marked as failed.
@@ -263,7 +267,7 @@ class RunStore:
         return self._digests
 
     def close(self, status: Status = "complete") -> dict[str, str]:
-        """End the run: close the tables if that is still to do, then write the manifest.
+        """End the run: close the tables if they are open, then write the manifest.
 
         Returns:
             The digest of each table; the run's own is in `manifest.digest`.
@@ -288,27 +292,27 @@ class RunStore:
         return digests
 
     def discard(self) -> None:
-        """Take back everything that was made, for a run that failed before its first step."""
+        """Remove all that was written, for a run that failed before its first step."""
         for entry in self._tables.values():
             if entry.file is not None:
                 entry.file.abandon()
         if self._root is not None and self._is_open:
-            names = [name for table in self._tables for name in _file_names(table)]
             self._ledger_of().end()
             remove_leftovers(self._root)
-            for name in (FILE_NAME, f"{FILE_NAME}.partial", *names):
-                with suppress(OSError):
-                    (self._root / name).unlink()
-            remove_directories(self._made)
+            for name in (FILE_NAME, *(f"{table}.parquet" for table in self._tables)):
+                for path in (self._root / name, self._root / f"{name}{PARTIAL}"):
+                    with suppress(OSError):
+                        path.unlink()
+            remove_directories(self._new_directories)
         self._is_open = False
 
     @property
     def is_closed(self) -> bool:
-        """Whether the run is closed, so that it can be read back."""
+        """Whether the run is closed and can be read back."""
         return self._digests is not None
 
     def _flush(self, entry: TableWriter) -> None:
-        """Hash the rows that wait, and write or keep them."""
+        """Move rows from the buffer to the file, or to the chunks in memory, and hash them."""
         rows = entry.buffer.rows
         if not rows:
             return
@@ -318,7 +322,7 @@ class RunStore:
         entry.logged = 0
         entry.digest.update(chunk, rows)
         if self._root is None:
-            entry.kept.append((chunk, rows))
+            entry.chunks.append((chunk, rows))
             return
         name = entry.buffer.spec.name
         with self._writing(f"{name}.parquet", entry):
@@ -329,7 +333,7 @@ class RunStore:
         return self._ledger
 
     def _finish_files(self, root: Path) -> None:
-        """Make every file whole before any gets its name."""
+        """Complete every file before any is renamed."""
         for name, entry in self._tables.items():
             with self._writing(f"{name}.parquet", entry):
                 entry.file_in(root).finish()
@@ -350,7 +354,7 @@ class RunStore:
 
     @contextmanager
     def _writing(self, what: str, entry: TableWriter | None = None) -> Iterator[None]:
-        """Turn a failed write into the end of the run, marked as failed."""
+        """End the run and mark it as failed if a write fails; `what` names the file."""
         try:
             yield
         except OSError as error:
@@ -362,23 +366,23 @@ class RunStore:
                     f"Free some space and go on by `fleet2d resume {self.directory}`, or store less"
                     " (`artifacts:` in the scenario) and run again with another --out"
                 )
-            marked = self._mark_failed(reason, entry)
+            is_marked = self._mark_failed(reason, entry)
             self._failure = ArtifactError(
                 f"{reason}; the run so far is in {self.directory} and "
-                f"{'marked as failed' if marked else 'not marked as complete'}. {advice}"
+                f"{'marked as failed' if is_marked else 'not marked as complete'}. {advice}"
             )
             raise self._failure from error
 
     def _mark_failed(self, reason: str, entry: TableWriter | None) -> bool:
-        """Leave the files partial; return whether the manifest could still say so."""
-        for other in self._tables.values():
-            if other.file is not None:
-                other.file.abandon()
+        """Leave the files partial; return whether the manifest with that status was written."""
+        for table in self._tables.values():
+            if table.file is not None:
+                table.file.abandon()
         self._ledger_of().end(keep=True, undo=True)
         self.manifest.status = "failed"
         self.manifest.notes.append(reason)
         return _try_write(self.manifest, self._root) or (
-            # The file is lost; what it takes up is enough for a manifest on a full disk.
+            # The file is lost anyway; its space is enough for a manifest on a full disk.
             entry is not None
             and entry.file is not None
             and entry.file.empty()
@@ -386,12 +390,8 @@ class RunStore:
         )
 
 
-def _file_names(table: str) -> tuple[str, str]:
-    return f"{table}.parquet", f"{table}.parquet.partial"
-
-
 def _try_write(manifest: Manifest, root: Path | None) -> bool:
-    """Write the manifest of a run that failed; return whether that worked."""
+    """Write the manifest of a failed run; return whether that worked."""
     with suppress(OSError):
         if root is not None:
             manifest.write(root)

@@ -1,4 +1,4 @@
-"""JSON as the standard has it: no NaN, no key twice, no number too large."""
+"""JSON by the standard: no NaN, no repeated key, no number beyond a float."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def read_json(text: bytes) -> Any:
     """Return the content of a JSON text.
 
     Raises:
-        ValueError: It is no JSON, or goes beyond a bound.
+        ValueError: It is no JSON, or is nested too deeply.
 
     Example:
         >>> read_json(b'{"steps": 3}')
@@ -23,28 +23,28 @@ def read_json(text: bytes) -> Any:
     try:
         return json.loads(
             text.decode(),
-            object_pairs_hook=_once,
-            parse_constant=_refuse,
-            parse_float=_finite,
+            object_pairs_hook=_unique_keys,
+            parse_constant=_refuse_constant,
+            parse_float=_finite_float,
         )
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) < len(pairs):
         keys = [key for key, _ in pairs]
-        twice = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {twice[:60]!r} is there twice")
+        repeated_key = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {repeated_key[:60]!r} is there twice")
     return content
 
 
-def _refuse(word: str) -> NoReturn:
+def _refuse_constant(word: str) -> NoReturn:
     raise ValueError(f"{word} is no number")
 
 
-def _finite(text: str) -> float:
+def _finite_float(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"{text[:60]} is too large a number")

@@ -48,7 +48,7 @@ class Column:
     description: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a column that could not be stored."""
+        """Refuse a column that can't be stored."""
         if not self.name:
             raise ArtifactError("a column has no name: give it one")
         if self.kind not in get_args(Kind):
@@ -68,7 +68,7 @@ class Column:
 
     @property
     def takes_strings(self) -> bool:
-        """Whether values are handed in as strings."""
+        """Whether values are appended as strings."""
         return self.kind == "string" or self.is_growing
 
 
@@ -86,7 +86,7 @@ class TableSpec:
     description: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a table that could not be stored."""
+        """Refuse a table that can't be stored."""
         object.__setattr__(self, "columns", tuple(self.columns))
         if not _NAME.fullmatch(self.name):
             raise ArtifactError(

@@ -1,4 +1,4 @@
-"""One table of a run on its way: rows that wait, rows that are kept, and the digest so far."""
+"""One table that is being written: the rows in the buffer, the rows stored, and their digest."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ class TableWriter:
     """A table that is being written.
 
     Attributes:
-        buffer: The rows that wait.
-        digest: Of the rows that left the buffer.
-        kept: Those rows, of a run in memory.
-        file: Where they are, of a run in a directory; None before the first.
-        logged: How many rows of the buffer the journal has.
+        buffer: The newest rows.
+        digest: Digest of the rows that left the buffer.
+        chunks: Those rows and the number in each chunk, if the run is in memory.
+        file: The file with those rows, if the run is in a directory; None before the first.
+        logged: How many rows of the buffer are in the journal.
     """
 
     buffer: TableBuffer
     digest: TableDigest
-    kept: list[tuple[Chunk, int]] = field(default_factory=list)
+    chunks: list[tuple[Chunk, int]] = field(default_factory=list)
     file: ParquetTable | None = None
     logged: int = 0
 
     def hash_again(self) -> None:
-        """Make the digest anew from the rows that are kept."""
+        """Compute the digest again from the chunks in memory."""
         self.digest = TableDigest(self.buffer.spec)
-        for chunk, rows in self.kept:
+        for chunk, rows in self.chunks:
             self.digest.update(chunk, rows)
 
     def log(self, ledger: Ledger | None) -> None:
-        """Write the rows to the journal that it doesn't have yet.
+        """Append the rows of the buffer to the journal that are not in it yet.
 
         Raises:
             OSError: They can't be written.
@@ -53,7 +53,7 @@ class TableWriter:
         self.logged = buffer.rows
 
     def file_in(self, root: Path) -> ParquetTable:
-        """Return the file of the table, begun if there is none yet."""
+        """Return the file of the table; create it if there is none yet."""
         from fleet2d.artifacts.arrow import ParquetTable
 
         if self.file is None:
@@ -61,7 +61,7 @@ class TableWriter:
         return self.file
 
     def record(self, digest: str) -> TableRecord:
-        """Return what the manifest says about the table."""
+        """Return the entry of the manifest about the table."""
         columns = [
             ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
             for column in self.buffer.spec.columns

@@ -7,7 +7,7 @@ import typer
 
 from fleet2d.arguments import Resolution, ThemeChoice, file_name
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
+from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 Figure = Annotated[
     Literal["life", "heat", "strip"],
@@ -63,7 +63,7 @@ def show(  # noqa: PLR0913 - options of the command line
     from fleet2d.view.theme import themed
 
     wanted = RunPicture(layer, step, reliability, at, begin, end, figure)
-    with themed(theme), restricting(trust, trust_dir):
+    with themed(theme), restrict_to(trust, trust_dir):
         if diary:
             from fleet2d.cli.diaries import show_diary
 

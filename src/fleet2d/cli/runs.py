@@ -14,7 +14,7 @@ from fleet2d.arguments import file_name, split
 from fleet2d.cli.summary import print_summary, summary_of
 from fleet2d.cli.watchdog import watched
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
+from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation
@@ -103,7 +103,7 @@ def export(
         from fleet2d.viewer.moments import steps_of
 
         first, last = steps_of(run, begin, end)
-        with restricting(trust, trust_dir):
+        with restrict_to(trust, trust_dir):
             export_html(run, html, first, last)
         typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
 

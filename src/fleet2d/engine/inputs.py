@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Iterator
 from pathlib import Path
 
-from fleet2d.artifacts.manifest import Manifest, file_record, is_regular
+from fleet2d.artifacts.manifest import Manifest, input_record, is_regular
 from fleet2d.component import Component
 from fleet2d.errors import RunDirectoryError
 from fleet2d.scenario.model import Scenario
@@ -41,7 +41,7 @@ def changed_inputs(manifest: Manifest) -> list[str]:
                 raise RunDirectoryError(
                     f"the run read {path}, which is no file now: put the file back"
                 )
-            if file_record(path)["sha256"] != record.sha256:
+            if input_record(path).sha256 != record.sha256:
                 changed.append(record.path)
         except (OSError, ValueError) as error:
             raise RunDirectoryError(

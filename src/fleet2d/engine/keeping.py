@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.manifest import Entities, InputRecord, Manifest, file_record, versions
+from fleet2d.artifacts.manifest import Entities, Manifest, input_record, versions
 from fleet2d.artifacts.store import RunStore
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
@@ -43,7 +43,7 @@ def describe_start(
     manifest.start = clock.start.isoformat()
     manifest.entities = Entities(users=list(scenario.users), robots=list(scenario.robots))
     manifest.versions = versions()
-    manifest.inputs = [InputRecord(**file_record(path)) for path in input_files(scenario)]
+    manifest.inputs = [input_record(path) for path in input_files(scenario)]
     manifest.notes = list(plan.notes)
     for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
         manifest.notes += [

@@ -20,7 +20,7 @@ from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.seen import SeenArea
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
-from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.costmap import CostmapSettings, costs_of
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
@@ -28,7 +28,7 @@ from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
-from fleet2d.units import micros
+from fleet2d.units import whole_steps
 
 NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 
@@ -175,13 +175,7 @@ class LayerBook:
         """Return a duration in steps, 0 for none."""
         if duration is None:
             return 0
-        steps, rest = divmod(micros(duration), self._clock.step_us)
-        if rest or not steps:
-            raise ScenarioError(
-                f"{key} is {duration}, which is no multiple of simulation.step"
-                f" ({self._clock.step_us / 1e6:g} s): choose a multiple"
-            )
-        return steps
+        return whole_steps(duration, self._clock.step_us, key)
 
     def _put(self, layer: Layer, step: int) -> None:
         spec = layer_table(layer)

@@ -24,7 +24,7 @@ from fleet2d.events import HOME, Event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import did_you_mean
-from fleet2d.units import micros
+from fleet2d.units import micros, whole_steps
 
 KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
 
@@ -225,14 +225,8 @@ class Learners:
         return notes
 
     def _add(self, name: str, path: str, component: Algorithm | Metric) -> None:
-        every, rest = divmod(micros(component.period), self.clock.step_us)
-        if component.on:
-            every = 0
-        elif rest or not every:
-            raise ScenarioError(
-                f"{path}.period is {component.period}, which is no multiple of simulation.step"
-                f" ({self.clock.step_us / 1e6:g} s): choose a multiple"
-            )
+        step_us = self.clock.step_us
+        every = 0 if component.on else whole_steps(component.period, step_us, f"{path}.period")
         origin, component = component, component.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)

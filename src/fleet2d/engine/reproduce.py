@@ -18,7 +18,7 @@ from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.scenario.model import load_scenario
-from fleet2d.trust import Trust, refuse_untrusted, restricted
+from fleet2d.trust import Trust, refuse_untrusted, restrict
 
 # Fields of the manifest that running again says nothing about.
 NOT_COMPARED = ("inputs", "resumed", "versions", "wall_s")
@@ -82,7 +82,7 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
     causes += seal.notes
     causes += [f"{name} in {directory} is no part of the run" for name in seal.foreign]
     with tempfile.TemporaryDirectory() as folder:
-        with restricted(trust):
+        with restrict(trust):
             again = _run_again(content, Path(folder) / "run")
         after = again.manifest
         causes += _other_versions(content["versions"], after["versions"])
@@ -106,7 +106,7 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
     content, trust = run.manifest, Trust.of(())
     if run.directory is not None:
         refuse_untrusted(run.directory, content["scenario"], trust)
-    with restricted(trust) if run.directory is not None else nullcontext():
+    with restrict(trust) if run.directory is not None else nullcontext():
         simulation = _simulation(content, None)
         label = simulation.expect(expectation, JUDGED)
         again = simulation.run()

@@ -16,7 +16,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import RunDirectoryError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import load_scenario
-from fleet2d.trust import Trust, refuse_untrusted, restricted
+from fleet2d.trust import Trust, refuse_untrusted, restrict
 
 
 def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:
@@ -80,7 +80,7 @@ def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
             " scenario again"
         )
     refuse_untrusted(root, manifest.scenario, trust)
-    with restricted(trust):
+    with restrict(trust):
         scenario = load_scenario(manifest.scenario)
         try:
             checkpoint = _checkpoint(ledger, manifest)

@@ -8,11 +8,10 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.ordering import in_order
-from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.mesh import SUB
-from fleet2d.units import micros
+from fleet2d.units import whole_steps
 
 
 class Samples:
@@ -89,10 +88,4 @@ def _steps_between(settings: ArtifactSettings, clock: Clock) -> int:
         return 0
     if settings.trajectories == "every step":
         return 1
-    every, rest = divmod(micros(settings.trajectories), clock.step_us)
-    if rest or not every:
-        raise ScenarioError(
-            f"artifacts.trajectories is {settings.trajectories}, which is no multiple of"
-            f" simulation.step ({clock.step_us / 1e6:g} s): choose one, 'every step' or 'off'"
-        )
-    return every
+    return whole_steps(settings.trajectories, clock.step_us, "artifacts.trajectories")

@@ -18,7 +18,7 @@ from fleet2d.component import Codec, Component, components
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, problem, problem_at, rewritten
+from fleet2d.problems import did_you_mean, problem, problem_at, rewrite
 from fleet2d.units import PositiveDuration
 
 
@@ -166,7 +166,7 @@ def _short(verb: str, cls: Any, fields: dict[str, Any], info: ValidationInfo) ->
         written = {cls.subject: fields.pop(verb), **fields}
         return cls.model_validate(written, context=info.context)  # type: ignore[no-any-return]
     except ValidationError as error:
-        raise rewritten(error, move) from None
+        raise rewrite(error, move) from None
 
 
 def _not_one_verb(

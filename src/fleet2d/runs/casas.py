@@ -8,14 +8,14 @@ from fleet2d.errors import RunDirectoryError
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
-# What CASAS writes where nobody said what the person was doing.
+# The activity that CASAS writes where none is known.
 OTHER = "Other_Activity"
 
 
 def write_casas(run: "Run", path: Path) -> int:
     """Write a line per reading: date, time, room, sensor, state, activity.
 
-    Spaces within a name become underscores, for the columns are set apart by spaces.
+    Spaces in names become underscores, because spaces separate the columns.
 
     Args:
         run: A run whose scenario has sensors.
@@ -29,7 +29,7 @@ def write_casas(run: "Run", path: Path) -> int:
     """
     if "sensors" not in run.tables:
         raise RunDirectoryError(
-            "the run has no table of sensors: give its scenario objects that sense, such as"
+            "the run has no table of sensors: add objects that sense to its scenario, such as"
             " hall: {type: motion_sensor, at: [1, 2]}"
         )
     rows = run.tables["sensors"].to_pylist()

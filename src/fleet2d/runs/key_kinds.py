@@ -1,7 +1,7 @@
 """The kinds of rows in the table key_frames.
 
-A row is a breakpoint that was reached (track), the end of a segment that was broken off before it
-(planned), or a state from which a random walk is drawn on (walk).
+A row is a breakpoint that the body reached (track), the planned end of a segment that was
+interrupted before (planned), or the state from which a random walk continues (walk).
 """
 
 TRACK, PLANNED, WALK = 0, 1, 2

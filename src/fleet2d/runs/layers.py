@@ -1,4 +1,4 @@
-"""Layers of cells, read back from a run."""
+"""Read the layers of cells that a run stored."""
 
 from typing import Any
 
@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.layers import EVERYWHERE, PREFIX
 from fleet2d.errors import ArtifactError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.runs.run import Run
 
 
 def layer_names(run: Run) -> list[str]:
-    """Return the layers that a run stored."""
+    """Return the names of the layers that a run stored."""
     return [name.removeprefix(PREFIX) for name in run.tables if name.startswith(PREFIX)]
 
 
@@ -23,8 +23,8 @@ def layer_steps(run: Run, name: str) -> list[int]:
         ArtifactError: The run stored no such layer.
     """
     table = _table(run, name)
-    whole = table["row"].to_numpy() == EVERYWHERE
-    return [int(step) for step in table["step"].to_numpy()[whole]]
+    begins = table["row"].to_numpy() == EVERYWHERE  # the first row of each step
+    return [int(step) for step in table["step"].to_numpy()[begins]]
 
 
 def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
@@ -44,15 +44,12 @@ def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
     if step is None:
         step = steps[-1]
     if step not in steps:
-        shown = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
-        raise ArtifactError(f"the layer {name!r} was not stored after step {step}, but: {shown}")
+        listed = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
+        raise ArtifactError(f"the layer {name!r} was not stored after step {step}, but: {listed}")
     table = _table(run, name)
-    here = table["step"].to_numpy() == step
+    at_step = table["step"].to_numpy() == step
     row, column, value = (
-        table[key].to_numpy(zero_copy_only=False)[here]
-        if key == "value"
-        else table[key].to_numpy()[here]
-        for key in ("row", "column", "value")
+        table[key].to_numpy(zero_copy_only=False)[at_step] for key in ("row", "column", "value")
     )
     lattice = run.plan.lattice
     inside = (row < lattice.rows) & (column < lattice.columns) & (row >= 0) & (column >= 0)
@@ -65,9 +62,6 @@ def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
 
 def _table(run: Run, name: str) -> Any:
     if f"{PREFIX}{name}" not in run.tables:
-        known = layer_names(run)
-        raise ArtifactError(
-            f"the run stored no layer {name!r}{did_you_mean(name, known)} It has:"
-            f" {', '.join(known) or 'none'}"
-        )
+        names = suggest(name, layer_names(run), "It has")
+        raise ArtifactError(f"the run stored no layer {name!r}{names}")
     return run.tables[f"{PREFIX}{name}"]

@@ -1,8 +1,7 @@
-"""Reading a run back: its manifest, its tables, and whether they are what was stored."""
+"""Reading a run back: its manifest and tables, and checking them against their digests."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import timedelta
 from pathlib import Path
@@ -14,6 +13,7 @@ from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.prefix import Prefix
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.leaves import judges, views
+from fleet2d.problems import suggest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,12 +28,13 @@ if TYPE_CHECKING:
 
 
 FLOORPLAN_NAME = "floorplan.json"
-LEARNED_NAME = "learned"  # the folder of what algorithms have learned
-"""The floor plan in a run directory, in our own format."""
+"""The floor plan in a run directory, in Fleet2D's own format."""
+LEARNED_NAME = "learned"
+"""The folder in a run directory of what algorithms have learned."""
 
 
 class Tables(Mapping[str, "pa.Table"]):
-    """Tables by name, each read when it is first asked for."""
+    """Tables by name, each read when it is first used."""
 
     def __init__(self, names: Sequence[str], read: Callable[[str], pa.Table]) -> None:
         """Read nothing yet."""
@@ -55,11 +56,11 @@ class Tables(Mapping[str, "pa.Table"]):
         return self._loaded[name]
 
     def __contains__(self, name: object) -> bool:
-        """Whether the run has such a table."""
+        """Whether the run has a table of that name."""
         return name in self._names
 
     def __iter__(self) -> Iterator[str]:
-        """Go through the names."""
+        """Iterate over the names."""
         return iter(self._names)
 
     def __len__(self) -> int:
@@ -67,18 +68,18 @@ class Tables(Mapping[str, "pa.Table"]):
         return len(self._names)
 
     def __repr__(self) -> str:
-        """Name the tables."""
+        """List the names of the tables."""
         return f"Tables({', '.join(self._names)})"
 
 
 class Run:
-    """A run that is over: what was run, and what it stored.
+    """A run that has ended: its manifest and the tables that it stored.
 
     Attributes:
-        directory: Where it is stored; None for a run in memory.
+        directory: The run directory; None for a run in memory.
         manifest: The content of `manifest.json`.
-        tables: The tables by name, read when first asked for.
-        notes: Remarks in plain words, such as what is missing after a crash.
+        tables: The tables by name, each read when it is first used.
+        notes: Remarks for the user, such as what is missing after a crash.
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class Run:
         read: Callable[[str], pa.Table],
         notes: Sequence[str] = (),
     ) -> None:
-        """Read nothing yet; `open_run` and `run_of` make runs."""
+        """Read nothing yet; `open_run` and `run_of` create runs."""
         self.directory = directory
         self.manifest: dict[str, Any] = manifest.content()
         self.tables = Tables(names, read)
@@ -97,13 +98,13 @@ class Run:
         self._plan: FloorPlan | None = None
 
     def __repr__(self) -> str:
-        """Say where the run is and how it ended."""
-        where = "in memory" if self.directory is None else str(self.directory)
-        return f"<Run {where}: {self.status}, tables {', '.join(self.tables)}>"
+        """Return the run's place, status and tables."""
+        place = "in memory" if self.directory is None else str(self.directory)
+        return f"<Run {place}: {self.status}, tables {', '.join(self.tables)}>"
 
     @property
     def status(self) -> str:
-        """How it ended: complete, interrupted, failed, or running (still, or until a crash)."""
+        """Its status: complete, interrupted, failed, or running (still, or until it crashed)."""
         return str(self.manifest["status"])
 
     @property
@@ -119,7 +120,7 @@ class Run:
 
     @property
     def plan(self) -> FloorPlan:
-        """The floor plan it ran in.
+        """The floor plan that it ran in.
 
         Raises:
             ArtifactError: The run directory holds none.
@@ -145,41 +146,42 @@ class Run:
         self._plan = plan
 
     def path(self, entity: str, every: timedelta = timedelta(minutes=1)) -> Trajectory:
-        """Return where a user or robot was, every so often, rebuilt exactly from key frames.
+        """Return the poses of a user or robot at regular times, rebuilt exactly from key frames.
 
         Args:
             entity: Its name.
             every: Time between two poses, a multiple of the step.
 
         Raises:
-            ArtifactError: The run stored no key frames, there is no such body, or `every` doesn't
-                fit.
+            ArtifactError: The run stored no key frames, there is no such body, or `every` is no
+                multiple of the step.
         """
         from fleet2d.runs.trajectory import rebuild_path
 
         return rebuild_path(self, self.plan, entity, every)
 
     def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
-        """Judge the run by an expectation: it is run again from its manifest, exactly as it was.
+        """Judge the run by an expectation; the run is repeated exactly for this, from its manifest.
 
         Args:
             expectation: What is expected, from the first step on.
-            name: What it is called.
+            name: A name for the verdict.
 
         Raises:
-            InputError: It names what isn't there, or can never happen; or the run isn't complete.
-            ArtifactError: The run comes out otherwise now.
+            InputError: It names something unknown, or an event that can never happen; or the run
+                isn't complete.
+            ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
         """
         verdict: Verdict = judges().judge_again(self, expectation, name)
         return verdict
 
     def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
-        """Draw the run, or a moment of it; needs the extra `viz`.
+        """Draw the run, or one moment of it; needs the extra `viz`.
 
         Args:
-            at: A moment, such as "day 3 18:30", or a step; None for the whole run.
+            at: A moment, such as "day 3 18:30", or a step; None: the whole run.
             ax: Matplotlib axes to draw the moment on (the last one, if `at` is None).
-            theme: Of a new figure: light or dark.
+            theme: Theme of a new figure: light or dark.
 
         Returns:
             A matplotlib figure, or `ax`.
@@ -194,7 +196,7 @@ class Run:
         """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
 
         Args:
-            height: Of the widget [pixels].
+            height: Height of the widget [pixels].
 
         Raises:
             InputError: anywidget is not installed.
@@ -207,16 +209,14 @@ class Run:
         return views().run_html(self)
 
     def arrow(self, name: str) -> pa.Table:
-        """Return a table as Arrow has it.
+        """Return a table as an Arrow table.
 
         Raises:
             ArtifactError: The run has no such table, or its file can't be read.
         """
         if name not in self.tables:
-            near = difflib.get_close_matches(name, self.tables, 1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
             raise ArtifactError(
-                f"the run has no table {name!r}: {hint}It has {', '.join(self.tables) or 'none'}"
+                f"the run has no table {name!r}{suggest(name, self.tables, 'It has')}"
             )
         return self.tables[name]
 
@@ -227,7 +227,7 @@ class Run:
             ArtifactError: pandas is not installed, or see `arrow`.
         """
         try:
-            import pandas as pd  # noqa: F401 - only to see whether it is there
+            import pandas as pd  # noqa: F401 - only to check that it is installed
         except ImportError as error:
             raise _not_installed("pandas") from error
         return self.arrow(name).to_pandas()
@@ -247,24 +247,24 @@ class Run:
         return frame
 
     def verify(self) -> list[str]:
-        """Compute all digests anew; return the names of the tables that are not as stored.
+        """Compute all digests again; return the names of the tables that have changed.
 
-        The list ends in `manifest.json` if the digest of the whole is not that of its tables.
+        The list ends in `manifest.json` if the digest of the run doesn't fit those of its tables.
 
         Raises:
-            ArtifactError: The run was never closed, so there is nothing to compare with.
+            ArtifactError: The run has no digest: it was never closed.
         """
         if self.digest is None:
             raise ArtifactError(
                 f"{self.directory or 'the run'} has no digest, for its status is {self.status}: "
                 "there is nothing to compare with"
             )
-        stored = {name: table["digest"] for name, table in self.manifest["tables"].items()}
-        differing = changed_tables(stored, self._digest_of)
-        return differing if run_digest(stored) == self.digest else [*differing, FILE_NAME]
+        digests = {name: table["digest"] for name, table in self.manifest["tables"].items()}
+        changes = changed_tables(digests, self._digest_of)
+        return changes if run_digest(digests) == self.digest else [*changes, FILE_NAME]
 
     def _digest_of(self, name: str) -> str | None:
-        """Return the digest of a table as it is now, None if it can't be read."""
+        """Return the present digest of a table, None if it can't be read."""
         if self.directory is not None:
             return digest_of_file(self.directory / f"{name}.parquet")
         try:
@@ -276,8 +276,8 @@ class Run:
 def open_run(directory: Path | str) -> Run:
     """Open a stored run for reading.
 
-    A run that crashed or failed opens too, with the tables that are whole; `Run.notes` says what
-    is not.
+    A run that crashed or failed can be opened, too, with the tables that are complete; `Run.notes`
+    lists the others.
 
     Raises:
         RunDirectoryError: There is no run in that directory, or its manifest is damaged.
@@ -286,8 +286,10 @@ def open_run(directory: Path | str) -> Run:
 
     root = Path(directory)
     if not root.is_dir():
-        what = "is a file" if root.exists() else "does not exist"
-        raise RunDirectoryError(f"{root} {what}: give the directory that `fleet2d run --out` wrote")
+        state = "is a file" if root.exists() else "does not exist"
+        raise RunDirectoryError(
+            f"{root} {state}: give the directory that `fleet2d run --out` wrote"
+        )
     manifest = Manifest.read(root)
     if manifest.digest is None:
         prefix = Prefix.find(root)
@@ -299,9 +301,8 @@ def open_run(directory: Path | str) -> Run:
         foreign = sorted(f"{name}.parquet" for name in on_disk - manifest.tables.keys())
         notes += [f"no part of the run: {', '.join(foreign)}"] if foreign else []
         on_disk = set()
-    names = sorted(on_disk | manifest.tables.keys())
-    readable = []
-    for name in names:
+    names = []
+    for name in sorted(on_disk | manifest.tables.keys()):
         try:
             rows = count_rows(root / f"{name}.parquet")
         except ArtifactError as error:
@@ -309,11 +310,11 @@ def open_run(directory: Path | str) -> Run:
             if name not in manifest.tables:
                 continue
         else:
-            stored = manifest.tables[name].rows if name in manifest.tables else rows
-            if rows != stored:
-                notes.append(f"table {name!r} has {rows} rows, but {stored} were stored")
-        readable.append(name)
-    return Run(root, manifest, readable, lambda name: read_parquet(root / f"{name}.parquet"), notes)
+            stored_rows = manifest.tables[name].rows if name in manifest.tables else rows
+            if rows != stored_rows:
+                notes.append(f"table {name!r} has {rows} rows, but {stored_rows} were stored")
+        names.append(name)
+    return Run(root, manifest, names, lambda name: read_parquet(root / f"{name}.parquet"), notes)
 
 
 def run_of(store: RunStore) -> Run:
@@ -330,23 +331,23 @@ def run_of(store: RunStore) -> Run:
 
 
 def _open_prefix(root: Path, manifest: Manifest, prefix: Prefix) -> Run:
-    """Return a run that isn't complete, up to the last commit."""
+    """Return an unfinished run up to its last commit."""
     manifest.steps = prefix.commit.step
     manifest.simulated_s = manifest.steps * manifest.step_us / 1e6
-    how = {
+    states = {
         "running": "is unfinished: it crashed, or is still going on",
         "failed": "failed",
         "interrupted": "was interrupted",
     }
     note = (
-        f"{root} {how.get(manifest.status, 'is unfinished')}; everything before step"
+        f"{root} {states.get(manifest.status, 'is unfinished')}; everything before step"
         f" {prefix.commit.step} can be read, and `fleet2d resume {root}` goes on with it"
     )
     return Run(root, manifest, prefix.names, prefix.read, [note])
 
 
 def _state_notes(root: Path, manifest: Manifest) -> list[str]:
-    """Say what a run lacks that did not end as it should."""
+    """Return notes on what is missing in a run that isn't complete."""
     notes = []
     if manifest.status == "running":
         notes.append(
@@ -357,9 +358,9 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
         notes.append(f"{root} was interrupted: it holds what was stored until then")
     if manifest.status == "failed":
         notes.append(f"{root} failed: it holds what was stored until then")
-    partial = sorted(root.glob(f"*.parquet{PARTIAL}"))
-    if partial:
-        notes.append(f"cut off and not readable: {', '.join(path.name for path in partial)}")
+    names = sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}"))
+    if names:
+        notes.append(f"cut off and not readable: {', '.join(names)}")
     return notes
 
 

@@ -26,13 +26,13 @@ from fleet2d.kernels.motion import (
 )
 from fleet2d.runs.key_kinds import KEY_KINDS, PLANNED, WALK
 from fleet2d.scenario.model import load_scenario
-from fleet2d.trust import of_others
-from fleet2d.units import micros
+from fleet2d.trust import restrict_stored
+from fleet2d.units import whole_steps
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
-# Sections of a scenario that say how bodies move; code of the others isn't needed, nor imported.
+# The sections of a scenario that bodies depend on; the components of all others are not imported.
 _BODIES = ("simulation", "floorplan", "users", "robots")
 
 I64 = NDArray[np.int64]
@@ -43,12 +43,12 @@ class Trajectory:
     """Poses of one body, all arrays of one length.
 
     Attributes:
-        step: int64.
-        time: datetime64[us], local.
-        x: float64 [m]; where it left while it is away.
+        step: Steps, int64.
+        time: Local times, datetime64[us].
+        x: float64 [m]; while the body is away, the place where it left the home.
         y: float64 [m].
-        heading: float64 [rad], counter-clockwise from +x.
-        away: bool.
+        heading: Counter-clockwise from +x, float64 [rad].
+        away: Whether the body is away from home, bool.
         room: Index of the room, -1 while away, int16.
     """
 
@@ -62,17 +62,17 @@ class Trajectory:
 
 
 def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> Trajectory:
-    """Return where a body of a stored run was, every so often.
+    """Return the poses of a body of a stored run at regular times.
 
     Args:
-        run: A run that stored key_frames.
+        run: A run that stored key frames.
         plan: The floor plan it ran in.
         entity: The name of the body.
         every: Time between two poses, a multiple of the step.
 
     Raises:
         ArtifactError: The run stored no key frames, there is no such body, or `every` is no
-            multiple.
+            multiple of the step.
     """
     manifest = run.manifest
     clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
@@ -80,11 +80,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
         raise ArtifactError(
             f"every is {every!r}: a timedelta is wanted, as in every=timedelta(seconds=10)"
         )
-    stride, rest = divmod(micros(every), clock.step_us)
-    if rest or stride < 1:
-        raise ArtifactError(
-            f"every is {every}: it must be a multiple of the step, {clock.step_us / 1e6:g} s"
-        )
+    stride = whole_steps(every, clock.step_us, "every", ArtifactError)
     if "key_frames" not in run.tables:
         raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
     keys = _keys_of(run, plan, entity, clock)
@@ -105,7 +101,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
 
 
 def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str, Any]:
-    """Return the key frames of a body in lattice units."""
+    """Return the key frames of a body in lattice units, each column (n,)."""
     entities = run.manifest["entities"]
     names = [*entities["users"], *entities["robots"]]
     if entity not in names:
@@ -113,9 +109,9 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str
     from pyarrow import array, compute
 
     table = run.tables["key_frames"]
-    mine = table.filter(compute.equal(table["entity"].cast("string"), entity))
-    column = {n: mine[n].to_numpy() for n in ("step", "time", "x", "y", "heading", "away")}
-    kind = compute.index_in(mine["kind"].cast("string"), array(KEY_KINDS)).to_numpy()
+    rows = table.filter(compute.equal(table["entity"].cast("string"), entity))
+    column = {n: rows[n].to_numpy() for n in ("step", "time", "x", "y", "heading", "away")}
+    kind = compute.index_in(rows["kind"].cast("string"), array(KEY_KINDS)).to_numpy()
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
     return {
         "step": column["step"],
@@ -139,7 +135,7 @@ def _trace(
     stride: int,
     out: Poses,
 ) -> None:
-    """Follow the key frames, stretch by stretch, each until the next key frame that was reached."""
+    """Fill `out` from the key frames, segment by segment, each up to the next one's begin."""
     kind, step = keys["kind"], keys["step"]
     walker = None
     begin = 0
@@ -152,7 +148,7 @@ def _trace(
         else:
             while end < len(kind) and kind[end] not in (WALK, PLANNED):
                 end += 1
-            if end < len(kind) and kind[end] == PLANNED:  # an end that was never reached
+            if end < len(kind) and kind[end] == PLANNED:  # the body never reached it
                 end += 1
             stop = step[end] if end < len(kind) else clock.steps
             _follow_track(keys, begin, end, int(stop), clock, stride, out)
@@ -166,10 +162,10 @@ def _follow_track(
     first = -(-int(keys["step"][begin]) // stride)
     last = -(-stop // stride)
     if last > first:
-        row = Poses(
+        poses = Poses(
             out.x[first:last], out.y[first:last], out.heading[first:last], out.away[first:last]
         )
-        trace_track(part, first * stride * clock.step_us, stride * clock.step_us, row)
+        trace_track(part, first * stride * clock.step_us, stride * clock.step_us, poses)
 
 
 def _follow_walk(
@@ -183,28 +179,28 @@ def _follow_walk(
     home, actor, behavior = walker
     step = int(keys["step"][begin])
     state = Pose(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
-    row = empty_poses(stop - step + 1)
-    trace_meander(home.walls, actor.space.mesh, behavior.rule, step, state[:3], row)
-    if begin + 1 < len(keys["x"]):  # where the walk came to, as it was stored
-        found = (row.x[-1], row.y[-1], row.heading[-1])
-        if found != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):
+    poses = empty_poses(stop - step + 1)
+    trace_meander(home.walls, actor.space.mesh, behavior.rule, step, state[:3], poses)
+    if begin + 1 < len(keys["x"]):  # the stored end of the walk
+        last = (poses.x[-1], poses.y[-1], poses.heading[-1])
+        if last != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):
             raise ArtifactError(
                 f"the random walk of {actor.name} from step {step} on can't be rebuilt: it was"
                 " walked by other rules than those of its behavior 'meander', or by another version"
             )
     first = -(-step // stride)
-    paste_poses(out, first, row, slice(first * stride - step, stop - step, stride))
+    paste_poses(out, first, poses, slice(first * stride - step, stop - step, stride))
 
 
 def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
-    """Return the body as it was configured, to walk its random walk again."""
-    stored = run.manifest["scenario"]
-    with of_others():
-        scenario = load_scenario({key: stored[key] for key in _BODIES if key in stored})
+    """Return the home, the body and its behavior that repeats its random walk."""
+    sections = run.manifest["scenario"]
+    with restrict_stored():
+        scenario = load_scenario({key: sections[key] for key in _BODIES if key in sections})
     bucket = "users" if entity in scenario.users else "robots"
-    configured = {**scenario.users, **scenario.robots}[entity]
+    body = {**scenario.users, **scenario.robots}[entity]
     home = Home(plan)
-    actor = Actor(entity, f"{bucket}.{entity}", configured, home, clock, run.manifest["seed"])
+    actor = Actor(entity, f"{bucket}.{entity}", body, home, clock, run.manifest["seed"])
     walks = [behavior for behavior in actor.behaviors if isinstance(behavior, Meander)]
     if not walks:
         raise ArtifactError(

@@ -1,1 +1,1 @@
-"""Scenarios: the YAML file that defines a run, how files compose, and what is wrong with one."""
+"""Scenarios: the YAML file that defines a run, how files compose, and the errors in one."""

@@ -3,6 +3,7 @@
 import os.path
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from fleet2d.bounds import one_line
 from fleet2d.component import base_of, lookup
 from fleet2d.document import Document, Keys, parse_yaml, read_document
 from fleet2d.errors import ScenarioError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 BUNDLED = Path(__file__).parent / "bundled"
 ENTRIES = ("users", "robots", "objects", "algorithms", "metrics", "expect")
@@ -30,9 +31,9 @@ def compose(
     overrides: Iterable[str] = (),
     settings: Mapping[Keys, Any] | None = None,
 ) -> Document:
-    """Compose a scenario from a file (None: the bundled base) or a mapping, and what changes it.
+    """Compose a scenario from a file (None: the bundled base) or a mapping, and overrides of it.
 
-    Mappings merge, everything else is replaced. Where a ``type`` changes, the fields of the old
+    Mappings are merged, all other values replaced. Where a ``type`` changes, the fields of the old
     type are dropped. All overrides and settings are one change, applied after the files.
 
     Args:
@@ -47,22 +48,20 @@ def compose(
     changes = [_read_override(text) for text in overrides]
     for keys, value in (settings or {}).items():
         changes.append(assignment(keys, value, f"argument {keys[-1]}={value!r}"))
-    return changed(document, changes)
+    return apply_changes(document, changes)
 
 
-def changed(document: Document, changes: Sequence[Document]) -> Document:
+def apply_changes(document: Document, changes: Sequence[Document]) -> Document:
     """Return a composed scenario with changes applied as one; the document is not modified.
 
     Args:
         document: A scenario as `compose` returns it.
-        changes: Changes, each on the one before; `assignment` makes one.
+        changes: Changes, each applied to the one before; see `assignment`.
 
     Raises:
-        ScenarioError: A change deletes or reaches into an entry that isn't there.
+        ScenarioError: A change deletes an unknown entry, or sets a key in one.
     """
-    change = Document()
-    for single in changes:
-        change = merge(change, single)
+    change = reduce(merge, changes, Document())
     _refuse_unknown_deletions(document, change)
     _refuse_unknown_entries(document, change, changes)
     document = merge(document, change)
@@ -70,14 +69,14 @@ def changed(document: Document, changes: Sequence[Document]) -> Document:
     return document
 
 
-def merge(below: Document, above: Document) -> Document:
-    """Return ``below`` changed by ``above``; neither is modified."""
-    merger = _Merger(dict(below.places), above.places)
-    return Document(merger.merge(below.data, above.data, ()), merger.places)
+def merge(base: Document, change: Document) -> Document:
+    """Return ``base`` with ``change`` applied; neither is modified."""
+    merger = _Merger(dict(base.places), change.places)
+    return Document(merger.merge(base.data, change.data, ()), merger.places)
 
 
 def slot_kind(keys: Keys) -> str | None:
-    """Return the kind of component that is configured at a key path, if one is.
+    """Return the kind of component that is configured at a key path, None if there is none.
 
     >>> slot_kind(("users", "ana")), slot_kind(("simulation",))
     ('behavior', None)
@@ -90,15 +89,12 @@ def bundled_path(name: str) -> Path:
     """Return the file of a bundled scenario.
 
     Raises:
-        ScenarioError: there is none of that name; the message lists them.
+        ScenarioError: there is no such file; the message lists all names.
     """
     path = BUNDLED / f"{name}.yaml"
     if not path.is_file():
-        known = sorted(p.stem for p in BUNDLED.glob("*.yaml"))
-        raise ScenarioError(
-            f"no scenario {name!r} is bundled{did_you_mean(name, known)} There are: "
-            f"{', '.join(known) or 'none'}"
-        )
+        names = sorted(p.stem for p in BUNDLED.glob("*.yaml"))
+        raise ScenarioError(f"no scenario {name!r} is bundled{suggest(name, names)}")
     return path
 
 
@@ -111,10 +107,10 @@ def _load(
     else:
         bundled = str(source).removeprefix("bundled:")
         path = folder / source if bundled == str(source) else bundled_path(bundled)
-        shown = os.path.normpath(path) if bundled == str(source) else str(source)
+        title = os.path.normpath(path) if bundled == str(source) else str(source)
         if path.resolve() in chain:
-            raise ScenarioError(f"{shown} extends itself: {_chain(chain, path)}")
-        document = read_document(path, shown)
+            raise ScenarioError(f"{title} extends itself: {_chain(chain, path)}")
+        document = read_document(path, title)
         folder, chain = path.parent, (*chain, path.resolve())
     extended = document.data.pop("extends", None) or []
     parents = extended if isinstance(extended, list) else [extended]
@@ -125,9 +121,9 @@ def _load(
                 raise ScenarioError(f"found {parent}; the path of a YAML file is wanted")
             result = merge(result, _load(str(parent), folder, chain))
     except ScenarioError as error:
-        where = document.place(("extends",))
-        raise ScenarioError(f"{where}{': ' * bool(where)}extends: {error}") from error
-    # Another scenario's name isn't this one's: runs are stored and titled by it.
+        place = document.place(("extends",))
+        raise ScenarioError(f"{place}{': ' * bool(place)}extends: {error}") from error
+    # A scenario doesn't inherit the name of the one that it extends: runs are stored under it.
     result.places.pop(("name",), None)
     result.data.pop("name", None)
     _refuse_unknown_deletions(result, document)
@@ -142,22 +138,21 @@ def _chain(chain: tuple[Path, ...], last: Path) -> str:
 def _read_override(text: str) -> Document:
     key, equals, value = text.partition("=")
     keys = tuple(key.strip().split("."))
-    shown = f"override {(text if len(text) <= 100 else one_line(text, 100))!r}"
+    place = f"override {(text if len(text) <= 100 else one_line(text, 100))!r}"
     if not equals:
-        raise ScenarioError(f"{shown}: there is no '=' in it; write key.path=value")
+        raise ScenarioError(f"{place}: there is no '=' in it; write key.path=value")
     if not all(keys):
-        raise ScenarioError(f"{shown}: a part of its key is empty")
-    # '#d62728' is a colour that a shell user has no reason to quote twice, not a comment.
-    parsed = (
-        value.strip() if value.lstrip().startswith("#") else parse_yaml(value, Path.cwd(), shown)
-    )
+        raise ScenarioError(f"{place}: a part of its key is empty")
+    # '#d62728' is a colour, not a comment, although it is not quoted within the value.
+    is_color = value.lstrip().startswith("#")
+    content = value.strip() if is_color else parse_yaml(value, Path.cwd(), place)
     if not value.strip():
-        raise ScenarioError(f"{shown}: no value; write {key}=null to delete an entry")
-    return assignment(keys, parsed, shown)
+        raise ScenarioError(f"{place}: no value; write {key}=null to delete an entry")
+    return assignment(keys, content, place)
 
 
 def assignment(keys: Keys, value: Any, place: str) -> Document:
-    """Return the change that sets one key; `place` is where messages say it is written.
+    """Return the change that sets one key; messages say that it is written at `place`.
 
     >>> assignment(("simulation", "seed"), 4, "home.yaml:3").data
     {'simulation': {'seed': 4}}
@@ -170,39 +165,39 @@ def assignment(keys: Keys, value: Any, place: str) -> Document:
 class _Merger:
     """Merges two trees of plain data, and the places of their values."""
 
-    def __init__(self, places: dict[Keys, str], above: dict[Keys, str]) -> None:
+    def __init__(self, places: dict[Keys, str], new_places: dict[Keys, str]) -> None:
         self.places = places
-        self.above = above
+        self.new_places = new_places
 
-    def merge(self, below: Any, above: Any, keys: Keys) -> Any:
+    def merge(self, base: Any, change: Any, keys: Keys) -> Any:
         kind = slot_kind(keys)
         if kind:
-            below, above = _unfold(below, above), _unfold(above, below)
-        if not isinstance(above, Mapping):
-            return self.replace(above, keys)
-        if isinstance(below, list) and above and all(key.isdigit() for key in above):
-            return self.merge_entries(below, above, keys)
-        if not isinstance(below, Mapping):
-            return self.replace(above, keys)
+            base, change = _unfold(base, change), _unfold(change, base)
+        if not isinstance(change, Mapping):
+            return self.replace(change, keys)
+        if isinstance(base, list) and change and all(key.isdigit() for key in change):
+            return self.merge_entries(base, change, keys)
+        if not isinstance(base, Mapping):
+            return self.replace(change, keys)
         if kind:
-            below = self.without_old_type(kind, below, above, keys)
-        result = dict(below)
-        for key, value in above.items():
+            base = self.without_old_fields(kind, base, change, keys)
+        result = dict(base)
+        for key, value in change.items():
             inner = (*keys, str(key))
-            known = key in result
+            is_old = key in result
             result[key] = (
-                self.merge(result[key], value, inner) if known else self.replace(value, inner)
+                self.merge(result[key], value, inner) if is_old else self.replace(value, inner)
             )
         return result
 
-    def merge_entries(self, below: list[Any], above: Mapping[str, Any], keys: Keys) -> list[Any]:
-        """Change single entries of a list: `behaviors.0.dwell=5 min`."""
-        result = list(below)
-        for key, value in above.items():
+    def merge_entries(self, base: list[Any], change: Mapping[str, Any], keys: Keys) -> list[Any]:
+        """Return a list with some entries changed, as by `behaviors.0.dwell=5 min`."""
+        result = list(base)
+        for key, value in change.items():
             inner = (*keys, key)
             if int(key) >= len(result):
                 raise ScenarioError(
-                    f"{self.above.get(inner)}: there is no {'.'.join(inner)}: the list has "
+                    f"{self.new_places.get(inner)}: there is no {'.'.join(inner)}: the list has "
                     f"{len(result)} entries, and the first is 0"
                 )
             result[int(key)] = self.merge(result[int(key)], value, inner)
@@ -211,47 +206,47 @@ class _Merger:
     def replace(self, value: Any, keys: Keys) -> Any:
         self.forget(keys)
         depth = len(keys)
-        # Its own place or the nearest around it; none: a value from Python.
-        around = (self.above.get(keys[:n]) for n in range(depth, -1, -1))
-        self.places[keys] = next((place for place in around if place is not None), "")
-        self.places.update({k: place for k, place in self.above.items() if k[:depth] == keys})
+        # The place of the key or the nearest key around it; none: a value from Python.
+        nearest = (self.new_places.get(keys[:n]) for n in range(depth, -1, -1))
+        self.places[keys] = next((place for place in nearest if place is not None), "")
+        self.places.update({k: place for k, place in self.new_places.items() if k[:depth] == keys})
         return value
 
     def forget(self, keys: Keys) -> None:
         for inner in [k for k in self.places if k[: len(keys)] == keys]:
             del self.places[inner]
 
-    def without_old_type(
-        self, kind: str, below: Mapping[str, Any], above: Mapping[str, Any], keys: Keys
+    def without_old_fields(
+        self, kind: str, base: Mapping[str, Any], change: Mapping[str, Any], keys: Keys
     ) -> dict[str, Any]:
-        """Drop what only the type below understands, if the mapping above changes the type."""
-        dropped: set[str] = set()
-        if "behaviors" in above and "type" in below:  # from the short form to the long one
-            dropped = {"type", *_own_fields(kind, below["type"])}
-        elif "type" in above:
-            # An algorithm or a metric without a type is called like its type.
-            old = below.get("type", keys[-1])
-            if not _same_type(kind, old, above["type"]):
-                dropped = {"behaviors", *_own_fields(kind, old)}
-        for key in dropped & below.keys():
+        """Return ``base`` without the fields of its type, if the change selects another type."""
+        old_fields: set[str] = set()
+        if "behaviors" in change and "type" in base:  # from the short form to the long one
+            old_fields = {"type", *_type_fields(kind, base["type"])}
+        elif "type" in change:
+            # The type of an algorithm or a metric may be given by its name.
+            old = base.get("type", keys[-1])
+            if not _same_type(kind, old, change["type"]):
+                old_fields = {"behaviors", *_type_fields(kind, old)}
+        for key in old_fields & base.keys():
             self.forget((*keys, key))
-        return {key: value for key, value in below.items() if key not in dropped}
+        return {key: value for key, value in base.items() if key not in old_fields}
 
 
 def _unfold(value: Any, other: Any) -> Any:
-    """Write a bare type name as a mapping where it meets a mapping."""
+    """Return a bare type name as a mapping if the other value is a mapping."""
     return {"type": value} if isinstance(value, str) and isinstance(other, Mapping) else value
 
 
 def _same_type(kind: str, one: Any, other: Any) -> bool:
     try:
         return bool(one == other or lookup(kind, one) is lookup(kind, other))
-    except (ScenarioError, TypeError):  # validation will say what is wrong with it
+    except (ScenarioError, TypeError):  # validation will report it
         return False
 
 
-def _own_fields(kind: str, name: Any) -> set[str]:
-    """Return the fields that a type has beyond those of every type of its kind."""
+def _type_fields(kind: str, name: Any) -> set[str]:
+    """Return the fields of a type that its kind's base class doesn't have."""
     try:
         cls = lookup(kind, name)
     except (ScenarioError, TypeError):
@@ -259,34 +254,32 @@ def _own_fields(kind: str, name: Any) -> set[str]:
     return set(cls.model_fields) - set(base_of(cls).model_fields)
 
 
-def _refuse_unknown_deletions(below: Document, above: Document) -> None:
+def _refuse_unknown_deletions(base: Document, change: Document) -> None:
     for section in ENTRIES:
-        entries, known = above.data.get(section), below.data.get(section) or {}
+        entries, names = change.data.get(section), base.data.get(section) or {}
         for name, value in entries.items() if isinstance(entries, Mapping) else ():
-            if value is None and name not in known:
-                where = above.place((section, name))
+            if value is None and name not in names:
+                place = change.place((section, name))
                 raise ScenarioError(
-                    f"{where}{': ' * bool(where)}{section}.{name}: null deletes an entry, and "
-                    f"there is none of this name{did_you_mean(name, known)} There are: "
-                    f"{', '.join(known) or 'none'}"
+                    f"{place}{': ' * bool(place)}{section}.{name}: null deletes an entry, and "
+                    f"there is none of this name{suggest(name, names)}"
                 )
 
 
-def _refuse_unknown_entries(below: Document, change: Document, changes: Sequence[Document]) -> None:
-    """Refuse to reach inside an entry that isn't there, unless the change says what it is."""
-    reached = {keys[:2]: single for single in changes for keys in single.places if len(keys) > 2}
-    whole = {max(single.places, key=len) for single in changes if single.places}
-    for (section, name), single in reached.items():
-        if section not in ENTRIES or (section, name) in whole or (section,) in whole:
+def _refuse_unknown_entries(base: Document, change: Document, changes: Sequence[Document]) -> None:
+    """Refuse to set a key of an unknown entry, unless the change gives its type, too."""
+    parts = {keys[:2]: part for part in changes for keys in part.places if len(keys) > 2}
+    set_keys = {max(part.places, key=len) for part in changes if part.places}
+    for (section, name), part in parts.items():
+        if section not in ENTRIES or (section, name) in set_keys or (section,) in set_keys:
             continue
-        known = [k for k, v in (below.data.get(section) or {}).items() if v is not None]
+        names = [k for k, v in (base.data.get(section) or {}).items() if v is not None]
         entry = change.data[section][name]
-        typed = isinstance(entry, Mapping) and entry.keys() & {"type", "behaviors"}
-        if name not in known and not typed:
+        has_type = isinstance(entry, Mapping) and entry.keys() & {"type", "behaviors"}
+        if name not in names and not has_type:
             raise ScenarioError(
-                f"{single.place((section, name))}: there is no {section}.{name}"
-                f"{did_you_mean(name, known)} There are: {', '.join(known) or 'none'}; to add one "
-                f"give {section}.{name}.type, too"
+                f"{part.place((section, name))}: there is no {section}.{name}"
+                f"{suggest(name, names)}; to add one give {section}.{name}.type, too"
             )
 
 

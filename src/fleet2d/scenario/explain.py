@@ -1,4 +1,4 @@
-"""Say in plain words what is wrong with a scenario: where, what was found, what is wanted."""
+"""Messages about wrong scenarios: where, what was found, and what is wanted."""
 
 import re
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.problems import Location, did_you_mean, shown
 from fleet2d.scenario.compose import slot_kind
 
-_WANTED = {
+_EXPECTED = {
     "int": "a whole number",
     "float": "a number",
     "decimal": "a number",
@@ -39,11 +39,11 @@ _WANTED = {
     "too_short": "a list of at least {min_length}",
     "too_long": "a list of at most {max_length}",
 }
-"""What is wanted, by the beginning of pydantic's name for the error; the first that fits."""
+"""The expected value, by the beginning of pydantic's name for the error; the first match counts."""
 
 
 def explain(error: ValidationError, document: Document) -> ScenarioError:
-    """Turn a validation error into one line per key: where it is written, its path, what is wrong.
+    """Return an error with one line per key: where it is written, its path, and what is wrong.
 
     >>> from fleet2d.scenario.model import SimulationSettings
     >>> document = Document({"duration": "1 h", "seed": "x"}, {("seed",): "home.yaml:3"})
@@ -54,43 +54,43 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     home.yaml:3: seed: found 'x'; a whole number is wanted
     """
     problems: dict[tuple[str, str], list[ErrorDetails]] = {}
-    told: set[str] = set()
+    groups: set[str] = set()
     lines = error.errors(include_url=False)
     for line in lines:
         # A list is also called too short when all of its entries are wrong.
         depth = len(line["loc"])
-        inner = [other for other in lines if other["loc"][:depth] == line["loc"]]
-        if line["type"] == "too_short" and len(inner) > 1:
+        entries = [entry for entry in lines if entry["loc"][:depth] == line["loc"]]
+        if line["type"] == "too_short" and len(entries) > 1:
             continue
-        location = _written_location(line, document.data)
-        once = line.get("ctx", {}).get("once")
-        if once and once in told:
+        location = _location_in(line, document.data)
+        group = line.get("ctx", {}).get("group")
+        if group and group in groups:
             continue
-        told.add(once or "")
-        line["msg"] += _whose_key(line, location, document.data)
+        groups.add(group or "")
+        line["msg"] += _type_with_key(line, location, document.data)
         key = (document.place(location), one_line(".".join(map(str, location)), 200))
         problems.setdefault(key, []).append(line)
     return ScenarioError(
         "\n".join(
-            ": ".join(part for part in (*where, describe(*found)) if part)
-            for where, found in problems.items()
+            ": ".join(part for part in (place, key, describe(*details)) if part)
+            for (place, key), details in problems.items()
         )
     )
 
 
 def describe(*lines: ErrorDetails) -> str:
-    """Say what is wrong with one value: a line for each arm of its union, which often agree."""
+    """Return what is wrong with one value, from the errors of all types that it may have."""
     texts: list[str] = []
-    wanted: list[str] = []
+    expected: list[str] = []
     choices: list[str] = []
     for line in lines:
         kind, context = line["type"], line.get("ctx", {})
-        text = next((text for name, text in _WANTED.items() if kind.startswith(name)), None)
+        text = next((text for name, text in _EXPECTED.items() if kind.startswith(name)), None)
         if text is not None:
             limits = {k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()}
-            wanted.append(text.format(**limits))
-            found = line["input"]
-            if kind == "literal_error" and isinstance(found, str):
+            expected.append(text.format(**limits))
+            value = line["input"]
+            if kind == "literal_error" and isinstance(value, str):
                 choices += re.findall(r"'([^']*)'", context["expected"])
         elif kind == "missing":
             texts.append("missing, and has no default")
@@ -98,26 +98,26 @@ def describe(*lines: ErrorDetails) -> str:
             texts.append(str(context["error"]))
         else:
             texts.append(line["msg"])
-    if wanted:
-        *first, last = dict.fromkeys(wanted)
+    if expected:
+        *first, last = dict.fromkeys(expected)
         joint = ", or " if any("," in text for text in first) else " or "
-        hint = did_you_mean(found, choices) if choices else ""
+        hint = did_you_mean(value, choices) if choices else ""
         hint = hint if hint.endswith("?") else ";"
-        listed = joint.join([*(text.rstrip(",") for text in first), last])
-        texts.insert(0, f"found {_found(found)}{hint} {listed} is wanted")
+        alternatives = joint.join([*(text.rstrip(",") for text in first), last])
+        texts.insert(0, f"found {_quote(value)}{hint} {alternatives} is wanted")
     return "; or ".join(dict.fromkeys(texts))
 
 
-def _whose_key(line: ErrorDetails, location: Location, data: Any) -> str:
-    """Say for an unknown key of a component which types know it, and how to get there."""
-    *around, key = map(str, location or ("",))
-    kind = slot_kind(tuple(around))
+def _type_with_key(line: ErrorDetails, location: Location, data: Any) -> str:
+    """Return which types have an unknown key of a component, and what to do; empty if none has."""
+    *parents, key = map(str, location or ("",))
+    kind = slot_kind(tuple(parents))
     if line["type"] != "unknown_key" or kind is None:
         return ""
-    for outer in location[:-1]:
-        data = data[outer]
+    for parent in location[:-1]:
+        data = data[parent]
     types = {name: cls for name, cls in components(kind).items() if key in cls.model_fields}
-    path = ".".join(around)
+    path = ".".join(parents)
     behaviors = data.get("behaviors") if isinstance(data, Mapping) else None
     for number, behavior in enumerate(behaviors if isinstance(behaviors, list) else ()):
         if (behavior.get("type") if isinstance(behavior, Mapping) else behavior) in types:
@@ -127,7 +127,7 @@ def _whose_key(line: ErrorDetails, location: Location, data: Any) -> str:
     return f". {key!r} is a key of {', '.join(types)}: give {path}.type, too"
 
 
-def _found(value: Any) -> str:
+def _quote(value: Any) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Mapping):
@@ -136,13 +136,13 @@ def _found(value: Any) -> str:
     return shown(value)
 
 
-def _written_location(line: ErrorDetails, data: Any) -> Location:
-    """Cut a location to what is in the data: pydantic adds the arm of a union, and '[key]'."""
+def _location_in(line: ErrorDetails, data: Any) -> Location:
+    """Return a location without what pydantic adds: the member of a union, and '[key]'."""
     location = line["loc"]
     for depth, key in enumerate(location):
         try:
             data = data[key]
         except (LookupError, TypeError):
-            missing = line["type"] == "missing" and depth == len(location) - 1
-            return location[: depth + missing]
+            is_missing = line["type"] == "missing" and depth == len(location) - 1
+            return location[: depth + is_missing]
     return location

@@ -27,7 +27,7 @@ from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interventions.script import Entry
 from fleet2d.metrics.metric import Metric
-from fleet2d.problems import did_you_mean, problem, problem_at
+from fleet2d.problems import problem, problem_at, suggest
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.explain import explain
 from fleet2d.short_form import ShortForm
@@ -38,7 +38,7 @@ from fleet2d.units import Duration, PositiveDuration, format_duration, micros
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 
 
-def _local_time(value: Any) -> Any:
+def _parse_local_time(value: Any) -> Any:
     """Refuse what pydantic would read as seconds since 1970, and time zones."""
     if not isinstance(value, str | date):
         raise problem(f"found {value}; a date and time is wanted, like 2026-01-05T08:00")
@@ -50,14 +50,14 @@ def _local_time(value: Any) -> Any:
         ) from None
     if isinstance(moment, datetime) and moment.tzinfo is not None:
         raise problem(
-            f"found {moment.isoformat()}; the clock on the home's wall is wanted, without a time "
-            "zone: a simulated day has 24 hours"
+            f"found {moment.isoformat()}; a local time without a time zone is wanted: a simulated"
+            " day has 24 hours"
         )
     return moment
 
 
-def _named(entries: Any) -> Any:
-    """Refuse names that could not be part of a key path, a file name or a table name."""
+def _check_names(entries: Any) -> Any:
+    """Refuse names that can't be part of a key path, a file name or a table name."""
     if isinstance(entries, Mapping):
         for name in entries:
             if not _NAME.fullmatch(str(name)):
@@ -69,7 +69,7 @@ def _named(entries: Any) -> Any:
     return entries
 
 
-def _typed_by_name(entries: Any) -> Any:
+def _name_as_type(entries: Any) -> Any:
     """Let `ltp_error: {of: ltp}` stand for `ltp_error: {type: ltp_error, of: ltp}`."""
     if not isinstance(entries, Mapping):
         return entries
@@ -79,14 +79,14 @@ def _typed_by_name(entries: Any) -> Any:
     }
 
 
-_Named = BeforeValidator(_named)
-_Typed = BeforeValidator(_typed_by_name)
+_CheckNames = BeforeValidator(_check_names)
+_NameAsType = BeforeValidator(_name_as_type)
 
 
 class SimulationSettings(Settings):
     """When a run starts, how long it lasts, and how fast it goes."""
 
-    start: Annotated[datetime, BeforeValidator(_local_time)] = Field(
+    start: Annotated[datetime, BeforeValidator(_parse_local_time)] = Field(
         default=datetime(2026, 1, 5), description="The home's local time at step 0."
     )
     duration: Duration = Field(
@@ -99,12 +99,12 @@ class SimulationSettings(Settings):
         default=None,
         ge=0,
         lt=2**63,
-        description="All randomness follows from it; null: one is drawn and stored.",
+        description="The seed of all random draws; null: one is drawn and stored.",
     )
     max_span: int | None = Field(
         default=None,
         ge=1,
-        description="The most steps that are computed in one go. It changes no result.",
+        description="The most steps that are computed at once. It changes no result.",
     )
     speedup: float | None = Field(
         default=None,
@@ -114,7 +114,7 @@ class SimulationSettings(Settings):
 
     @model_validator(mode="after")
     def _fits_the_calendar(self) -> Self:
-        # With room for an agenda to look a week back, and a day ahead.
+        # Agendas look a week back and a day ahead.
         if not 1900 <= self.start.year <= 7900:
             raise problem_at(("start",), f"found {self.start}; a year from 1900 to 7900 is wanted")
         return self
@@ -143,37 +143,37 @@ class SimulationSettings(Settings):
 class Scenario(Settings):
     """Everything that defines a run."""
 
-    name: str | None = Field(default=None, description="What this scenario is called in reports.")
+    name: str | None = Field(default=None, description="The name of this scenario in reports.")
     simulation: SimulationSettings
     floorplan: Annotated[FloorPlanSource, OneOf("floorplan")] = Field(
         description="The home's walls."
     )
-    users: Annotated[dict[str, Annotated[User, ShortForm()]], _Named] = Field(
+    users: Annotated[dict[str, Annotated[User, ShortForm()]], _CheckNames] = Field(
         default={}, description="The people, by name."
     )
-    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _Named] = Field(
+    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _CheckNames] = Field(
         default={}, description="The robots, by name."
     )
-    objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], _Named] = Field(
-        default={}, description="Doors and what senses, by name."
+    objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], _CheckNames] = Field(
+        default={}, description="Doors and sensors, by name."
     )
     changes: tuple[HomeChange, ...] = Field(
-        default=(), description="What changes in the home during the run, and when."
+        default=(), description="Changes of the home during the run, and when they happen."
     )
     script: tuple[Entry, ...] = Field(
         default=(),
-        description="What is done to people, robots and the home from outside, and when.",
+        description="Interventions on people, robots and the home, and when they happen.",
     )
     sight: SightSettings = Field(
-        default=SightSettings(), description="How it is worked out what is in view."
+        default=SightSettings(), description="How to compute what is in view."
     )
-    algorithms: Annotated[dict[str, Annotated[Algorithm, OneOf("algorithm")]], _Named, _Typed] = (
-        Field(default={}, description="What computes during the run, by name.")
+    algorithms: Annotated[
+        dict[str, Annotated[Algorithm, OneOf("algorithm")]], _CheckNames, _NameAsType
+    ] = Field(default={}, description="The algorithms that run during the simulation, by name.")
+    metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _CheckNames, _NameAsType] = (
+        Field(default={}, description="The metrics that are recorded, by name.")
     )
-    metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _Named, _Typed] = Field(
-        default={}, description="What is only recorded, by name."
-    )
-    expect: Annotated[dict[str, ExpectationField], _Named] = Field(
+    expect: Annotated[dict[str, ExpectationField], _CheckNames] = Field(
         default={}, description="What must hold over the run, by name."
     )
     artifacts: ArtifactSettings = Field(
@@ -184,26 +184,25 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        taken: dict[str, str] = {}
+        nouns: dict[str, str] = {}
         for section, noun in (("users", "a user"), ("robots", "a robot"), ("objects", "an object")):
             for name in getattr(self, section):
-                if name in taken:
+                if name in nouns:
                     raise problem_at(
-                        (section, name), f"there is {taken[name]} named {name!r} already"
+                        (section, name), f"there is {nouns[name]} named {name!r} already"
                     )
-                taken[name] = noun
+                nouns[name] = noun
         return self
 
     @model_validator(mode="after")
-    def _users_are_there(self) -> Self:
+    def _behaviors_name_users(self) -> Self:
         for robot, entity in self.robots.items():
             for i, behavior in enumerate(entity.behaviors):
                 for user in behavior.about():
                     if user not in self.users:
                         raise problem_at(
                             ("robots", robot, "behaviors", i),
-                            f"there is no user {user!r}{did_you_mean(user, self.users)}"
-                            f" There are: {', '.join(self.users) or 'none'}",
+                            f"there is no user {user!r}{suggest(user, self.users)}",
                         )
         return self
 
@@ -213,11 +212,11 @@ class Scenario(Settings):
         return self._folder
 
     def where(self, path: str) -> str:
-        """Return where a key was written, or the nearest key around it: 'home.yaml:15', else ''.
+        """Return where a key is written, or the nearest key around it: 'home.yaml:15', else ''.
 
         Args:
-            path: the key's path as messages write it, like 'users.ana.days.0.items.1.place'. In an
-                entry with the short form, 'behaviors.0' may be in it.
+            path: the key's path as in messages, like 'users.ana.days.0.items.1.place'; for a short
+                form with or without 'behaviors.0'.
 
         Example:
             >>> load_scenario("users.ana.speed=0.9").where("users.ana.speed")
@@ -249,7 +248,8 @@ def load_scenario(
         settings: keys of ``simulation`` (``seed=4``) or whole sections (``name="night"``).
 
     Raises:
-        ScenarioError: what is wrong, where it is written, and what is wanted; a line per problem.
+        ScenarioError: the scenario is not valid; a line per problem says what is wrong, where it
+            is written, and what is wanted.
     """
     folder = Path.cwd()
     if isinstance(source, str) and "=" in source and not _is_path(source):
@@ -284,7 +284,7 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
 
 
 def _is_path(text: str) -> bool:
-    """Whether there is a file of that name; an override may be too long for one."""
+    """Whether there is a file of that name; an override may be too long for a file name."""
     try:
         return Path(text).exists()
     except (OSError, ValueError):
@@ -296,7 +296,5 @@ def _key(name: str) -> tuple[str, ...]:
         return ("simulation", name)
     if name not in Scenario.model_fields:
         known = [*SimulationSettings.model_fields, *Scenario.model_fields]
-        raise ScenarioError(
-            f"unknown argument {name!r}{did_you_mean(name, known)} Known are: {', '.join(known)}"
-        )
+        raise ScenarioError(f"unknown argument {name!r}{suggest(name, known)}")
     return (name,)

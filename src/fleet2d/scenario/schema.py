@@ -1,4 +1,4 @@
-"""What a scenario can say: a JSON Schema for editors, a list of components for people."""
+"""The format of scenarios: a JSON Schema for editors, a list of components for people."""
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -15,14 +15,14 @@ from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
 
 
-class _Writer(GenerateJsonSchema):
-    """Writes defaults as a scenario does: '1 min', not pydantic's 'PT1M'."""
+class _SchemaGenerator(GenerateJsonSchema):
+    """Generates schemas with defaults as scenarios write them: '1 min', not pydantic's 'PT1M'."""
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-        """Dump the default as the field's own type does."""
+        """Return the schema of a field with its default dumped as the field's type does."""
         result = super().default_schema(schema)
         if "default" in result:
-            # What can't be dumped alone stays as it is, such as a default that is yet to be parsed.
+            # A default that can't be dumped stays as it is, such as one that is yet to be parsed.
             with suppress(SchemaError, PydanticSerializationError):
                 default = self.get_default_value(schema)
                 result["default"] = SchemaSerializer(schema).to_python(default, mode="json")
@@ -31,7 +31,7 @@ class _Writer(GenerateJsonSchema):
 
 @dataclass(frozen=True)
 class FieldDescription:
-    """One configuration key of a component; ``default`` is None where it has to be given."""
+    """One configuration key of a component; ``default`` is None if the key is required."""
 
     name: str
     type: str
@@ -52,20 +52,20 @@ class ComponentDescription:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
-    found = {kind: components(kind) for kind in PACKAGES}
+    registry = {kind: components(kind) for kind in PACKAGES}
     models: list[type[BaseModel]] = [
         Scenario,
-        *(cls for classes in found.values() for cls in classes.values()),
+        *(cls for classes in registry.values() for cls in classes.values()),
     ]
-    references, written = models_json_schema(
-        [(model, "validation") for model in models], schema_generator=_Writer
+    references, definitions = models_json_schema(
+        [(model, "validation") for model in models], schema_generator=_SchemaGenerator
     )
-    definitions = written["$defs"]
+    definitions = definitions["$defs"]
     kinds = {
         kind: {
             name: definitions[_key(references[cls, "validation"])] for name, cls in classes.items()
         }
-        for kind, classes in found.items()
+        for kind, classes in registry.items()
     }
     acts = kinds.pop("intervention")
     for cls in verbs().values():
@@ -79,12 +79,12 @@ def schema() -> dict[str, Any]:
     for kind, types in kinds.items():
         for name, definition in types.items():
             properties = definition.get("properties", {})
-            others = aliases(kind, name)
-            selects = {"enum": [name, *others]} if others else {"const": name}
-            definition.update(title=name, properties={"type": selects, **properties})
-        definitions[kind] = {"anyOf": _any_of(kind, references, found[kind])}
+            names = [name, *aliases(kind, name)]
+            type_schema = {"enum": names} if names[1:] else {"const": name}
+            definition.update(title=name, properties={"type": type_schema, **properties})
+        definitions[kind] = {"anyOf": _any_of(kind, references, registry[kind])}
     definitions = {
-        key: _without_required(_expanded(value, kinds)) for key, value in definitions.items()
+        key: _without_required(_expand(value, kinds)) for key, value in definitions.items()
     }
     result = definitions.pop(_key(references[Scenario, "validation"]))
     _allow_composition(result["properties"])
@@ -98,15 +98,15 @@ def schema() -> dict[str, Any]:
 def _by_verb(
     entry: Mapping[str, Any], verb: str, subject: str, act: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return an entry of a script as it is written: its verb, then the rest of what is done."""
-    when = {key: value for key, value in entry["properties"].items() if key != "act"}
-    rest = {key: value for key, value in act["properties"].items() if key != subject}
+    """Return the schema of an entry of a script: its verb, the time, and the other keys."""
+    times = {key: value for key, value in entry["properties"].items() if key != "act"}
+    details = {key: value for key, value in act["properties"].items() if key != subject}
     required = [key for key in act.get("required", ()) if key != subject]
     return {
         "title": verb,
         "description": act.get("description", ""),
         "type": "object",
-        "properties": {verb: act["properties"][subject], **when, **rest},
+        "properties": {verb: act["properties"][subject], **times, **details},
         "required": [verb, *required],
         "additionalProperties": False,
     }
@@ -119,28 +119,28 @@ def _key(reference: Mapping[str, Any]) -> str:
 def _any_of(
     kind: str, references: Mapping[Any, Any], classes: Mapping[str, type[Component]]
 ) -> list[dict[str, Any]]:
-    """List the ways to write a component: each type, a bare name, and a user's own."""
-    typed = ({**references[cls, "validation"], "required": ["type"]} for cls in classes.values())
-    return [*typed, *_untold(kind, classes)]
+    """Return the ways to write a component: each type, a bare name, and a user's own."""
+    types = ({**references[cls, "validation"], "required": ["type"]} for cls in classes.values())
+    return [*types, *_forms_without_fields(kind, classes)]
 
 
-def _untold(kind: str, names: Iterable[str]) -> list[dict[str, Any]]:
-    """List the ways to write a component of which the schema has no fields to tell."""
-    own = {"type": "string", "pattern": ":", "description": f"your own {kind}: module:Class"}
+def _forms_without_fields(kind: str, names: Iterable[str]) -> list[dict[str, Any]]:
+    """Return the ways to write a component whose fields the schema doesn't describe."""
+    own_class = {"type": "string", "pattern": ":", "description": f"your own {kind}: module:Class"}
     return [
         {"type": "string", "enum": [n for name in names for n in (name, *aliases(kind, name))]},
-        {"type": "object", "properties": {"type": own}, "required": ["type"]},
-        own,
+        {"type": "object", "properties": {"type": own_class}, "required": ["type"]},
+        own_class,
     ]
 
 
-def _expanded(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Replace the marks that `OneOf` and `ShortForm` leave in the schema of their fields."""
+def _expand(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Return a schema with the marks of `OneOf` and `ShortForm` replaced by types."""
     if isinstance(value, list):
-        return [_expanded(item, kinds) for item in value]
+        return [_expand(item, kinds) for item in value]
     if not isinstance(value, dict):
         return value
-    result = {k: _expanded(v, kinds) for k, v in value.items() if k != "x-short-form"}
+    result = {k: _expand(v, kinds) for k, v in value.items() if k != "x-short-form"}
     if (kind := result.pop("x-kind", None)) is not None:
         result["$ref"] = f"#/$defs/{kind}"
     if (mark := value.get("x-short-form")) is not None:
@@ -152,31 +152,31 @@ def _expanded(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
             }
             for definition in kinds[mark["kind"]].values()
         ]
-        result["anyOf"] += _untold(mark["kind"], kinds[mark["kind"]])
+        result["anyOf"] += _forms_without_fields(mark["kind"], kinds[mark["kind"]])
     return result
 
 
 def _allow_composition(properties: dict[str, Any]) -> None:
-    """Add what a file may say and a composed scenario can't: 'extends', deletion by null."""
+    """Add what a file may contain, unlike a composed scenario: 'extends', and deletion by null."""
     path = {"type": "string", "description": "a YAML file beside this one, or 'bundled:NAME'"}
     properties["extends"] = {
-        "description": "What this file builds on.",
+        "description": "The scenarios that this file extends.",
         "anyOf": [path, {"type": "array", "items": path}],
     }
-    deleted = {"type": "null", "description": "null deletes an entry of the extended file"}
+    deletion = {"type": "null", "description": "null deletes an entry of the extended file"}
     for section in ENTRIES:
         entry = properties[section]["additionalProperties"]
-        forms = [entry, {"type": "object", "not": {"required": ["type"]}}, deleted]
+        forms = [entry, {"type": "object", "not": {"required": ["type"]}}, deletion]
         if section in ("users", "robots"):  # only algorithms and metrics are typed by their name
             del forms[1]
         properties[section]["additionalProperties"] = {"anyOf": forms}
 
 
 def describe_components() -> list[ComponentDescription]:
-    """Describe all that a scenario is made of: fields, their units and defaults.
+    """Return descriptions of all parts of a scenario: fields, their units and defaults.
 
-    First the sections that every scenario has (kind `scenario`, named as in Python), then every
-    registered type, and what their fields hold (kind `part`).
+    First the sections of every scenario (kind `scenario`, with their names in Python), then every
+    registered type, and the groups of keys in their fields (kind `part`).
     """
     types = {(kind, name): cls for kind in PACKAGES for name, cls in components(kind).items()}
     sections = _parts_of(Scenario)
@@ -190,11 +190,11 @@ def describe_components() -> list[ComponentDescription]:
 
 def _parts_of(cls: type[Settings]) -> list[type[Settings]]:
     """Return the groups of keys below a class that no `type` selects, outermost first."""
-    found: list[type[Settings]] = []
+    parts: list[type[Settings]] = []
     for field in cls.model_fields.values():
         for part in _settings_in(field.annotation):
-            found += [part, *_parts_of(part)]
-    return list(dict.fromkeys(found))
+            parts += [part, *_parts_of(part)]
+    return list(dict.fromkeys(parts))
 
 
 def _settings_in(annotation: Any) -> list[type[Settings]]:
@@ -204,8 +204,8 @@ def _settings_in(annotation: Any) -> list[type[Settings]]:
 
 
 def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription:
-    written = cls.model_json_schema(schema_generator=_Writer)
-    properties, needed = written.get("properties", {}), written.get("required", ())
+    schema = cls.model_json_schema(schema_generator=_SchemaGenerator)
+    properties, required = schema.get("properties", {}), schema.get("required", ())
     return ComponentDescription(
         kind,
         name,
@@ -215,7 +215,7 @@ def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription
             FieldDescription(
                 key,
                 _type_of(value),
-                None if key in needed else _shown(value.get("default")),
+                None if key in required else _default_text(value.get("default")),
                 cls.model_fields[key].description or "",
             )
             for key, value in properties.items()
@@ -224,16 +224,16 @@ def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription
 
 
 def _type_of(value: Mapping[str, Any]) -> str:
-    """Name the type of a JSON Schema as a person would."""
+    """Return the type of a JSON Schema in words."""
     if mark := value.get("x-quantity", value.get("x-kind")):
         return str(mark)
     if "const" in value or "enum" in value:
         return " | ".join(map(str, value.get("enum", [value.get("const")])))
     if "$ref" in value:
         return str(value["$ref"]).rpartition("/")[2]
-    arms = value.get("anyOf", value.get("oneOf"))
-    if arms:
-        return " | ".join(dict.fromkeys(_type_of(arm) for arm in arms))
+    options = value.get("anyOf", value.get("oneOf"))
+    if options:
+        return " | ".join(dict.fromkeys(_type_of(option) for option in options))
     if "prefixItems" in value:
         return f"[{', '.join(map(_type_of, value['prefixItems']))}]"
     if value.get("type") == "array":
@@ -242,19 +242,19 @@ def _type_of(value: Mapping[str, Any]) -> str:
         inner = value.get("additionalProperties")
         return f"mapping to {_type_of(inner if isinstance(inner, Mapping) else {})}"
     words = {"integer": "whole number", "string": "text", "boolean": "true | false"}
-    found = value.get("type", "any")
-    kinds = found if isinstance(found, list) else [found]
+    types = value.get("type", "any")
+    kinds = types if isinstance(types, list) else [types]
     return " | ".join(words.get(kind, str(kind)) for kind in kinds)
 
 
-def _shown(default: Any) -> str:
+def _default_text(default: Any) -> str:
     if isinstance(default, bool) or default is None:
         return {None: "null", True: "true", False: "false"}[default]
     return str(default)
 
 
 def _without_required(value: Any) -> Any:
-    """Drop 'required' except for ``type``: the file that one extends may give the rest."""
+    """Drop 'required' except for ``type``: an extended file may give the other keys."""
     if isinstance(value, list):
         return [_without_required(item) for item in value]
     if not isinstance(value, dict):

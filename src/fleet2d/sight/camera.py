@@ -18,6 +18,7 @@ from fleet2d.units import (
     Share,
     format_duration,
     micros,
+    whole_steps,
 )
 
 # Squares of distances in lattice units stay far inside 64 bits.
@@ -164,12 +165,9 @@ class Camera(Settings):
                 f" {-(-lost_us // step_us) * step_us / 1e6:g} s; choose a multiple"
             )
         near, far = (round(distance * units_per_m) for distance in self.range)
-        period, rest = divmod(step_us if self.period is None else micros(self.period), step_us)
-        if rest:
-            raise ValueError(
-                f"the period of {format_duration(self.period or timedelta())} is no multiple of"
-                f" simulation.step ({step_us / 1e6:g} s): choose a multiple"
-            )
+        period = 1
+        if self.period is not None:
+            period = whole_steps(self.period, step_us, "period", ValueError)
         return Lens(
             near=near,
             far=far,

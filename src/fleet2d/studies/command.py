@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
+from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy
@@ -62,14 +62,14 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.driver import RunOptions, check_study, run_study
     from fleet2d.studies.progress import observing
 
-    with restricting(trust, trust_dir):
+    with restrict_to(trust, trust_dir):
         checked = check_study(source)
         if dry_run:
             _print_plan(checked, workers)
             return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    with _terminated_as_interrupted(), restricting(trust, trust_dir):
+    with _terminated_as_interrupted(), restrict_to(trust, trust_dir):
         try:
             with observing(show=sys.stderr.isatty() and not quiet) as observer:
                 options = RunOptions(fail_fast, changed, observer)
@@ -132,7 +132,7 @@ def rerun(
     row = next(row for row in rows if row["variant"] == number)
     labels = ", ".join(f"{c} = {row[c]}" for c in study.columns if row[c] is not None)
     typer.echo(f"variant {number}: {labels}")
-    with restricting(trust, trust_dir):
+    with restrict_to(trust, trust_dir):
         repeated = study.rerun(number, out)
     if out is not None:
         typer.echo(f"stored in {out}")
@@ -249,10 +249,10 @@ def tune(
     from fleet2d.studies.specification import read_specification
     from fleet2d.studies.tune import tune as search
 
-    with restricting(trust, trust_dir):
+    with restrict_to(trust, trust_dir):
         specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    with _terminated_as_interrupted(), restricting(trust, trust_dir):
+    with _terminated_as_interrupted(), restrict_to(trust, trust_dir):
         try:
             with observing_trials(show=sys.stderr.isatty() and not quiet) as observer:
                 result = search(specification, folder, make_executor(executor, workers), observer)

@@ -10,7 +10,7 @@ from typing import Any
 from fleet2d.document import Document
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.problems import did_you_mean
-from fleet2d.scenario.compose import assignment, changed, merge
+from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.choice import Choice, Label, key_path
 from fleet2d.studies.specification import SEED, Specification
@@ -115,7 +115,7 @@ class Design:
         changes += [rule.change for rule in self.rules if matches(rule.when, labels)]
         changes.append(assignment(("simulation", "seed"), seed, f"seed {seed}"))
         try:
-            return scenario_of(changed(self.base, changes), self.folder)
+            return scenario_of(apply_changes(self.base, changes), self.folder)
         except InputError as error:
             raise type(error)(f"{self.describe(index)}: {error}") from None
 

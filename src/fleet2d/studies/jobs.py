@@ -16,7 +16,7 @@ from fleet2d.studies.engine import (
 )
 from fleet2d.studies.identity import FileHashes, identity, input_hash, scenario_content
 from fleet2d.studies.record import WorkerTask, record_of
-from fleet2d.trust import Trust, current_trust, under
+from fleet2d.trust import Trust, current_trust, restrict
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -48,7 +48,7 @@ class StudyJob:
 
     def __call__(self, task: WorkerTask) -> bytes:
         """Run a variant; return its record, with the error if it fails."""
-        with under(self.trust):
+        with restrict(self.trust):
             return record_of(task, self._outcome(task)).encode()
 
     def _outcome(self, task: WorkerTask) -> VariantOutcome:
@@ -88,7 +88,7 @@ class SetupJob:
     def __call__(self, task: WorkerTask) -> bytes:
         """Return the error of a variant's set-up as text; empty if there is none."""
         try:
-            with under(self.trust):
+            with restrict(self.trust):
                 check_setup(self.design.scenario(task.index))
         except Fleet2DError as error:
             return str(error).encode()

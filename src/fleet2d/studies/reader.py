@@ -22,7 +22,7 @@ from fleet2d.studies.parts import (
     with_variant,
 )
 from fleet2d.studies.results import Counts, variants_table
-from fleet2d.trust import Trust, of_others
+from fleet2d.trust import Trust, restrict_stored
 
 if TYPE_CHECKING:
     import duckdb
@@ -230,7 +230,7 @@ class Study:
             RunDirectoryError: There is no such variant, or the directory can't be used.
             ScenarioError: Its code isn't trusted.
         """
-        with of_others(Trust.of(trust)):
+        with restrict_stored(Trust.of(trust)):
             return run_scenario(self.scenario(variant), out, **settings)
 
     @property

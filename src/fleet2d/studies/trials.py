@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ComponentError, Fleet2DError
-from fleet2d.scenario.compose import assignment, changed
+from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.choice import key_path
 from fleet2d.studies.design import Design
@@ -15,7 +15,7 @@ from fleet2d.studies.engine import StagedRun, describe_error, flat_numbers
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.sampling import Parameter, rounded
 from fleet2d.studies.schedule import TaskSchedule
-from fleet2d.trust import Trust, current_trust, under
+from fleet2d.trust import Trust, current_trust, restrict
 
 if TYPE_CHECKING:
     import optuna
@@ -71,14 +71,14 @@ class TrialJob:
             )
             for name, value in settings.items()
         ]
-        document = changed(scenario._document, changes)
+        document = apply_changes(scenario._document, changes)
         return scenario_of(document, scenario.folder)
 
     def __call__(self, task: WorkerTask) -> bytes:
         """Return (objectives, error), pickled; one of them is None."""
         assert isinstance(task, TrialTask)
         try:
-            with under(self.trust):
+            with restrict(self.trust):
                 metrics = self._metrics(task)
             numbers = dict(flat_numbers(metrics))
             missing = [name for name in self.objectives if name not in numbers]

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from fleet2d.document import Document, Keys, read_document
 from fleet2d.errors import Fleet2DError, InputError, ScenarioError
 from fleet2d.problems import did_you_mean
-from fleet2d.scenario.compose import assignment, changed
+from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import AnyAxis
 from fleet2d.studies.choice import Choice, key_path
@@ -82,7 +82,7 @@ class Space:
         changes = [(("simulation", "seed"), seed), *self.changes(point)]
         words = self.words(point)
         single = [assignment(keys, value, words) for keys, value in changes]
-        return scenario_of(changed(base, single), folder)
+        return scenario_of(apply_changes(base, single), folder)
 
     def check(self, base: Document, folder: Path) -> None:
         """Build a scenario for each end of each range, and for each choice.

@@ -7,7 +7,7 @@ import typer
 
 from fleet2d.arguments import ThemeChoice, split
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restricting
+from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 
 def view(
@@ -31,7 +31,7 @@ def view(
     if names and all(path.is_dir() for path in directories):
         if seed is not None or out is not None:
             raise InputError("--seed and --out are for a scenario, not for stored runs")
-        with restricting(trust, trust_dir):
+        with restrict_to(trust, trust_dir):
             if trust or trust_dir:
                 _import_code(directories)
             _view_runs(directories, port, browser=browser)
@@ -41,7 +41,7 @@ def view(
         raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
     from fleet2d.viewer.live import watch_scenario
 
-    with restricting(trust, trust_dir):
+    with restrict_to(trust, trust_dir):
         watch_scenario(
             scenario,
             overrides,
@@ -102,7 +102,7 @@ def film(  # noqa: PLR0913 - options of the command line
     run = open_run(directory)
     first, last = steps_of(run, begin, end)
     target = out or directory / "film.mp4"
-    with themed(theme), restricting(trust, trust_dir):
+    with themed(theme), restrict_to(trust, trust_dir):
         frames = write_film(run, target, first, last, speed=speed, height=height)
     typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
 
@@ -118,6 +118,6 @@ def report(
     from fleet2d.viewer.report import write_report
 
     target = out or directory / "report.html"
-    with restricting(trust, trust_dir):
+    with restrict_to(trust, trust_dir):
         write_report(open_run(directory), target)
     typer.echo(target)
