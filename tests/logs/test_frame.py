@@ -27,16 +27,16 @@ def test_a_frame_does_what_complex_numbers_do_and_matches_find_it_again(
     expected = np.stack([w.real, w.imag], 1)
     assert expected == pytest.approx(frame.to_plan(log), abs=1e-9 * (1 + scale))
     matches = [{"log": a, "plan": b} for a, b in zip(log.tolist(), expected.tolist(), strict=True)]
-    found = Frame(flip_y=flip, matches=matches)
-    assert expected == pytest.approx(found.to_plan(log), abs=1e-6 * (1 + scale))
-    assert found.errors().max() < 1e-6 * (1 + scale)
+    fitted = Frame(flip_y=flip, matches=matches)
+    assert expected == pytest.approx(fitted.to_plan(log), abs=1e-6 * (1 + scale))
+    assert fitted.errors().max() < 1e-6 * (1 + scale)
 
 
 def test_headings_turn_and_mirror_with_the_frame() -> None:
     east, north = 0.0, 0.25
-    turned = Frame(rotation_deg=90).turned(np.array([east, north]))
+    turned = Frame(rotation_deg=90).turn_headings(np.array([east, north]))
     assert [0.25, 0.5] == pytest.approx(turned.tolist())
-    mirrored = Frame(flip_y=True).turned(np.array([east, north]))
+    mirrored = Frame(flip_y=True).turn_headings(np.array([east, north]))
     assert [0.0, -0.25] == pytest.approx(mirrored.tolist())
 
 

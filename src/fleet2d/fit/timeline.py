@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.rooms import DOOR, USUAL
-from fleet2d.logs.visits import UNKNOWN, Rule, Visit, visits_of
+from fleet2d.logs.visits import UNKNOWN, LoggedVisit, VisitRule, visits_of
 from fleet2d.units import micros
 
 MINUTES = 1440
@@ -82,7 +82,7 @@ def read_timeline(log: ActivityLog) -> Timeline:
 def read_seconds(log: ActivityLog) -> tuple[list[State], I16]:
     """Return the states of a log, and the index of that in each second of its days, -1 unknown."""
     kinds = {label: (_kind(label),) for label in log.rooms}
-    rule = Rule(
+    rule = VisitRule(
         step_us=1_000_000,
         begin_us=0,
         steps=log.days * DAY_S,
@@ -99,7 +99,7 @@ def _kind(label: str) -> str:
     return AWAY if label == AWAY else kind
 
 
-def _by_second(visits: list[Visit], count: int) -> tuple[list[State], I16]:
+def _by_second(visits: list[LoggedVisit], count: int) -> tuple[list[State], I16]:
     index: dict[State, int] = {}
     seconds = np.full(count, NOBODY_KNOWS, np.int16)
     for number, visit in enumerate(visits):

@@ -1,4 +1,4 @@
-"""Real logs: who was where and did what, read from the files of smart homes and trackers."""
+"""Real logs: positions and activities of people, from the files of smart homes and trackers."""
 
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog, Reading
 from fleet2d.logs.read import Layout, read_log

@@ -4,8 +4,8 @@
 
     2011-06-15 01:41:40.205759 Bathroom Bathroom ON Bed_Toilet_Transition
 
-Only what switches on tells that somebody is there: a motion sensor switches off by itself, seconds
-after the last motion, when the body may be gone.
+Only sensors that switch on show that somebody is there: a motion sensor switches off by itself,
+seconds after the last motion, when the person may be gone.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""From the frame of coordinates of a log to that of the floor plan: a similarity."""
+"""Frames: the similarity transform from the coordinates of a log to those of the floor plan."""
 
 from typing import Self
 
@@ -16,8 +16,8 @@ Pair = tuple[float, float]
 class Match(Settings):
     """One place in both frames."""
 
-    log: Pair = Field(description="where the log has it, in the log's units")
-    plan: Pair = Field(description="where the floor plan has it [m]")
+    log: Pair = Field(description="its coordinates in the log, in the log's units")
+    plan: Pair = Field(description="its coordinates in the floor plan [m]")
 
 
 class Frame(Settings):
@@ -49,7 +49,7 @@ class Frame(Settings):
     )
 
     @model_validator(mode="after")
-    def _is_told_once(self) -> Self:
+    def _is_defined_in_one_way(self) -> Self:
         if self.matches and {"scale", "rotation_deg", "origin"} & self.model_fields_set:
             raise problem("give matches, or scale, rotation_deg and origin, and not both")
         if self.matches and len({match.log for match in self.matches}) < 2:
@@ -57,27 +57,27 @@ class Frame(Settings):
         return self
 
     def to_plan(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return positions (n, 2) of the log as positions in the plan [m]."""
+        """Return positions of the log, float64 (n, 2), as positions in the plan [m]."""
         (ax, ay), (bx, by) = self._factor()
         x, y = xy[:, 0], -xy[:, 1] if self.flip_y else xy[:, 1]
         return np.stack([ax * x - ay * y + bx, ay * x + ax * y + by], 1)
 
-    def turned(self, heading: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return headings of the log [turns, any] as headings in the plan [turns]."""
+    def turn_headings(self, heading: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return headings of the log [turns], float64 (n,), as headings in the plan [turns]."""
         ax, ay = self._factor()[0]
-        turn = np.arctan2(ay, ax) / (2 * np.pi)  # rounded to 1/4096 later
-        flipped = -heading if self.flip_y else heading
-        return np.asarray(flipped + turn)
+        turn = np.arctan2(ay, ax) / (2 * np.pi)  # callers round headings to 1/4096 turn
+        sign = -1.0 if self.flip_y else 1.0
+        return np.asarray(sign * heading + turn)
 
     def errors(self) -> NDArray[np.float64]:
-        """Return how far each match is off after the fit [m]."""
+        """Return the distance between each match's place in the plan and its fit [m], (n,)."""
         log = np.array([match.log for match in self.matches], np.float64).reshape(-1, 2)
         plan = np.array([match.plan for match in self.matches], np.float64).reshape(-1, 2)
-        off = self.to_plan(log) - plan
-        return np.sqrt(off[:, 0] ** 2 + off[:, 1] ** 2)
+        residuals = self.to_plan(log) - plan
+        return np.sqrt(residuals[:, 0] ** 2 + residuals[:, 1] ** 2)
 
     def _factor(self) -> tuple[Pair, Pair]:
-        """Return a and b of plan = a * log + b, complex numbers as pairs."""
+        """Return the complex numbers a and b of plan = a * log + b, as pairs."""
         if not self.matches:
             cosine, sine = _direction(self.rotation_deg)
             return (self.scale * cosine, self.scale * sine), self.origin
@@ -102,13 +102,13 @@ def _mean(points: list[Pair]) -> Pair:
 def _direction(degrees: float) -> Pair:
     """Return the cosine and sine of an angle, the same on every machine.
 
-    By their series: the sines of C libraries differ in the last digit.
+    They are computed by their series, as the sines of C libraries differ in the last digit.
     """
     quarters, rest = divmod(degrees, 90.0)
     angle = rest * (3.141592653589793 / 180.0)
     cosine = sine = 0.0
     term = 1.0
-    for n in range(24):  # the terms are below 1e-18 from there on
+    for n in range(24):  # later terms are below 1e-18
         if n % 2 == 0:
             cosine += term if n % 4 == 0 else -term
         else:

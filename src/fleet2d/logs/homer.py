@@ -9,10 +9,10 @@
     [WALK] <bathroom> (1) [1]
     370.25
 
-The number after one or several actions is the minute of the day at which they are done. A room is
-named by walking to it. Things with a number below 1000 are numbered room by room, as in
-VirtualHome, whose scripts these are: number 16, a shower, belongs to the bathroom, number 1, if the
-next room is number 41. What can't be told so happens where the last thing did.
+The number after one or several actions is the minute of the day at which they are done. Walking to
+a room names it. Objects with a number below 1000 are numbered room by room, as in VirtualHome,
+which the scripts come from: number 16, a shower, belongs to the bathroom, number 1, if the next
+room is number 41. Actions without such a number happen in the room of the action before.
 """
 
 import re
@@ -29,14 +29,22 @@ ACTION = re.compile(r"\[(\w+)\]((?: <\w+> \(\d+\))*) \[\d+\]")
 THING = re.compile(r"<(\w+)> \((\d{1,9})\d*\)")
 MINUTE = re.compile(r"\d+(?:\.\d+)?")
 ROOM = re.compile(r"bathroom|bedroom|dining_room|home_office|kitchen|living_?room|hallway")
-ADDED = 1000  # things from this number on were added later, anywhere
+ADDED = 1000  # objects from this number on were added later, in any room
 MINUTE_US = 60_000_000
-MOST_MINUTES = 1e6  # what is later is at the end of its activity anyway
+MOST_MINUTES = 1e6  # later times are cut to the end of their activity in any case
 
 
 @dataclass
-class _Block:
-    """An activity of a day: its times on the agenda and what its script does when."""
+class _ScriptedActivity:
+    """An activity of a day.
+
+    Attributes:
+        activity: Its name.
+        begin_us: Its begin on the agenda [us since midnight].
+        end_us: Its end on the agenda [us since midnight].
+        line: The line of the agenda.
+        steps: Its script: time [us], objects by name and number, and line.
+    """
 
     activity: str
     begin_us: int
@@ -62,24 +70,24 @@ def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
     readings: list[Reading] = []
     notes: list[str] = []
     for number, (file, blocks) in enumerate(zip(files, days, strict=True)):
-        found = [reading for block in blocks for reading in _placed(block, rooms)]
-        found, amiss = in_order(found, file, sort=sort)
-        notes += [f"{file.name}: {note}" for note in amiss]
-        placed = {reading.activity for reading in found}
-        lost = sorted({block.activity for block in blocks} - placed)
-        if lost:
-            notes.append(f"{file.name}: in no room, or in no time: {', '.join(lost)}")
+        of_day = [reading for block in blocks for reading in _readings(block, rooms)]
+        of_day, order_notes = in_order(of_day, file, sort=sort)
+        notes += [f"{file.name}: {note}" for note in order_notes]
+        without_room = {block.activity for block in blocks} - {r.activity for r in of_day}
+        if without_room:
+            names = ", ".join(sorted(without_room))
+            notes.append(f"{file.name}: in no room, or in no time: {names}")
         readings += [
             r._replace(begin_us=r.begin_us + number * DAY_US, end_us=r.end_us + number * DAY_US)
-            for r in found
+            for r in of_day
         ]
     return ActivityLog(path, "homer", None, tuple(readings), tuple(notes))
 
 
-def _day(path: Path) -> list[_Block]:
-    blocks: list[_Block] = []
+def _day(path: Path) -> list[_ScriptedActivity]:
+    blocks: list[_ScriptedActivity] = []
     block = -1
-    waiting: list[tuple[str, int]] = []
+    objects: list[tuple[str, int]] = []  # of the actions since the last time
     for number, line in log_lines(path):
         if match := AGENDA.fullmatch(line):
             blocks.append(_agenda(match, path, number))
@@ -90,51 +98,51 @@ def _day(path: Path) -> list[_Block]:
                     f"{path}, line {number}: the script of {one_line(match[1])} isn't next on the"
                     " agenda"
                 )
-            waiting = []
+            objects = []
         elif match := ACTION.fullmatch(line):
-            waiting += [(name, int(n)) for name, n in THING.findall(match[2])]
+            objects += [(name, int(n)) for name, n in THING.findall(match[2])]
         elif MINUTE.fullmatch(line):
             if block < 0:
                 raise LogError(f"{path}, line {number}: an action before any '### activity'")
-            # To the microsecond: sums of thirds of minutes end in …33332.
+            # Rounded to the microsecond, as sums of thirds of minutes end in …33332.
             at = round(min(float(line), MOST_MINUTES) * MINUTE_US)
-            blocks[block].steps.append((at, waiting, number))
-            waiting = []
+            blocks[block].steps.append((at, objects, number))
+            objects = []
     if not blocks:
         raise LogError(f"{path}: no line like 'breakfast (08:35 - 09:02)'; is it a day of HOMER+?")
     return blocks
 
 
-def _agenda(match: re.Match[str], path: Path, line: int) -> _Block:
+def _agenda(match: re.Match[str], path: Path, line: int) -> _ScriptedActivity:
     begin = int(match[2]) * 60 + int(match[3])
     end = (int(match[4] or 0) * 24 + int(match[5])) * 60 + int(match[6])
     if begin >= 24 * 60 or int(match[5]) > 24:
         raise LogError(f"{path}, line {line}: a day has 24 hours, found {one_line(match[0])!r}")
     if end < begin:
         raise LogError(f"{path}, line {line}: it ends before it begins, {one_line(match[0])!r}")
-    return _Block(match[1], begin * MINUTE_US, end * MINUTE_US, line)
+    return _ScriptedActivity(match[1], begin * MINUTE_US, end * MINUTE_US, line)
 
 
-def _placed(block: _Block, rooms: list[tuple[int, str]]) -> list[Reading]:
-    """Return an activity's readings: one for each time in one room."""
+def _readings(block: _ScriptedActivity, rooms: list[tuple[int, str]]) -> list[Reading]:
+    """Return the readings of an activity, one for each stay in a room."""
     numbers = [number for number, _ in rooms]
     pieces: list[tuple[int, int, str, int]] = []  # begin, end, room or "", line
     begin = block.begin_us
     for at, things, line in block.steps:
         end = min(max(at, begin), block.end_us)
-        said = ""
+        named_room = ""
         for _name, number in things:
-            if number < ADDED and (known := bisect_right(numbers, number)):
-                said = rooms[known - 1][1]
-        pieces.append((begin, end, said, line))
+            if number < ADDED and (count := bisect_right(numbers, number)):
+                named_room = rooms[count - 1][1]
+        pieces.append((begin, end, named_room, line))
         begin = end
     pieces.append((begin, block.end_us, "", block.line))
-    room = next((said for _, _, said, _ in pieces if said), "")
+    room = next((named_room for _, _, named_room, _ in pieces if named_room), "")
     readings: list[Reading] = []
-    for first, last, said, line in pieces:
-        room = said or room
+    for first, last, named_room, line in pieces:
+        room = named_room or room
         if last == first:
-            continue  # done in no time: nobody was ever there
+            continue  # without a duration, it is no reading
         if readings and readings[-1].room == room:
             readings[-1] = readings[-1]._replace(end_us=last)
         elif room:

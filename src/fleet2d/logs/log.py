@@ -1,4 +1,4 @@
-"""What a log says, in one form for all layouts: readings of rooms and activities, or fixes."""
+"""Logs in one form for all layouts: readings of rooms and activities, or position fixes."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -15,16 +15,16 @@ from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file
 from fleet2d.errors import InputError
 
 DAY_US = 86_400_000_000
-# Lines that a note names.
+# The most lines that a note lists.
 _MOST_NAMED = 20
-# Characters of a line of a log.
+# The most characters in a line of a log.
 _LONGEST = 10_000
 AWAY = "away"
-"""The room label of who is out of the home."""
+"""The room label for being out of the home."""
 
 
 def log_lines(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield the number and the text of each line of a log that isn't blank, stripped.
+    """Yield the number and the stripped text of each line of a log that isn't blank.
 
     Raises:
         LogError: The file can't be read, is no text file, or is beyond a bound.
@@ -46,10 +46,10 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def check_days(first: date, last: date, path: Path) -> None:
-    """Refuse a log that lasts longer than logs do: one of its dates is wrong.
+    """Refuse a log that is longer than the bound on days, as one of its dates must be wrong.
 
     Raises:
-        LogError: It does.
+        LogError: It is longer.
     """
     days = (last - first).days + 1
     LOG_DAYS.check(days, f"{path} runs from {first} to {last}: it", LogError)
@@ -60,13 +60,13 @@ class LogError(InputError):
 
 
 class Reading(NamedTuple):
-    """Somebody is in a room, at an instant or for a while.
+    """A person is in a room, at an instant or for a while.
 
     Attributes:
         begin_us: Local time since the midnight that begins the log's first day [us].
-        end_us: When the log last says so; equal to `begin_us` for an instant.
+        end_us: The end, likewise; equal to `begin_us` for an instant.
         room: The room's label in the log, or `AWAY`.
-        activity: What is done there, "" where the log doesn't say.
+        activity: What is done there, "" if the log doesn't say.
         line: Line of the file, from 1.
     """
 
@@ -85,8 +85,8 @@ class ActivityLog:
         path: The file, or the folder of files, that it was read from.
         layout: The layout it is written in: casas, uci_adl or homer.
         first_day: The date of its first day; None where the log has no dates.
-        readings: What it says.
-        notes: What was odd in it and what was made of that.
+        readings: The readings.
+        notes: Oddities in the log, and how they were resolved.
     """
 
     path: Path
@@ -117,7 +117,7 @@ class PositionLog:
         time_us: Local time since the midnight that begins the first day, int64 (n,) [us].
         xy: Positions in the log's own frame, float64 (n, 2).
         heading: Headings in the log's own frame, float64 (n,) [rad]; NaN where it has none.
-        notes: What was odd in it and what was made of that.
+        notes: Oddities in the log, and how they were resolved.
     """
 
     path: Path
@@ -135,9 +135,9 @@ class PositionLog:
 
 
 def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[Reading], list[str]]:
-    """Return readings in the order in which they begin, and notes about what was amiss.
+    """Return readings in the order in which they begin, and notes about oddities.
 
-    An end that lies before the begin isn't believed: the reading counts as an instant then.
+    A reading that ends before it begins counts as an instant.
 
     Raises:
         LogError: There are none, times run backwards and `sort` is off, or one lasts longer than a
@@ -147,11 +147,11 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
         raise LogError(f"{path} holds no reading: is it the right file?")
     first, last = min(r.begin_us for r in readings), max(r.end_us for r in readings)
     LOG_DAYS.check((last - first) // DAY_US + 1, path, LogError)
-    backwards = [b for a, b in pairwise(readings) if b.begin_us < a.begin_us]
-    if backwards and not sort:
+    early = [b for a, b in pairwise(readings) if b.begin_us < a.begin_us]
+    if early and not sort:
         raise LogError(
-            f"{path}, line {backwards[0].line}: the time runs backwards there"
-            f" ({_counted(len(backwards), 'such line')}); check the clock of the log, or put its"
+            f"{path}, line {early[0].line}: the time runs backwards there"
+            f" ({_counted(len(early), 'such line')}); check the clock of the log, or put its"
             " lines in order of time by 'sort: true'"
         )
     for reading in readings:
@@ -162,14 +162,14 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
                 " day at most: check its end"
             )
     notes = []
-    ended = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
-    if ended:
-        more = f" and {len(ended) - _MOST_NAMED} more" if len(ended) > _MOST_NAMED else ""
-        lines = f"{', '.join(ended[:_MOST_NAMED])}{more}"
-        notes.append(f"an end before the begin isn't believed, in line {lines}")
-    if backwards:
+    wrong = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
+    if wrong:
+        more = f" and {len(wrong) - _MOST_NAMED} more" if len(wrong) > _MOST_NAMED else ""
+        lines = f"{', '.join(wrong[:_MOST_NAMED])}{more}"
+        notes.append(f"an end before the begin is ignored, in line {lines}")
+    if early:
         readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable
-        notes.append(f"{_counted(len(backwards), 'line')} ran backwards in time and were sorted in")
+        notes.append(f"{_counted(len(early), 'line')} ran backwards in time and were sorted in")
     return [r._replace(end_us=max(r.end_us, r.begin_us)) for r in readings], notes
 
 

@@ -53,17 +53,17 @@ def read_positions(
 ) -> PositionLog:
     """Read the fixes of one tag.
 
-    Times are text or timestamps, or numbers of s, ms, us or ns since 1970 (which one, by their
-    size), or of seconds since the log began if they are below 10⁸. With a time zone of their own
-    they are turned into the local time of `time_zone`. A heading is in radians; in degrees, if its
-    column is called …_deg.
+    Times are text, timestamps, or numbers: of s, ms, us or ns since 1970, which is recognized by
+    their size, or of seconds since the begin of the log if they are below 10⁸. Times with a time
+    zone are converted to the local time of `time_zone`. Headings are in radians, or in degrees if
+    the name of their column ends in _deg.
 
     Args:
         path: The file, .csv or .parquet.
-        id: The tag, where the file holds several.
-        columns: What its columns are called, where that is none of `NAMES`: {"x": "east"}.
-        time_zone: Of the home, like "Europe/Berlin"; needed if the log's times have a zone or are
-            numbers since 1970.
+        id: The tag to read, if the file holds several.
+        columns: Names of its columns that are not in `NAMES`: {"x": "east"}.
+        time_zone: The time zone of the home, like "Europe/Berlin"; needed if the log's times have a
+            zone or are numbers since 1970.
         sort: Put fixes in order of time instead of refusing times that run backwards.
 
     Raises:
@@ -78,29 +78,28 @@ def read_positions(
         heading = _numbers(table, named["heading"], path, line)
         if named["heading"].endswith("_deg"):
             heading = heading / 180 * np.pi
-    time_us, dated, zoned = _times(table[named["time"]], path, line)
-    _check_times(time_us, path, line, dated=dated)
+    time_us, has_date, has_zone = _times(table[named["time"]], path, line)
+    _check_times(time_us, path, line, has_date=has_date)
     repeated = np.zeros(len(time_us), bool)
-    if zoned:
+    if has_zone:
         if time_zone is None:
             raise LogError(
                 f"{path}: its times are of a time zone; say which local time the home has by"
                 " time_zone, like 'Europe/Berlin' or 'UTC'"
             )
         time_us, repeated = _in_zone(time_us, time_zone)
-    kept = np.isfinite(x) & np.isfinite(y)
-    if not kept.all():
-        notes.append(f"{np.count_nonzero(~kept)} fixes without a position were left out")
+    usable = np.isfinite(x) & np.isfinite(y)
+    if not usable.all():
+        notes.append(f"{np.count_nonzero(~usable)} fixes without a position were left out")
     if repeated.any():
         notes.append(
             f"{np.count_nonzero(repeated)} fixes of the hour that the end of summer time repeats"
             " were left out: a simulated day has 24 hours"
         )
-    kept &= ~repeated
-    fixes = [time_us[kept], x[kept], y[kept], heading[kept], line[kept]]
-    fixes = _in_order(fixes, path, notes, sort=sort)
-    time_us, x, y, heading, _ = fixes
-    first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if dated else None
+    usable &= ~repeated
+    fixes = [column[usable] for column in (time_us, x, y, heading, line)]
+    time_us, x, y, heading, _ = _in_order(fixes, path, notes, sort=sort)
+    first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if has_date else None
     if first_day:
         time_us = time_us - time_us[0] // DAY_US * DAY_US
     return PositionLog(
@@ -109,6 +108,7 @@ def read_positions(
 
 
 def _table(path: Path) -> pa.Table:
+    """Read a file within its bounds."""
     try:
         check_file(path, LOG_BYTES, LogError)
         if path.suffix.lower() in (".parquet", ".pq"):
@@ -127,22 +127,23 @@ def _table(path: Path) -> pa.Table:
     return table
 
 
-def _columns(table: pa.Table, given: Mapping[str, str], path: Path) -> dict[str, str]:
-    named = dict(given)
-    for what, name in named.items():
-        if what not in NAMES:
-            raise LogError(f"columns: {what!r} is none of {', '.join(NAMES)}")
+def _columns(table: pa.Table, overrides: Mapping[str, str], path: Path) -> dict[str, str]:
+    """Return the name of the column of each quantity: as the user says, else one of `NAMES`."""
+    named = dict(overrides)
+    for quantity, name in named.items():
+        if quantity not in NAMES:
+            raise LogError(f"columns: {quantity!r} is none of {', '.join(NAMES)}")
         if name not in table.column_names:
             raise LogError(f"{path} has no column {name!r}{did_you_mean(name, table.column_names)}")
     lower = {name.strip().lower(): name for name in reversed(table.column_names)}
-    for what, names in NAMES.items():
-        found = next((lower[name] for name in names if name in lower), None)
-        if what not in named and found is not None:
-            named[what] = found
-        if what not in named and what in ("time", "x", "y"):
+    for quantity, names in NAMES.items():
+        column = next((lower[name] for name in names if name in lower), None)
+        if quantity not in named and column is not None:
+            named[quantity] = column
+        if quantity not in named and quantity in ("time", "x", "y"):
             raise LogError(
-                f"{path} has no column {what!r}; it has: {', '.join(table.column_names)}. Say which"
-                f" it is by columns: {{{what}: …}}"
+                f"{path} has no column {quantity!r}; it has: {', '.join(table.column_names)}. Say"
+                f" which it is by columns: {{{quantity}: …}}"
             )
     return named
 
@@ -162,20 +163,23 @@ def _of_tag(
     known = sorted(str(name) for name in pc.unique(tags).to_pylist())
     if tag is None and len(known) > 1:
         raise LogError(f"{path} holds {len(known)} ids: {', '.join(known[:10])}; say which by 'id'")
-    wanted = known[0] if tag is None else tag
-    if wanted not in known:
+    name = known[0] if tag is None else tag
+    if name not in known:
         raise LogError(
-            f"{path} has no id {wanted!r}{did_you_mean(wanted, known)}"
+            f"{path} has no id {name!r}{did_you_mean(name, known)}"
             f" There are: {', '.join(known[:10])}"
         )
-    mine = pc.fill_null(pc.equal(tags, wanted), False).combine_chunks()
-    keep = mine.to_numpy(zero_copy_only=False) if known != ["None"] else np.ones(len(line), bool)
-    others = len(line) - int(np.count_nonzero(keep))
+    is_tag = np.ones(len(line), bool)
+    if known != ["None"]:
+        equal = pc.fill_null(pc.equal(tags, name), False).combine_chunks()
+        is_tag = equal.to_numpy(zero_copy_only=False)
+    others = len(line) - int(np.count_nonzero(is_tag))
     notes = [f"{others} fixes of other ids were left out"] if others else []
-    return table.filter(pa.array(keep)), line[keep], notes
+    return table.filter(pa.array(is_tag)), line[is_tag], notes
 
 
 def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.float64]:
+    """Return a column of numbers, float64 (n,); NaN where it is empty."""
     column = table[name]
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
         for at, text in zip(line.tolist(), column.to_pylist(), strict=True):
@@ -196,39 +200,42 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.fl
 
 
 def _times(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:
-    """Return times [us], whether they count from 1970, not the log's begin, and if in UTC."""
+    """Return times [us], whether they count from 1970, and whether they have a time zone.
+
+    Times that don't count from 1970 count from the begin of the log; those with a zone are UTC.
+    """
     if column.null_count:
         empty = np.flatnonzero(pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False))
         raise LogError(f"{path}, line {line[empty[0]]}: it has no time")
     kind: Any = column.type
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
-        values, zoned = _parsed(column.to_pylist(), path, line)
-        return values, True, zoned
+        values, has_zone = _parse_texts(column.to_pylist(), path, line)
+        return values, True, has_zone
     if pa.types.is_timestamp(kind):
         values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
         return pc.cast(values, pa.int64()).to_numpy(), True, kind.tz is not None
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
-        values, zoned = _scaled(column.to_numpy(), path, line)
-        return values, zoned, zoned
+        values, has_date = _scale_numbers(column.to_numpy(), path, line)
+        return values, has_date, has_date
     raise LogError(f"{path}: the times are {kind}; text, timestamps or numbers are wanted")
 
 
-def _check_times(time_us: I64, path: Path, line: I64, *, dated: bool) -> None:
-    """Refuse times of another century, and logs that last longer than logs do."""
-    first, end = (EARLIEST_US, LATEST_US) if dated else (-LATEST_US, LATEST_US)
+def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None:
+    """Refuse times of another century, and logs beyond the bound on days."""
+    first, end = (EARLIEST_US, LATEST_US) if has_date else (-LATEST_US, LATEST_US)
     wrong = np.flatnonzero((time_us < first) | (time_us >= end))
     if len(wrong):
-        wanted = "a time from 1900 to 2199" if dated else "seconds since the log began"
+        expected = "a time from 1900 to 2199" if has_date else "seconds since the log began"
         raise LogError(
             f"{path}, line {line[wrong[0]]}: its time is out of all bounds ({len(wrong)} such"
-            f" lines): {wanted} is wanted"
+            f" lines): {expected} is wanted"
         )
     days = int(time_us.max() - time_us.min()) // DAY_US + 1
     LOG_DAYS.check(days, path, LogError)
 
 
-def _parsed(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
-    """Return times in text as [us since 1970], and whether they have a zone (all or none)."""
+def _parse_texts(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
+    """Return times in text [us since 1970], and whether they have a zone (all or none)."""
     epoch = datetime(1970, 1, 1)
     values, zones = [], set()
     for at, text in zip(line.tolist(), texts, strict=True):
@@ -245,8 +252,8 @@ def _parsed(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
     return np.array(values, np.int64), zones == {True}
 
 
-def _scaled(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, bool]:
-    """Return numbers as microseconds, and whether they count from 1970."""
+def _scale_numbers(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, bool]:
+    """Return numeric times [us], and whether they count from 1970."""
     wrong = np.flatnonzero(~(np.abs(numbers.astype(np.float64)) < MOST_NUMBER))
     if len(wrong):
         raise LogError(f"{path}, line {line[wrong[0]]}: its time is no number, or far too large")
@@ -260,7 +267,7 @@ def _scaled(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, bool]:
 
 
 def _in_zone(utc_us: I64, name: str) -> tuple[I64, NDArray[np.bool_]]:
-    """Return the wall times of a zone, and which of them are a second pass of the same hour."""
+    """Return the local times of a zone [us], and which of them are in a repeated hour."""
     try:
         zone = ZoneInfo(name)
     except (KeyError, ValueError, OSError):
@@ -279,6 +286,11 @@ def _in_zone(utc_us: I64, name: str) -> tuple[I64, NDArray[np.bool_]]:
 
 
 def _in_order(fixes: list[Any], path: Path, notes: list[str], *, sort: bool) -> list[Any]:
+    """Return columns of fixes in order of time, one fix at a time; the first column is the time.
+
+    Raises:
+        LogError: There are no fixes, or times run backwards and `sort` is off.
+    """
     time_us, line = fixes[0], fixes[-1]
     if not len(time_us):
         raise LogError(f"{path} holds no fix with a position")

@@ -1,4 +1,4 @@
-"""Read a log of any layout."""
+"""Reading a log of any layout, which is recognized by its content."""
 
 from collections.abc import Mapping
 from itertools import islice
@@ -29,10 +29,10 @@ def read_log(
 
     Args:
         path: The file; or the folder, for a home that has several (uci_adl, homer).
-        layout: How it is written; "auto" looks.
-        id: See `read_positions`; as the next two.
-        columns: The names of the columns of positions.
-        time_zone: The time zone of the home.
+        layout: The layout; "auto" recognizes it by its content.
+        id: The tag to read, of positions; see `read_positions`.
+        columns: The names of the columns of positions; see `read_positions`.
+        time_zone: The time zone of the home, for positions; see `read_positions`.
         sort: Sort lines whose time runs backwards instead of refusing them.
 
     Raises:
@@ -41,9 +41,9 @@ def read_log(
     path = Path(path)
     if not path.exists():
         raise LogError(f"no such file: {path}")
-    layout = _look(path) if layout == "auto" else layout
+    layout = _recognize(path) if layout == "auto" else layout
     if layout == "positions":
-        # The one layout that needs pyarrow.
+        # Imported here, as no other layout needs pyarrow.
         from fleet2d.logs.positions import read_positions
 
         return read_positions(path, id=id, columns=columns, time_zone=time_zone, sort=sort)
@@ -56,17 +56,17 @@ def read_log(
     return read_uci_adl(path, sort=sort) if layout == "uci_adl" else read_homer(path, sort=sort)
 
 
-def _look(path: Path) -> Layout:
+def _recognize(path: Path) -> Layout:
     """Return the layout of a file or folder.
 
     Raises:
-        LogError: It looks like none.
+        LogError: It is of no known layout.
     """
     if path.is_dir():
         files = sorted(path.glob("*.txt"))
         if any(file.name.endswith(("_ADLs.txt", "_Sensors.txt")) for file in files):
             return "uci_adl"
-        if files and _look(files[0]) == "homer":
+        if files and _recognize(files[0]) == "homer":
             return "homer"
         raise LogError(
             f"{path}: a folder holds the files of one home, as …_Sensors.txt and …_ADLs.txt, or the"

@@ -1,4 +1,4 @@
-"""Which room of a home each room label of a log stands for."""
+"""Labels: which room of a home each room label of a log stands for."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -10,7 +10,7 @@ from fleet2d.problems import did_you_mean
 RoomChoice = tuple[str, ...]
 
 DOOR = "door"
-"""The front door: who is there may be about to leave."""
+"""The front door: after a long silence there, the person is out."""
 
 USUAL: dict[str, RoomChoice] = {
     "away": (AWAY,),
@@ -45,11 +45,11 @@ USUAL: dict[str, RoomChoice] = {
     "snack": ("kitchen",),
     "spare_time_tv": ("living_room",),
 }
-"""What labels of the known data sets mean, as tried in turn, where the user doesn't say."""
+"""Meanings of the labels of known data sets: rooms or kinds of rooms to be tried in turn."""
 
 
 def map_rooms(
-    labels: Mapping[str, int], given: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
+    labels: Mapping[str, int], overrides: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
 ) -> dict[str, RoomChoice | None]:
     """Return the rooms that each label of a log stands for, to be tried in turn.
 
@@ -57,17 +57,17 @@ def map_rooms(
 
     Args:
         labels: How many readings each label has.
-        given: What the user says about some of them.
+        overrides: The user's choices for some labels, before their usual meaning.
         rooms: The rooms of the home.
 
     Raises:
         LogError: A label is unknown, or stands for no room of this home.
     """
-    _check_given(labels, given, rooms)
+    _check_overrides(labels, overrides, rooms)
     mapped: dict[str, RoomChoice | None] = {}
     for label, count in labels.items():
-        choice = given[label] if label in given else _usual(label, rooms)
-        if choice is None and label not in given:
+        choice = overrides[label] if label in overrides else _usual(label, rooms)
+        if choice is None and label not in overrides:
             raise LogError(
                 f"no room of this home stands for {label!r}, which {count} readings of the log"
                 f" name; say which does by rooms: {{{label}: …}}, one of"
@@ -77,11 +77,11 @@ def map_rooms(
     return mapped
 
 
-def _check_given(
-    labels: Mapping[str, int], given: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
+def _check_overrides(
+    labels: Mapping[str, int], overrides: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
 ) -> None:
-    """Refuse labels that the log hasn't, and rooms that the home hasn't."""
-    for label, choice in given.items():
+    """Refuse labels that are not in the log, and rooms that are not in the home."""
+    for label, choice in overrides.items():
         if label not in labels:
             raise LogError(
                 f"rooms: the log has no room {label!r}{did_you_mean(label, labels)}"
@@ -96,6 +96,7 @@ def _check_given(
 
 
 def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
+    """Return the usual meaning of a label in this home, if it has one."""
     if any(room.name == label for room in rooms):
         return (label,)
     kind = room_type(label)
@@ -103,7 +104,7 @@ def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
 
 
 def _first_fit(choice: RoomChoice, rooms: Sequence[Room]) -> RoomChoice | None:
-    """Return the first of some names that is a room, a kind of room, away or the door."""
+    """Return the first of some names that is a room, a kind of room, away or door; else None."""
     names = {AWAY, DOOR, "any", *(room.name for room in rooms), *(room.type for room in rooms)}
     return next(((name,) for name in choice if name in names), None)
 

@@ -5,9 +5,9 @@
     2011-11-28 10:21:44    2011-11-28 10:23:31    Basin    PIR    Bathroom      (…_Sensors.txt)
     2011-11-28 10:21:24    2011-11-28 10:23:36    Toileting                     (…_ADLs.txt)
 
-The two files of a home belong together and are read together, whichever is named: the sensors say
-in which room somebody is, the activities what is done there and when the home is left. Of a file
-of activities alone, each activity stands for the room it is done in.
+The two files of a home are read together, whichever is named: the sensors show in which room a
+person is, the activities what is done there and when the home is left. In a file of activities
+alone, each activity stands for the room that it is done in.
 """
 
 import re
@@ -27,9 +27,11 @@ LEAVING = frozenset({"leaving", "leave_home", "away", "out"})
 
 
 class _Row(NamedTuple):
+    """A line of a file; `words` are an activity, or a sensor with its type and place."""
+
     begin: datetime
     end: datetime
-    what: str
+    words: str
     line: int
 
 
@@ -39,13 +41,14 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
     Raises:
         LogError: A line is damaged, or times run backwards.
     """
-    rows = {what: (file, _rows(file)) for what, file in _pair(path).items()}
-    first_day = min(row.begin.date() for _, found in rows.values() for row in found)
+    files = {kind: (file, _rows(file)) for kind, file in _pair(path).items()}
+    first_day = min(row.begin.date() for _, rows in files.values() for row in rows)
     notes: list[str] = []
     parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
-    for what, (file, found) in rows.items():
-        parts[what], amiss = in_order([_reading(r, first_day) for r in found], file, sort=sort)
-        notes += [f"{file.name}: {note}" for note in amiss]
+    for kind, (file, rows) in files.items():
+        readings = [_reading(row, first_day) for row in rows]
+        parts[kind], order_notes = in_order(readings, file, sort=sort)
+        notes += [f"{file.name}: {note}" for note in order_notes]
     readings = parts["activities"]
     if parts["sensors"]:
         readings = _joined(parts["sensors"], readings)
@@ -55,15 +58,15 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
 def _pair(path: Path) -> dict[str, Path]:
     """Return the files of a home: of sensors, of activities, or both."""
     if path.is_dir():
-        found = {
+        by_kind = {
             "sensors": sorted(path.glob("*_Sensors.txt")),
             "activities": sorted(path.glob("*_ADLs.txt")),
         }
-        for what, files in found.items():
+        for kind, files in by_kind.items():
             if len(files) > 1:
-                raise LogError(f"{path} holds {len(files)} files of {what}: name the one to read")
-        return {what: files[0] for what, files in found.items() if files}
-    is_sensors = len(_rows(path)[0].what.split()) >= 3
+                raise LogError(f"{path} holds {len(files)} files of {kind}: name the one to read")
+        return {kind: files[0] for kind, files in by_kind.items() if files}
+    is_sensors = len(_rows(path)[0].words.split()) >= 3
     parts = ("_Sensors", "_ADLs") if is_sensors else ("_ADLs", "_Sensors")
     twin = path.with_name(path.name.replace(*parts))
     pair = {"sensors" if is_sensors else "activities": path}
@@ -91,8 +94,8 @@ def _rows(path: Path) -> list[_Row]:
 
 
 def _reading(row: _Row, first_day: date) -> Reading:
-    begin, end, what, number = row
-    words = what.split()
+    begin, end, text, number = row
+    words = text.split()
     label = words[-1]
     activity = label if len(words) == 1 else ""
     room = AWAY if activity.lower() in LEAVING else label
@@ -100,12 +103,12 @@ def _reading(row: _Row, first_day: date) -> Reading:
 
 
 def _joined(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
-    """Return the sensors' readings with the activity they are part of, and those of being out."""
+    """Return the readings of sensors with the activities at that time, and those of being out."""
     begins = [activity.begin_us for activity in activities]
     readings = [reading for reading in activities if reading.room == AWAY]
     for sensor in sensors:
-        during = bisect_right(begins, sensor.begin_us) - 1
-        inside = during >= 0 and sensor.begin_us <= activities[during].end_us
-        readings.append(sensor._replace(activity=activities[during].activity if inside else ""))
-    # Of what begins at one time the door comes first, so that being out is what holds.
+        number = bisect_right(begins, sensor.begin_us) - 1
+        is_part = number >= 0 and sensor.begin_us <= activities[number].end_us
+        readings.append(sensor._replace(activity=activities[number].activity if is_part else ""))
+    # Of readings with the same begin, being out comes last, so that it holds.
     return sorted(readings, key=lambda reading: (reading.begin_us, reading.room == AWAY))

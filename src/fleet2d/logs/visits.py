@@ -1,4 +1,4 @@
-"""From readings to visits: where a body is from which step to which, and what nobody knows."""
+"""Visits: the rooms that a body is in according to a log, step by step, and the gaps between."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -9,17 +9,17 @@ from fleet2d.logs.rooms import DOOR, RoomChoice
 UNKNOWN = "unknown"
 
 
-class Rule(NamedTuple):
-    """How readings are made into visits.
+class VisitRule(NamedTuple):
+    """How readings are turned into visits.
 
     Attributes:
         step_us: Length of a step [us].
         begin_us: The moment of the log that is step 0 [us].
-        steps: Number of steps.
-        gap_us: A silence between two rooms that lasts longer is a gap.
-        still_us: A silence in one room up to this long is no gap: who sleeps trips no sensor.
-        unknown: Whether nobody is said to be anywhere in a gap.
-        door_us: A silence at the front door that lasts longer is being out.
+        steps: The number of steps.
+        gap_us: A longer silence between two rooms is a gap [us].
+        still_us: A silence in one room up to this long is no gap: sleepers trip no sensor [us].
+        unknown: Whether the position in a gap is unknown; else the last visit lasts through it.
+        door_us: A longer silence at the front door means that the person is out [us].
     """
 
     step_us: int
@@ -31,8 +31,15 @@ class Rule(NamedTuple):
     door_us: int
 
 
-class Claim(NamedTuple):
-    """A reading in steps: the body is in a room from one step to another, both included."""
+class RoomInterval(NamedTuple):
+    """A reading in steps: the body is in a room from one step to another, both included.
+
+    Attributes:
+        first: The first step.
+        last: The last step.
+        place: The room or kind of room, "away" or "door".
+        activity: What it does there, "" if unknown.
+    """
 
     first: int
     last: int
@@ -40,16 +47,16 @@ class Claim(NamedTuple):
     activity: str
 
 
-class Visit(NamedTuple):
+class LoggedVisit(NamedTuple):
     """A time in one room.
 
     Attributes:
-        first: The step at which the body is there.
-        keep: The step up to which it must stay: a reading of an instant, or the begin of one that
-            lasts, of which the end may be cut for the way to what comes next.
+        first: The first step at which the body is there.
+        keep: The step up to which it must stay. A reading that lasts has to be kept only at its
+            begin: its end may be cut for the way to the next visit.
         last: The last step at which the log says that it is there.
         place: The room or kind of room, "away", "door" or "unknown".
-        activities: What it does from which step on.
+        activities: Pairs of a step and the activity from that step on.
     """
 
     first: int
@@ -59,48 +66,59 @@ class Visit(NamedTuple):
     activities: tuple[tuple[int, str], ...] = ()
 
 
-class Told(NamedTuple):
-    """The visits of a run, and the number of readings that lost against others at their step."""
+class LoggedVisits(NamedTuple):
+    """The visits of a run.
 
-    visits: list[Visit]
+    Attributes:
+        visits: The visits, in order.
+        unmapped: The number of readings whose label stands for no room.
+        overruled: The number of readings of another room than later ones at the same step.
+    """
+
+    visits: list[LoggedVisit]
     unmapped: int
     overruled: int
 
 
-def visits_of(log: ActivityLog, rooms: Mapping[str, RoomChoice | None], rule: Rule) -> Told:
-    """Return where a log says that the body is, from step 0 on.
+def visits_of(
+    log: ActivityLog, rooms: Mapping[str, RoomChoice | None], rule: VisitRule
+) -> LoggedVisits:
+    """Return the visits of a log, from step 0 on.
 
-    At each step the reading that began last holds; when it ends before an earlier one does, that
-    one holds again. What a single reading of an instant says counts for the step that holds it.
+    At each step the reading that began last holds; if it ends before an earlier one, that one holds
+    again. A reading of an instant holds for the step that the instant lies in.
     """
-    claims, unmapped = [], 0
+    intervals, unmapped = [], 0
     for reading in log.readings:
         choice = rooms[reading.room]
         if choice is None:
             unmapped += 1
         else:
-            claims.append(_claim(reading, choice[0], rule))
-    pieces, overruled = _sweep(claims)
-    return Told(_without_gaps(_merged(pieces, rule), rule), unmapped, overruled)
+            intervals.append(_interval(reading, choice[0], rule))
+    pieces, overruled = _sweep(intervals)
+    return LoggedVisits(_without_gaps(_merged(pieces, rule), rule), unmapped, overruled)
 
 
-def _claim(reading: Reading, place: str, rule: Rule) -> Claim:
+def _interval(reading: Reading, place: str, rule: VisitRule) -> RoomInterval:
     first = (reading.begin_us - rule.begin_us) // rule.step_us
     last = -(-(reading.end_us - rule.begin_us) // rule.step_us) - 1
-    return Claim(first, max(first, last), place, reading.activity)
+    return RoomInterval(first, max(first, last), place, reading.activity)
 
 
-def _sweep(claims: Sequence[Claim]) -> tuple[list[tuple[Claim, bool]], int]:
-    """Return disjoint pieces of claims in order, each with whether it is an instant."""
-    pieces: list[tuple[Claim, bool]] = []
-    under_way: list[tuple[Claim, int]] = []
+def _sweep(intervals: Sequence[RoomInterval]) -> tuple[list[tuple[RoomInterval, bool]], int]:
+    """Return disjoint pieces of intervals in order, and the number of overruled intervals.
+
+    Each piece comes with whether its interval is an instant.
+    """
+    pieces: list[tuple[RoomInterval, bool]] = []
+    active: list[tuple[RoomInterval, int]] = []  # a stack: the last one began last
     shown: set[int] = set()
     now = 0
 
     def advance(end: int | None) -> None:
         nonlocal now
-        while under_way and (end is None or now < end):
-            top, number = under_way[-1]
+        while active and (end is None or now < end):
+            top, number = active[-1]
             last = top.last if end is None else min(top.last, end - 1)
             if last >= now:
                 pieces.append((top._replace(first=now, last=last), top.first == top.last))
@@ -108,56 +126,61 @@ def _sweep(claims: Sequence[Claim]) -> tuple[list[tuple[Claim, bool]], int]:
                 now = last + 1
             if end is not None and top.last >= end:
                 break
-            under_way.pop()
+            active.pop()
 
-    for number, claim in enumerate(claims):
-        advance(claim.first)
-        under_way.append((claim, number))
-        now = claim.first
+    for number, interval in enumerate(intervals):
+        advance(interval.first)
+        active.append((interval, number))
+        now = interval.first
     advance(None)
-    # Who is in the same room anyway isn't overruled.
-    where = {claim.first: claim.place for claim, _ in pieces}
-    lost = [c for i, c in enumerate(claims) if i not in shown and where.get(c.first) != c.place]
-    return pieces, len(lost)
+    # An interval without a piece isn't overruled if the piece at its begin is of the same room.
+    place_at = {piece.first: piece.place for piece, _ in pieces}
+    overruled = [
+        interval
+        for number, interval in enumerate(intervals)
+        if number not in shown and place_at.get(interval.first) != interval.place
+    ]
+    return pieces, len(overruled)
 
 
-def _merged(pieces: Sequence[tuple[Claim, bool]], rule: Rule) -> list[Visit]:
-    """Join pieces in one room to visits; a long silence after the front door is being away."""
-    visits: list[Visit] = []
-    for claim, instant in pieces:
-        keep = claim.last if instant else claim.first
-        visit = Visit(claim.first, keep, claim.last, claim.place, ((claim.first, claim.activity),))
+def _merged(pieces: Sequence[tuple[RoomInterval, bool]], rule: VisitRule) -> list[LoggedVisit]:
+    """Join pieces in one room to visits; after a long silence at the front door, one is away."""
+    visits: list[LoggedVisit] = []
+    for piece, is_instant in pieces:
+        keep = piece.last if is_instant else piece.first
+        activity = (piece.first, piece.activity)
+        visit = LoggedVisit(piece.first, keep, piece.last, piece.place, (activity,))
         before = visits[-1] if visits else None
-        if before is None or before.place != claim.place:
+        if before is None or before.place != piece.place:
             visits.append(visit)
             continue
-        silence_us = (claim.first - before.last - 1) * rule.step_us
-        if claim.place == DOOR and silence_us > rule.door_us:
-            out = Visit(before.last + 1, claim.first - 1, claim.first - 1, AWAY)
+        silence_us = (piece.first - before.last - 1) * rule.step_us
+        if piece.place == DOOR and silence_us > rule.door_us:
+            out = LoggedVisit(before.last + 1, piece.first - 1, piece.first - 1, AWAY)
             visits += [out, visit]
         elif silence_us > rule.still_us:
             visits.append(visit)
         else:
-            done = before.activities
-            if not done or claim.activity != done[-1][1]:
-                done = (*done, *visit.activities)
-            visits[-1] = Visit(before.first, keep, claim.last, claim.place, done)
+            activities = before.activities
+            if not activities or piece.activity != activities[-1][1]:
+                activities = (*activities, activity)
+            visits[-1] = LoggedVisit(before.first, keep, piece.last, piece.place, activities)
     return visits
 
 
-def _without_gaps(visits: Sequence[Visit], rule: Rule) -> list[Visit]:
-    """Return the visits within the run, with those nowhere known in between."""
-    filled: list[Visit] = []
-    end = -1  # the last step that is told
+def _without_gaps(visits: Sequence[LoggedVisit], rule: VisitRule) -> list[LoggedVisit]:
+    """Return the visits within the run, with visits to "unknown" in the gaps between them."""
+    filled: list[LoggedVisit] = []
+    end = -1  # the last known step
     for number, visit in enumerate(visits):
         silence = visit.first - end - 1
-        gap = silence * rule.step_us > rule.gap_us and rule.unknown
-        if (number == 0 and silence > 0) or gap:
-            filled.append(Visit(end + 1, visit.first - 1, visit.first - 1, UNKNOWN))
+        is_gap = silence * rule.step_us > rule.gap_us and rule.unknown
+        if (number == 0 and silence > 0) or is_gap:
+            filled.append(LoggedVisit(end + 1, visit.first - 1, visit.first - 1, UNKNOWN))
         filled.append(visit)
         end = visit.last
     if end + 1 < rule.steps:
-        filled.append(Visit(end + 1, rule.steps, rule.steps, UNKNOWN))
-    begun = [visit for visit in filled if visit.first < rule.steps]
-    earlier = [number for number, visit in enumerate(begun) if visit.first <= 0]
-    return begun[max(earlier, default=0) :]
+        filled.append(LoggedVisit(end + 1, rule.steps, rule.steps, UNKNOWN))
+    of_run = [visit for visit in filled if visit.first < rule.steps]
+    earlier = [number for number, visit in enumerate(of_run) if visit.first <= 0]
+    return of_run[max(earlier, default=0) :]

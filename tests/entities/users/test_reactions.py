@@ -173,7 +173,7 @@ def test_who_gives_up_what_it_did_rests() -> None:
 def test_manners_are_the_personas_unless_given() -> None:
     def kept(*behaviors: Any) -> Any:
         users = {"ana": {"behaviors": list(behaviors)}}
-        return Simulation(scenario(users=users)).actors["ana"].behaviors[0].kept
+        return Simulation(scenario(users=users)).actors["ana"].behaviors[0].used_manners
 
     routine = {"type": "routine", "persona": "child"}
     assert bundled_persona("child").manners == kept("reactions", routine)

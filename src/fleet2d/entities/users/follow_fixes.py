@@ -1,4 +1,4 @@
-"""From position fixes to a plan: the body is at each fix when the log says so."""
+"""Plans that follow position fixes: the body is at each fix at the time of the log."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
 
 I64 = NDArray[np.int64]
 
-# Nothing of a home is farther away than that [m].
+# Coordinates are clipped to this, far outside of any home [m].
 FAR = 1e6
-# A move shorter than this says nothing about where somebody looks [m].
+# A move shorter than this is ignored for the heading [m].
 STIR = 0.1
 
 
 @dataclass(frozen=True)
 class Fixes:
-    """Fixes as the body can follow them.
+    """Fixes that the body can follow.
 
     Attributes:
-        time_us: When [us since the start of the run], rising, int64 (n,).
-        xy: Where, free places that the body can get to [lattice], int64 (n, 2).
-        heading: 0 to 4095, or -1 where the log has none, int64 (n,).
-        snapped: How many were moved off a wall.
-        outside: How many were too far from any free place, and left out.
+        time_us: Times [us since the start of the run], ascending, int64 (n,).
+        xy: Positions, all free and reachable [lattice], int64 (n, 2).
+        heading: Headings [1/4096 turn], -1 where the log has none, int64 (n,).
+        snapped: The number of fixes that were moved to the nearest free place.
+        outside: The number of fixes that were left out, too far from any free place.
     """
 
     time_us: I64
@@ -55,13 +55,13 @@ def place_fixes(
 
     Args:
         actor: The body.
-        time_us: When [us since the start of the run], rising, int64 (n,).
-        xy: Where, in the plan [m], float64 (n, 2).
+        time_us: Times [us since the start of the run], ascending, int64 (n,).
+        xy: Positions in the plan [m], float64 (n, 2).
         turns: Headings in the plan [turns], NaN where there is none.
         reach: A fix farther than this from any such place is left out [m].
     """
     lattice, space = actor.home.plan.lattice, actor.space
-    size = 1 << 20  # beyond any home, and safe to round
+    size = 1 << 20  # beyond any home, within 64 bits when squared
     points: I64 = np.clip(lattice.to_lattice(np.clip(xy, -FAR, FAR)), -size, size)
     fits = [
         0 <= x < size and 0 <= y < size and space.part_at(x, y) == actor.part
@@ -72,24 +72,30 @@ def place_fixes(
     away: I64 = near - points[off]
     far = (away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2
     points[off] = near
-    kept = np.ones(len(points), bool)
-    kept[off[far]] = False
+    is_inside = np.ones(len(points), bool)
+    is_inside[off[far]] = False
     known = np.isfinite(turns)
     heading = np.full(len(turns), -1, np.int64)
     heading[known] = np.floor(turns[known] * TURN + 0.5).astype(np.int64) % TURN
-    outside = int(np.count_nonzero(~kept))
-    return Fixes(time_us[kept], points[kept], heading[kept], len(off) - outside, outside)
+    outside = int(np.count_nonzero(~is_inside))
+    return Fixes(
+        time_us[is_inside],
+        points[is_inside],
+        heading[is_inside],
+        snapped=len(off) - outside,
+        outside=outside,
+    )
 
 
 class FixFollower:
-    """Lays a plan through fixes: straight from each to the next where that is free, else around.
+    """Plans the way through fixes: straight from each to the next if that is free, else around.
 
     Args:
         actor: The body.
-        fixes: Where it is when.
-        gap_us: Between two fixes farther apart in time than this, nobody knows where it is.
-        gaps: What is done then: "unknown"; "hold": stay, and leave in time to be at the next fix;
-            "walk": take all that time for the way.
+        fixes: Its positions.
+        gap_us: Two fixes farther apart in time than this have a gap between them.
+        gaps: What happens in a gap: "unknown": the body is away; "hold": it stays, and leaves in
+            time for the next fix; "walk": it takes all that time for the way.
         fastest: A leg faster than this is counted as implausible [m/s].
     """
 
@@ -105,7 +111,7 @@ class FixFollower:
         self.heading = self._headings()
 
     def follow(self, plan: "Plan") -> "Plan":
-        """Lay a plan from its beginning to the last fix; the body is put there where it must."""
+        """Fill a plan from its beginning, with a jump to the present fix, to the last fix."""
         time = self.fixes.time_us
         end_us = self.actor.clock.steps * self.actor.clock.step_us
         i = int(np.searchsorted(time, plan.time_us, side="right")) - 1
@@ -121,7 +127,7 @@ class FixFollower:
             elif time[j] - time[j - 1] <= self.gap_us:
                 self._leg(plan, j - 1, j, plan.time_us)
             elif self.gaps == "unknown":
-                self._vanish(plan, plan.time_us + 1)  # at the fix itself it is there
+                self._vanish(plan, plan.time_us + 1)  # at the fix itself it is known
                 self.gap_count += 1
                 self.unknown_us += int(time[j] - time[j - 1])
                 self._appear(plan, j)
@@ -130,21 +136,20 @@ class FixFollower:
                 if self.gaps == "hold":
                     leave = max(leave, int(time[j]) - self._takes(j - 1, j))
                 self._leg(plan, j - 1, j, leave)
-        left = end_us - plan.time_us
-        if len(time) and not plan.away and left > self.gap_us:
+        if len(time) and not plan.away and end_us - plan.time_us > self.gap_us:
             self._vanish(plan, plan.time_us + 1)
         return plan.stay()
 
     def _headings(self) -> I64:
-        """Return the heading at each fix: the log's, else where it goes next."""
+        """Return the heading at each fix: the log's, else the direction to the next fix."""
         xy, heading = self.fixes.xy, self.fixes.heading.copy()
         stir = STIR * self.actor.home.plan.lattice.units_per_m
         last = 0
         moves = np.diff(xy, axis=0, append=xy[-1:])
         for i, (dx, dy) in enumerate(moves.tolist()):
             if heading[i] < 0:
-                far = dx * dx + dy * dy >= stir * stir
-                heading[i] = heading_of(dx, dy) if far else last
+                has_moved = dx * dx + dy * dy >= stir * stir
+                heading[i] = heading_of(dx, dy) if has_moved else last
             last = int(heading[i])
         return heading
 
@@ -153,8 +158,9 @@ class FixFollower:
         return np.array([[at_us, x, y, self.heading[i], away]], np.int64)
 
     def _vanish(self, plan: "Plan", at_us: int) -> None:
-        still = [plan.x, plan.y, plan.heading]
-        plan.follow(np.array([[at_us, *still, plan.away], [at_us, *still, 1]], np.int64))
+        """Make the body's position unknown: it is away, without having walked out."""
+        pose = [plan.x, plan.y, plan.heading]
+        plan.follow(np.array([[at_us, *pose, plan.away], [at_us, *pose, 1]], np.int64))
         plan.note("unknown")
 
     def _appear(self, plan: "Plan", i: int) -> None:
@@ -164,7 +170,7 @@ class FixFollower:
         plan.note("known")
 
     def _route(self, i: int, j: int) -> I64:
-        """Return the way from a fix to another: straight if that is free."""
+        """Return the route from a fix to another, straight if that is free; int64 (n, 2)."""
         (ax, ay), (bx, by) = self.fixes.xy[i].tolist(), self.fixes.xy[j].tolist()
         space = self.actor.space
         straight = straight_way((ax, ay), (bx, by))
@@ -182,7 +188,7 @@ class FixFollower:
         return int(rows[-1, 0])
 
     def _leg(self, plan: "Plan", i: int, j: int, leave_us: int) -> None:
-        """Go from fix i, left at a moment, to fix j, at an even speed all the way."""
+        """Go from fix i, from a moment on, to fix j, at a constant speed."""
         route = self._route(i, j)
         arrive_us = int(self.fixes.time_us[j])
         moves = np.diff(route, axis=0)

@@ -1,4 +1,4 @@
-"""From visits to a plan: the body is in each room at the step at which the log says so."""
+"""Plans that follow visits of rooms: the body is in each room at the step of the log."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from fleet2d.floorplan.home.space import straight_way
 from fleet2d.kernels.motion import time_route
 from fleet2d.logs.log import AWAY
 from fleet2d.logs.rooms import DOOR
-from fleet2d.logs.visits import UNKNOWN, Visit
+from fleet2d.logs.visits import UNKNOWN, LoggedVisit
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
 
 I64 = NDArray[np.int64]
 
-# Who is in a room for less than this goes no farther into it than the way takes [us].
+# In visits shorter than this, the body stops at the nearest point of the room [us].
 BRIEF_US = 10_000_000
 
 
 @dataclass
 class Paces:
-    """What walks in a replay came to.
+    """Counts of the walks in a replay.
 
     Attributes:
-        walks: How many there were.
-        hurried: How many were faster than the body walks, because the log leaves no more time.
-        over: How many of those were implausibly fast.
-        fastest: Speed of the fastest [m/s].
+        walks: The number of walks.
+        hurried: Those faster than the body walks, because the log leaves no more time.
+        over: Those of the hurried ones that are implausibly fast.
+        fastest: The speed of the fastest walk [m/s].
     """
 
     walks: int = 0
@@ -43,11 +43,11 @@ class Paces:
 
 
 class RoomFollower:
-    """Lays a plan through visits: leaves each room in time to be in the next one when it has to.
+    """Plans the way through visits: the body leaves each room in time for the next visit.
 
     Args:
         actor: The body.
-        visits: Where it is when; the first from step 0 or before.
+        visits: Its visits, in order; the first begins at step 0 or before.
         at_once: Whether it goes to the next room as soon as it may, and waits there.
         limit: A walk faster than this is counted as implausible [m/s].
     """
@@ -55,7 +55,7 @@ class RoomFollower:
     def __init__(
         self,
         actor: "Actor",
-        visits: Sequence[Visit],
+        visits: Sequence[LoggedVisit],
         at_once: bool = False,
         limit: float = float("inf"),
     ) -> None:
@@ -68,13 +68,13 @@ class RoomFollower:
         self._nearest: dict[int, Nearest] = {}
 
     def follow(self, plan: "Plan", current: int, *, rejoin: bool) -> "Plan":
-        """Lay a plan from its beginning, in visit `current`, to the end of the log.
+        """Fill a plan from its beginning, in visit `current`, to the end of the log.
 
         Args:
             plan: An empty plan.
-            current: The visit under way when it begins.
-            rejoin: Whether the body may be somewhere else, and walks there first; else it is put
-                there.
+            current: The number of the visit at the beginning of the plan.
+            rejoin: Whether the body may be somewhere else, and walks to the visit's room first;
+                else it is put there.
         """
         if rejoin:
             self._catch_up(plan, self.visits[current])
@@ -85,7 +85,7 @@ class RoomFollower:
         for i in range(current + 1, len(self.visits)):
             before, visit = self.visits[i - 1], self.visits[i]
             arrive_us = visit.first * self.step_us
-            self._tell_activities(plan, before)
+            self._note_activities(plan, before)
             if arrive_us <= plan.time_us:  # still catching up
                 self._catch_up(plan, visit)
             elif visit.place == UNKNOWN:
@@ -94,11 +94,11 @@ class RoomFollower:
                 self._appear(plan, visit, arrive_us)
             else:
                 self._walk(plan, before, visit)
-        self._tell_activities(plan, self.visits[-1])
+        self._note_activities(plan, self.visits[-1])
         return plan.stay()
 
-    def _catch_up(self, plan: "Plan", visit: Visit) -> None:
-        """Be where one should have been already, as soon as the way allows."""
+    def _catch_up(self, plan: "Plan", visit: LoggedVisit) -> None:
+        """Walk to a visit that has already begun."""
         if visit.place == UNKNOWN:
             self._vanish(plan, plan.time_us)
         elif visit.place == AWAY:
@@ -106,19 +106,19 @@ class RoomFollower:
         else:
             plan.go_to_point(*self._spot(visit, plan))
 
-    def _spot(self, visit: Visit, plan: "Plan") -> tuple[int, int]:
+    def _spot(self, visit: LoggedVisit, plan: "Plan") -> tuple[int, int]:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
         return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
 
     def _vanish(self, plan: "Plan", at_us: int) -> None:
-        """Let nobody know where the body is: it is away, without having walked out."""
-        still = [plan.x, plan.y, plan.heading]
-        plan.follow(np.array([[at_us, *still, plan.away], [at_us, *still, 1]], np.int64))
+        """Make the body's position unknown: it is away, without having walked out."""
+        pose = [plan.x, plan.y, plan.heading]
+        plan.follow(np.array([[at_us, *pose, plan.away], [at_us, *pose, 1]], np.int64))
         plan.note("unknown")
 
-    def _appear(self, plan: "Plan", visit: Visit, at_us: int, *, known: bool = True) -> None:
-        """Put the body where the log has it again."""
+    def _appear(self, plan: "Plan", visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
+        """Put the body where the log has it."""
         away = int(visit.place == AWAY)
         x, y = self._spot(visit, plan)
         before = [at_us, plan.x, plan.y, plan.heading, plan.away]
@@ -126,8 +126,8 @@ class RoomFollower:
         if known:
             plan.note("known", visit.place)
 
-    def _walk(self, plan: "Plan", before: Visit, visit: Visit) -> None:
-        """Go from one visit to the next, leaving so as to be there in time."""
+    def _walk(self, plan: "Plan", before: LoggedVisit, visit: LoggedVisit) -> None:
+        """Walk from one visit to the next, so as to arrive in time."""
         arrive_us = visit.first * self.step_us
         may_leave = max(plan.time_us, before.keep * self.step_us)
         if before.place == AWAY:
@@ -142,14 +142,14 @@ class RoomFollower:
             rows = self._way(plan, self._near(plan, spot))
         self._set_out(plan, rows, may_leave, arrive_us, before)
         if visit.place == AWAY:
-            here = [arrive_us, plan.x, plan.y, plan.heading]
-            plan.follow(np.array([[*here, 0], [*here, 1]], np.int64))
+            pose = [arrive_us, plan.x, plan.y, plan.heading]
+            plan.follow(np.array([[*pose, 0], [*pose, 1]], np.int64))
             plan.note("left_home")
 
-    def _come_home(self, plan: "Plan", out: Visit, arrive_us: int) -> None:
+    def _come_home(self, plan: "Plan", out: LoggedVisit, arrive_us: int) -> None:
         back_us = max(plan.time_us, min((out.last + 1) * self.step_us, arrive_us - 1))
-        here = [back_us, plan.x, plan.y, plan.heading]
-        plan.follow(np.array([[*here, 1], [*here, 0]], np.int64))
+        pose = [back_us, plan.x, plan.y, plan.heading]
+        plan.follow(np.array([[*pose, 1], [*pose, 0]], np.int64))
         plan.note("came_home")
 
     def _near(self, plan: "Plan", spot: tuple[int, int]) -> tuple[int, int]:
@@ -164,15 +164,16 @@ class RoomFollower:
         return x, y
 
     def _way(self, plan: "Plan", spot: tuple[int, int]) -> I64:
-        """Return the breakpoints (time since setting out, x, y, heading) of the way to a spot."""
+        """Return the breakpoints of the way to a spot: time since its begin, x, y, heading."""
         route = self.actor.space.route((plan.x, plan.y), spot)
-        if route is None:  # a door is shut at present: straight on, for the log knows better
+        if route is None:  # a door is shut at present, but the log says that somebody went there
             route = straight_way((plan.x, plan.y), spot)
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(
-        self, plan: "Plan", rows: I64, may_leave: int, arrive_us: int, before: Visit
+        self, plan: "Plan", rows: I64, may_leave: int, arrive_us: int, before: LoggedVisit
     ) -> None:
+        """Follow the breakpoints of a way, at a time and speed that let the body arrive in time."""
         takes = int(rows[-1, 0])
         if not takes:
             plan.follow(np.array([[arrive_us, *rows[-1, 1:], 0]], np.int64))
@@ -195,8 +196,8 @@ class RoomFollower:
         block[-1, 0] = arrive_us
         plan.follow(block)
 
-    def _tell_activities(self, plan: "Plan", visit: Visit) -> None:
-        """Note what is done in a visit, from when on; what is past is told already."""
+    def _note_activities(self, plan: "Plan", visit: LoggedVisit) -> None:
+        """Add rows for the activities of a visit, except those before the plan begins."""
         for step, activity in visit.activities:
             at_us = max(step, 0) * self.step_us
             if activity and at_us >= plan.began[0] * self.step_us:

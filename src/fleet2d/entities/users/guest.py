@@ -1,4 +1,4 @@
-"""Guest: somebody who is out of the home until a script lets the person come."""
+"""Guest: a person who is out of the home until a script lets the person come."""
 
 from datetime import datetime
 
@@ -9,13 +9,13 @@ from fleet2d.entities.plan import Plan
 
 @register("behavior", "guest")
 class Guest(Behavior):
-    """Stay out of the home; whoever is in leaves by the way out.
+    """Stay out of the home; a person who is in it leaves by the way out.
 
     An intervention `guest` lets the person come.
     """
 
     def begins_at(self, time: datetime) -> tuple[()]:
-        """Return that the person is away at first."""
+        """Return (): the person is away at first."""
         return ()
 
     def decide(self, now: Situation) -> Plan:

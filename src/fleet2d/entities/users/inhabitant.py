@@ -1,4 +1,4 @@
-"""Inhabitant: what behaviors share that live by activities: where one does them, and how."""
+"""Inhabitants: the base of behaviors that do one activity after another in the home."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -28,31 +28,32 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import Room
 
 SECOND_US = 1_000_000
-# A day has fewer activities than half of that: a draw's address is the day's number times this.
+# Draws of a doing are addressed by the day's ordinal times this, plus the doing's number. A day has
+# fewer doings than half of it.
 DOINGS_A_DAY = 1024
-# What goes on after midnight has draws of its own.
-GOING_ON = DOINGS_A_DAY // 2
-# Nobody sets out for another spot when what they do is over sooner than that.
+# Added to the address for the part of a doing after midnight.
+AFTER_MIDNIGHT = DOINGS_A_DAY // 2
+# Within this time before the end of a doing, no small move begins.
 NEARLY_OVER_US = 90 * SECOND_US
-# Who may be interrupted any time plans what begins within that.
+# How far ahead people plan who may be interrupted by robots at any time.
 AHEAD_US = 1800 * SECOND_US
-# One turns to the side by up to half of two to the power of that: an eighth of a turn.
+# Random turns on the spot have this many bits, in headings: up to an eighth of a turn to each side.
 SIDEWAYS_BITS = 10
 
 
 @dataclass
 class _Last:
-    """What was done last.
+    """The last doing that was planned; doings are identified by day's ordinal and number.
 
     Attributes:
-        which: The day's ordinal and the number of the doing.
-        place: Where.
-        base: Where what was interrupted is done.
-        step: Up to which step that was planned.
-        given_up: What is not to be gone on with.
+        doing: Which doing it is.
+        place: Where it is done.
+        base: Where the planned doing that it interrupts is done.
+        step: The step up to which it was planned.
+        given_up: The doing that is not to be continued.
     """
 
-    which: tuple[int, int] | None = None
+    doing: tuple[int, int] | None = None
     place: Spot | Seat | None = None
     base: Spot | Seat | None = None
     step: int = -1
@@ -60,7 +61,7 @@ class _Last:
 
 
 class Inhabitant(Behavior):
-    """Base of behaviors that live by activities: a subclass says what is done on a day."""
+    """Base of behaviors that do activities: a subclass implements `day`, the doings of a day."""
 
     small_moves: bool = Field(
         default=True,
@@ -68,11 +69,11 @@ class Inhabitant(Behavior):
     )
 
     def day(self, ordinal: int) -> Sequence[Doing]:
-        """Return what is done on the day of a date's ordinal, from its beginning to the next's."""
+        """Return the doings of the day of a date's ordinal, until the next day begins."""
         raise NotImplementedError
 
     def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
-        """Return how long to wait before one may use a room [us]; None: better not at all."""
+        """Return how long to wait before it may use a room [us]; None: not now."""
         return 0
 
     def settle(
@@ -87,10 +88,11 @@ class Inhabitant(Behavior):
 
         Args:
             actor: The body.
-            activities: What it may do, by name.
-            spots: Where it can stand.
-            sleeps_in: Which of the bedrooms it sleeps in, counted on; None: any one, for good.
-            side: Which of how many sleepers of its bed it is.
+            activities: The activities that its days may have, by name.
+            spots: The spots where it may stand.
+            sleeps_in: The number of the bedroom that it sleeps in, modulo how many there are;
+                None: one drawn for the whole run.
+            side: Its rank among those who sleep in its bed, and their number.
 
         Raises:
             PlacementError: The home has none of an activity's rooms.
@@ -99,7 +101,7 @@ class Inhabitant(Behavior):
         self.last = _Last()
         self.clock = actor.clock
         self.spots = spots
-        self.own_part = actor.reachable_rooms()
+        self.reachable_rooms = actor.reachable_rooms()
         self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
         self._leave_out(actor)
         exclusive = (s for s in self.settings.values() if s.activity.exclusive)
@@ -112,7 +114,7 @@ class Inhabitant(Behavior):
         return tuple(self.settings)
 
     def perform(self, plan: Plan, activity: str) -> None:
-        """Go to where an activity is done, and sit or lie down as one does."""
+        """Go to where an activity is done, and take its posture."""
         setting = self._at_present(self.settings[activity])
         if setting.activity.away:
             plan.leave_home()
@@ -122,9 +124,9 @@ class Inhabitant(Behavior):
             raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
 
     def _leave_out(self, actor: "Actor") -> None:
-        """Rest instead of what this home has no room for, and note it."""
-        none = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]
-        for name in none:
+        """Replace activities that this home has no room for by rest, and note it."""
+        impossible = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]
+        for name in impossible:
             rooms = " or ".join(self.settings[name].activity.rooms)
             actor.notes.append(f"activities.{name}.rooms: left out, for this home has no {rooms}")
             self.settings[name] = self.settings[REST]
@@ -132,21 +134,19 @@ class Inhabitant(Behavior):
     def decide(self, now: Situation) -> Plan:
         """Plan the rest of the date.
 
-        All plans end at midnight, so that many bodies decide at the same step: the engine then has
-        few spans to take. Who reacts to robots plans less far ahead: it may all be for nothing.
+        All plans end at midnight: bodies that decide at the same step make fewer spans. People who
+        react to robots plan less far ahead, as they are interrupted more often.
         """
         plan, clock = now.plan(), now.actor.clock
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
         far_us = plan.time_us + AHEAD_US if now.actor.attention else midnight_us
         for ordinal, i, doing in self._doings(now.time):
             day_us = clock.elapsed(datetime.fromordinal(ordinal))
-            if (
-                plan.time_us >= min(far_us, midnight_us)
-                or day_us + doing.begin * SECOND_US >= midnight_us
-            ):
+            begin_us = day_us + doing.begin * SECOND_US
+            if plan.time_us >= min(far_us, midnight_us) or begin_us >= midnight_us:
                 break
             end_us = min(day_us + doing.end * SECOND_US, midnight_us)
-            if plan.time_us >= end_us:  # the way to it took longer than it lasts
+            if plan.time_us >= end_us:  # the way to the last doing took longer than this one lasts
                 continue
             if not self._do(plan, doing, (ordinal, i), end_us):
                 break
@@ -154,7 +154,7 @@ class Inhabitant(Behavior):
         return plan
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
-        """Return the name of the furniture of a kind at which it does things; where it sleeps."""
+        """Return the name of the furniture of a kind that it uses, first of all to sleep."""
         sleeps = [self.settings[SLEEP]] if SLEEP in self.settings else []
         for setting in (*sleeps, *self.settings.values()):
             for seat in setting.seats:
@@ -163,7 +163,7 @@ class Inhabitant(Behavior):
         return None
 
     def give_up(self, now: Situation) -> None:
-        """Rest instead of what one is doing, from the next plan on."""
+        """Rest for the remaining time of the present doing, from the next plan on."""
         for ordinal, i, doing in self._doings(now.time):
             day_us = now.actor.clock.elapsed(datetime.fromordinal(ordinal))
             if day_us + doing.end * SECOND_US > now.step * now.actor.clock.step_us:
@@ -171,7 +171,7 @@ class Inhabitant(Behavior):
                 return
 
     def _doings(self, time: datetime) -> Iterator[tuple[int, int, Doing]]:
-        """Yield what is done from a time on: the day's ordinal, the number in it, the doing."""
+        """Yield the doings from a time on: the day's ordinal, the number in it, the doing."""
         ordinal = time.toordinal()
         if time < datetime.fromordinal(ordinal) + timedelta(seconds=self.day(ordinal)[0].begin):
             ordinal -= 1
@@ -180,11 +180,11 @@ class Inhabitant(Behavior):
             ordinal += 1
 
     def _do(self, plan: Plan, doing: Doing, which: tuple[int, int], end_us: int) -> bool:
-        """Do something until `end_us`; which doing it is names its random draws.
+        """Add a doing to a plan, until `end_us`; `which` is the address of its random draws.
 
         Returns:
-            Whether it can be done. Where doors keep one from all of its rooms, the plan ends, for
-            they may be open when it is time; if that is now, one stays where one is instead.
+            Whether it can be done. If shut doors block all of its rooms, the plan ends before it,
+            as they may be open when it begins; if it begins now, the body stays where it is.
         """
         last = self.last
         if which == last.given_up:
@@ -194,10 +194,10 @@ class Inhabitant(Behavior):
             if plan.time_us <= plan.began[0] * self.clock.step_us:
                 plan.note("way_blocked", doing.activity).stay_until(end_us)
             return False
-        goes_on = last.which == which and plan.began[0] == last.step
+        is_continued = last.doing == which and plan.began[0] == last.step
         number = which[0] * DOINGS_A_DAY + which[1]
-        draws = Draws(self.key, number + GOING_ON if goes_on else number)
-        if not goes_on:
+        draws = Draws(self.key, number + AFTER_MIDNIGHT if is_continued else number)
+        if not is_continued:
             last.place = None
             last.base = None if doing.role == PLANNED else last.base
             if setting.activity.away:
@@ -211,31 +211,31 @@ class Inhabitant(Behavior):
                 if doing.role == PLANNED:
                     last.base = last.place
             plan.note("activity", doing.activity)
-        if last.place is not None and self.small_moves and setting.restless:
-            last.place = self._fidget(plan, setting, last.place, end_us, draws)
-        last.which = which
+        if last.place is not None and self.small_moves and setting.small_moves:
+            last.place = self._move_about(plan, setting, last.place, end_us, draws)
+        last.doing = which
         plan.stay_until(end_us)
         return True
 
     def _at_present(self, setting: Setting) -> Setting:
-        """Return where an activity is done while doors keep one from some of its rooms."""
-        reached = self.spots.reached(setting.rooms)
-        if len(reached) < len(setting.rooms):
-            did = setting.activity
-            seats = self.spots.at_furniture(did.objects, reached, did.posture)
-            setting = setting._replace(rooms=reached, seats=seats)
-        return setting._replace(stores=self.spots.reached(setting.stores))
+        """Return the setting of an activity, without the rooms that shut doors block at present."""
+        rooms = self.spots.reachable(setting.rooms)
+        if len(rooms) < len(setting.rooms):
+            activity = setting.activity
+            seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
+            setting = setting._replace(rooms=rooms, seats=seats)
+        return setting._replace(stores=self.spots.reachable(setting.stores))
 
     def _in_its_room(self, doing: Doing) -> Setting:
-        """Return where a doing is done, in the room that its household chose for it, if any."""
+        """Return the setting of a doing, in the room that its household chose for it, if any."""
         setting = self.settings[doing.activity]
-        room = next((room for room in self.own_part if room.index == doing.room), None)
+        room = next((room for room in self.reachable_rooms if room.index == doing.room), None)
         return setting if room is None else self._within(setting, room)
 
     def _within(self, setting: Setting, room: "Room") -> Setting:
-        """Return where an activity is done in a given room."""
-        did = setting.activity
-        seats = self.spots.at_furniture(did.objects, [room], did.posture)
+        """Return the setting of an activity, in one room only."""
+        activity = setting.activity
+        seats = self.spots.at_furniture(activity.objects, [room], activity.posture)
         return setting._replace(rooms=[room], seats=seats)
 
     def _go(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
@@ -255,7 +255,7 @@ class Inhabitant(Behavior):
         return place
 
     def _stay_in_the_room(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
-        """Do something in the room where one is: at its furniture, else on the spot."""
+        """Use the furniture of the room that the body is in, or else stay on the spot."""
         plan.come_home()
         room = self.spots.room_at(plan.x, plan.y)
         seats = [] if room is None else self._within(setting, room).seats
@@ -264,7 +264,7 @@ class Inhabitant(Behavior):
         return place
 
     def _nearest(self, plan: Plan, rooms: list["Room"]) -> "Room":
-        """Return the room whose middle is nearest, as the crow flies."""
+        """Return the room whose middle is nearest, in a straight line."""
         x, y = self.spots.in_metres(plan.x, plan.y)
 
         def distance(room: "Room") -> float:
@@ -273,28 +273,28 @@ class Inhabitant(Behavior):
 
         return min(rooms, key=distance)
 
-    def _fidget(
+    def _move_about(
         self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
     ) -> Spot | Seat:
         """Turn, move and fetch things at the activity's rates until it is nearly over.
 
         Returns:
-            The place that one ends at.
+            The place of the body at the end.
         """
         bits = Bits(draws)
-        next_us = [plan.time_us + _wait_us(law, bits) for _, law in setting.restless]
+        next_us = [plan.time_us + _wait_us(law, bits) for _, law in setting.small_moves]
         facing = plan.heading
         end_us -= NEARLY_OVER_US
         while True:
             k = min(range(len(next_us)), key=next_us.__getitem__)
             if next_us[k] >= end_us:
                 return place
-            what, law = setting.restless[k]
+            kind, law = setting.small_moves[k]
             plan.stay_until(next_us[k])
-            if what == "shifts":
+            if kind == "shifts":
                 aside = bits.take(SIDEWAYS_BITS) - (1 << SIDEWAYS_BITS) // 2
                 plan.turn_by(turn_between(plan.heading, (facing + aside) % TURN) / TURN)
-            elif what == "moves":
+            elif kind == "moves":
                 place = self._go_elsewhere(plan, setting, place, draws)
                 facing = plan.heading
             else:
@@ -305,7 +305,11 @@ class Inhabitant(Behavior):
     def _go_elsewhere(
         self, plan: Plan, setting: Setting, place: Spot | Seat, draws: Draws
     ) -> Spot | Seat:
-        """Go from the furniture to a spot in the room, from there back or to another spot."""
+        """Go from the furniture to a spot in the room, or from a spot to the furniture or another.
+
+        Returns:
+            The place of the body then.
+        """
         if setting.seats and isinstance(place, Spot):
             return self._go(plan, setting, draws)
         spot = draws.choice(self.spots.in_room(draws.choice(setting.rooms)))
@@ -315,7 +319,7 @@ class Inhabitant(Behavior):
     def _fetch(
         self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
     ) -> None:
-        """Go to another room, stay a moment, and come back, if there is time and a way."""
+        """Go to another room, stay there shortly, and come back, if there is time for it."""
         if not setting.stores:
             return
         takes_us = setting.fetch_takes.draw(draws) * SECOND_US
@@ -336,36 +340,36 @@ class Inhabitant(Behavior):
             if activity.choose == "own"
             else self._all_rooms(actor, activity.rooms)
         )
-        restless = [
-            (what, exponential(seconds(mean)))
-            for what in ("shifts", "moves", "fetches")
-            if (mean := getattr(activity, what)) is not None
+        small_moves = [
+            (kind, exponential(seconds(mean)))
+            for kind in ("shifts", "moves", "fetches")
+            if (mean := getattr(activity, kind)) is not None
         ]
         return Setting(
             activity,
             rooms,
             self.spots.at_furniture(activity.objects, rooms, activity.posture),
             self._own_rooms(actor, activity.fetches_from) if activity.fetches else [],
-            tuple(restless),
+            tuple(small_moves),
             activity.fetch_takes.table(),
         )
 
     def _bed(
         self, actor: "Actor", sleep: Activity, sleeps_in: int, side: tuple[int, int]
     ) -> Setting:
-        """Return where a member of a household sleeps: beside nobody but its partner."""
+        """Return the setting of sleep for a member of a household, whose bed it may share."""
         rooms = _match(actor, sleep.rooms)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
         return self._setting(actor, sleep)._replace(rooms=[room], seats=seats)
 
     def _all_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
-        """Return the rooms of all kinds that a list names and that there are."""
-        rooms = [r for name in names for r in self.own_part if name in (r.name, r.type)]
+        """Return the reachable rooms of all kinds that a list names."""
+        rooms = [r for name in names for r in self.reachable_rooms if name in (r.name, r.type)]
         return list(dict.fromkeys(rooms)) or _match(actor, names)[1]
 
     def _own_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
-        """Return the rooms that a list of names stands for: of several of a kind, its own one."""
+        """Return the rooms of the first name that matches: of several of a kind, one for good."""
         name, rooms = _match(actor, names)
         if name == "any" or not rooms:
             return rooms
@@ -382,7 +386,7 @@ def _match(actor: "Actor", names: "RoomChoice") -> tuple[str, list["Room"]]:
 
 
 def rooms_at(doings: Iterable[Doing], time_s: int, activities: dict[str, Activity]) -> "RoomChoice":
-    """Return the rooms of what is done at a time; () if that is out of the home."""
+    """Return the rooms of the doing at a time; () if that is out of the home."""
     for doing in doings:
         if doing.begin <= time_s < doing.end:
             activity = activities[doing.activity]
@@ -391,5 +395,5 @@ def rooms_at(doings: Iterable[Doing], time_s: int, activities: dict[str, Activit
 
 
 def _wait_us(law: Law, bits: Bits) -> int:
-    """Return one of a law's quantiles [us]: fine enough for when somebody stirs."""
+    """Draw one of a law's quantiles [us], which is fine enough for small moves."""
     return law.knots[bits.take(KNOTS.bit_length() - 1)] * SECOND_US

@@ -1,4 +1,4 @@
-"""Pet: a cat or a dog that sleeps most of the day, and roams between."""
+"""Pet: a cat or a dog that sleeps most of the day, and roams through the home in between."""
 
 from datetime import timedelta
 from typing import TYPE_CHECKING, Self
@@ -25,8 +25,8 @@ NAPS = 10
 class Pet(Behavior):
     """Nap somewhere, roam through a few spots of the home, nap somewhere else.
 
-    Naps and stops have lengths by law. The next spot is in the same room or in any other that it
-    may enter, by `stays_in_room`.
+    The durations of naps and stops are drawn from their laws. The next spot is in the same room
+    with probability `stays_in_room`, else in any room that it may enter.
     """
 
     rooms: tuple[str, ...] = Field(
@@ -41,7 +41,7 @@ class Pet(Behavior):
         description="how long it stops at a spot while it roams",
     )
     spots: tuple[int, int] = Field(
-        default=(3, 12), description="at how many spots it stops between two naps, least and most"
+        default=(3, 12), description="least and most number of stops between two naps"
     )
     stays_in_room: float = Field(
         default=0.6, ge=0, le=1, description="how likely its next spot is in the same room"
@@ -56,15 +56,15 @@ class Pet(Behavior):
 
     def start(self, actor: "Actor") -> None:
         """Find the rooms that it may enter."""
-        named = available_rooms(actor, "pet.rooms", self.rooms)
-        self.entered = named or actor.reachable_rooms()
+        rooms = available_rooms(actor, "pet.rooms", self.rooms)
+        self.allowed_rooms = rooms or actor.reachable_rooms()
         self.places = Spots(actor)
         self.laws = self.nap.table(), self.stop.table()
         self.naps = 0
-        self.room = Draws(actor.stream("first room"), 0).choice(self.entered)
+        self.room = Draws(actor.stream("first room"), 0).choice(self.allowed_rooms)
 
     def decide(self, now: Situation) -> Plan:
-        """Plan the next naps, and the ways between them."""
+        """Plan the next naps, and the stops between them."""
         plan = now.plan()
         nap, stop = self.laws
         least, most = self.spots
@@ -72,13 +72,14 @@ class Pet(Behavior):
             draws = Draws(now.actor.stream("roam"), self.naps)
             self.naps += 1
             for _ in range(least + draws.below(most - least + 1)):
-                self._go_on(plan, draws)
+                self._walk(plan, draws)
                 plan.stay(timedelta(seconds=stop.draw(draws)))
-            self._go_on(plan, draws)
+            self._walk(plan, draws)
             plan.take("lie").stay(timedelta(seconds=nap.draw(draws)))
         return plan
 
-    def _go_on(self, plan: Plan, draws: Draws) -> None:
+    def _walk(self, plan: Plan, draws: Draws) -> None:
+        """Walk to the next spot."""
         if draws.uniform() >= self.stays_in_room:
-            self.room = draws.choice(self.entered)
+            self.room = draws.choice(self.allowed_rooms)
         draws.choice(self.places.in_room(self.room)).walk(plan)

@@ -25,29 +25,29 @@ if TYPE_CHECKING:
 
 @register("behavior", "population")
 class Population(Inhabitant):
-    """Live as somebody drawn from the American Time Use Survey 2022-2023.
+    """Live as a person drawn from the American Time Use Survey 2022-2023.
 
-    Of many such people, the share that does each activity at each hour is the survey's, for
-    weekdays and weekends. A person keeps at an activity for as long as its mean duration in the
-    survey lets expect, but knows no habits: no day is like the one before.
+    Among many such people, the share that does each activity at each hour is that of the survey,
+    for weekdays and weekends. The durations of activities follow their means in the survey. A
+    person has no habits: every day is drawn independently.
     """
 
     group: Literal["any", "workers", "retired", "working_parents", "at_home"] = Field(
-        default="any", description="whose days; any: drawn by the groups' shares of the people"
+        default="any", description="group of people; any: drawn by the groups' shares of the people"
     )
 
     bodily_needs: bool = Field(
         default=True,
         description="whether an adult's needs and errands interrupt what is done, which the survey"
-        " doesn't tell: its shares count them as what they interrupt",
+        " doesn't record: its shares count them as what they interrupt",
     )
 
     def start(self, actor: "Actor") -> None:
-        """Draw who it is, and find where its activities are done."""
+        """Draw the person's group, and find where the activities are done in the home."""
         self.days = actor.stream("day")
         self.details = actor.stream("details")
         draws = Draws(actor.stream("who"), 0)
-        self.people = survey.group(_drawn_group(draws) if self.group == "any" else self.group)
+        self.people = survey.group(_draw_group(draws) if self.group == "any" else self.group)
         self.at_home = works_at_home(self.people, draws)
         self.first = actor.clock.start.toordinal() - 1
         self.states = [survey.first_state(self.people, draws, self.first)]
@@ -61,7 +61,7 @@ class Population(Inhabitant):
         self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
-        """Return where one likely is at that time."""
+        """Return the rooms of a likely activity at that time."""
         draws, known = Draws(stream_key(0, "", "likely"), 0), catalogue()
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()
@@ -89,7 +89,7 @@ class Population(Inhabitant):
         return interrupted(self.body, Draws(self.interruptions, ordinal), day)
 
 
-def _drawn_group(draws: Draws) -> str:
+def _draw_group(draws: Draws) -> str:
     """Draw a group by its share of the people."""
     names = survey.groups()
     shares = [survey.table()["groups"][name]["share"] for name in names]

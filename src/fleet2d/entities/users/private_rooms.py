@@ -1,4 +1,4 @@
-"""Private rooms: where members of a household do what wants a room to itself."""
+"""Private rooms: where members of a household do activities that they don't share a room for."""
 
 from typing import TYPE_CHECKING
 
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import Room
     from fleet2d.routines.activity import Activity
 
-# All members must find the same rooms, so they are those that a body of this radius gets to [m].
+# All members must get the same rooms, whatever their radius: those of a body of this radius [m].
 USUAL_RADIUS = 0.2
 
 
 def private_rooms(household: Household, home: "Home") -> MemberRooms:
-    """Return the rooms of each member's activities that want a room to themselves, by index.
+    """Return the rooms of each member's exclusive activities: indices by activity, by member.
 
-    What is done nowhere but in such rooms, laundry in the bathroom, wants one as well. Where a home
-    has none of the rooms that an activity names, it is done in one unknown room.
+    Activities that are done only in such rooms, like laundry in the bathroom, count as exclusive,
+    too. If the home has none of the rooms of an activity, the activity has no entry.
     """
     space = home.space(USUAL_RADIUS, opens_doors=True)
     reachable = [room for room in home.rooms if len(space.cells(room.index, 0))]
@@ -30,20 +30,27 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
         }
         for name, persona in household.members.items()
     }
-    alone = {
+    private = {
         room
         for name, persona in household.members.items()
         for activity in persona.body.private & set(rooms[name])
         for room in rooms[name][activity]
     }
     return {
-        name: {activity: some for activity, some in own.items() if some and alone.issuperset(some)}
+        name: {
+            activity: indices
+            for activity, indices in own.items()
+            if indices and private.issuperset(indices)
+        }
         for name, own in rooms.items()
     }
 
 
 def _rooms_of(activity: "Activity", reachable: "list[Room]") -> "list[Room]":
-    """Return the rooms of the first kind that there is, or of all kinds where any will do."""
+    """Return the rooms of the activity's first kind that exists, or of all its kinds.
+
+    All kinds count if the activity may be done in a different room each time.
+    """
     kinds = [name for name in activity.rooms if name != ANY]
     by_kind = [[room for room in reachable if kind in (room.name, room.type)] for kind in kinds]
     if activity.choose == "own":

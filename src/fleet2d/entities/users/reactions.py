@@ -1,4 +1,4 @@
-"""Reactions: what people do about robots."""
+"""Reactions: how people react to robots."""
 
 from collections.abc import Iterator
 from datetime import timedelta
@@ -19,68 +19,68 @@ from fleet2d.units import micros
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
 
-# What is reacted to first, of several things at one step, and the manner that says how likely.
-LIKELY = {
+# The events, the most important first, and the manner that is the probability of a reaction.
+PROBABILITIES = {
     "robot_calls": "comes",
     "robot_close": "leaves",
     "robot_coming": "steps_aside",
     "robot_near": "turns",
 }
-RANKS = list(LIKELY)
-# So far one steps aside, and so far from a robot one stops that called [m].
+RANKS = list(PROBABILITIES)
+# How far a person steps aside, and how far from a robot that called a person stops [m].
 STEP_M = 0.7
 MEET_M = 0.9
-CLEAR_M = 0.1  # beyond what is too close
-# A robot that was let pass has passed.
+CLEAR_M = 0.1  # the least that is added to what is too close
+# How long a person waits for a robot to pass.
 PASSING = timedelta(seconds=4)
 DIRECTIONS = 16
 
 
 @register("behavior", "reactions")
 class Reactions(Behavior):
-    """React to robots: turn to them, step aside, come, leave; put before what one does otherwise.
+    """React to robots: turn to them, step aside, come, leave; to be put before other behaviors.
 
-    How likely one reacts, and how near a robot has to be, are one's manners: those given here, else
-    those of the persona of a `routine` behind it, else the usual ones.
+    The probability of each reaction, and how near a robot has to be, are the person's manners:
+    those given here, else those of the persona of a later `routine`, else the usual ones.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"reacts"})
 
     manners: Manners | None = Field(
-        default=None, description="how one reacts; left out: as the persona does"
+        default=None, description="how the person reacts; left out: as the persona does"
     )
 
     def attention(self, actor: "Actor") -> Attention:
-        """Find out what its manners are, now that all behaviors know who they are."""
+        """Determine the manners, which may be those of a persona, and return their distances."""
         personas = (getattr(behavior, "who", None) for behavior in actor.behaviors)
         persona = next((who for who in personas if who is not None), None)
-        self.kept = self.manners or getattr(persona, "manners", None) or Manners()
+        self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
         self.laws = {
-            "looks": self.kept.looks.table(),
-            "leaves_for": self.kept.leaves_for.table(),
-            "comes_for": self.kept.comes_for.table(),
+            "looks": self.used_manners.looks.table(),
+            "leaves_for": self.used_manners.leaves_for.table(),
+            "comes_for": self.used_manners.comes_for.table(),
         }
-        self.rank, self.until = 0, -1  # what it reacts to, and up to which step
-        units, kept = actor.home.plan.lattice.units_per_m, self.kept
+        self.rank, self.until = 0, -1  # of the present reaction, and the step at which it ends
+        units, used = actor.home.plan.lattice.units_per_m, self.used_manners
         return Attention(
-            notices=round(kept.notices * units),
-            in_way=round(kept.in_the_way * units),
-            too_close=round(kept.too_close * units),
-            patience=max(1, -(-micros(kept.patience) // actor.clock.step_us)),
-            hears=round(kept.hears * units),
+            notices=round(used.notices * units),
+            in_way=round(used.in_the_way * units),
+            too_close=round(used.too_close * units),
+            patience=max(1, -(-micros(used.patience) // actor.clock.step_us)),
+            hears=round(used.hears * units),
         )
 
     def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
-        """Tell whether it reacts to something at a step."""
+        """Tell whether the person reacts to an event at a step; drawn by its probability."""
         if step < self.until and RANKS.index(event.event) >= self.rank:
-            return False  # it has something better to do
-        likely: float = getattr(self.kept, LIKELY[event.event])
+            return False  # the present reaction is more important
+        probability: float = getattr(self.used_manners, PROBABILITIES[event.event])
         draws = Draws(actor.stream(f"{event.event} {event.user}"), step)
-        return draws.uniform() < likely
+        return draws.uniform() < probability
 
     def decide(self, now: Situation) -> Plan | None:
-        """React to what just happened; else leave it to the next behavior."""
-        events = [event for event in now.events if event.event in LIKELY]
+        """React to an event of the present step; without one, leave it to the next behavior."""
+        events = [event for event in now.events if event.event in PROBABILITIES]
         if not events:
             return None
         event = min(events, key=lambda event: RANKS.index(event.event))
@@ -103,27 +103,26 @@ class Reactions(Behavior):
         plan.note("reacts", f"comes to {event.user}")
         self._maybe_stop(now, draws)
         at_x, at_y = _robot(now, event)
-        far = max(MEET_M, self.kept.too_close + CLEAR_M)
-        own = [p for p in _around(now, at_x, at_y, far) if plan.reaches(*p)]
-        if own:
-            plan.go_to_point(*min(own, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
+        distance_m = max(MEET_M, self.used_manners.too_close + CLEAR_M)
+        points = [p for p in _around(now, at_x, at_y, distance_m) if plan.reaches(*p)]
+        if points:
+            plan.go_to_point(*min(points, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
         self._look_at(now, plan, event, self.laws["comes_for"], draws)
 
     def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         plan.note("reacts", f"leaves {event.user}")
         self._maybe_stop(now, draws)
-        here = now.room
-        rooms = [room for room in now.actor.reachable_rooms() if room != here]
+        rooms = [room for room in now.actor.reachable_rooms() if room != now.room]
         if rooms:
             plan.go_to((draws.choice(rooms).name,), "retreat")
         plan.stay(timedelta(seconds=self.laws["leaves_for"].draw(draws)))
 
     def _step_aside(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
-        """Step to where the robot doesn't come: of the places about, the one farthest from it."""
+        """Step out of the robot's way, to a random free point beside it."""
         plan.note("reacts", f"steps aside for {event.user}")
         at_x, at_y = _robot(now, event)
         dx, dy = plan.x - at_x, plan.y - at_y
-        # Across its way, not along it: it would only come after one.
+        # Across the robot's way; along it, the robot would come closer again.
         across = [
             (x, y)
             for x, y in _around(now, plan.x, plan.y, STEP_M)
@@ -142,7 +141,7 @@ class Reactions(Behavior):
         plan.stay(timedelta(seconds=law.draw(draws)))
 
     def _maybe_stop(self, now: Situation, draws: Draws) -> None:
-        if draws.uniform() < self.kept.stops:
+        if draws.uniform() < self.used_manners.stops:
             for behavior in now.actor.behaviors:
                 behavior.give_up(now)
 
@@ -153,14 +152,14 @@ def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
 
 
 def _around(now: Situation, x: int, y: int, distance_m: float) -> Iterator[tuple[int, int]]:
-    """Yield the points so far from a point where the body can stand, in the point's room."""
+    """Yield the points at a distance from a point where the body can stand, in the same room."""
     actor, lattice = now.actor, now.home.plan.lattice
     room = now.home.plan.room_at(*lattice.to_metres([x, y]).tolist())
-    far = round(distance_m * lattice.units_per_m)
+    distance = round(distance_m * lattice.units_per_m)
     for i in range(DIRECTIONS):
         heading = i * TURN // DIRECTIONS
-        at_x = x + far * cosine(heading) // SINE_UNIT
-        at_y = y + far * sine(heading) // SINE_UNIT
+        at_x = x + distance * cosine(heading) // SINE_UNIT
+        at_y = y + distance * sine(heading) // SINE_UNIT
         same_room = now.home.plan.room_at(*lattice.to_metres([at_x, at_y]).tolist()) == room
         if same_room and actor.space.part_at(at_x, at_y) == actor.part:
             yield at_x, at_y

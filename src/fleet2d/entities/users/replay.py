@@ -1,4 +1,4 @@
-"""Replay: be where a log says that somebody was, in its rooms or at its positions."""
+"""Replay: be where a person was according to a log, in its rooms or at its positions."""
 
 from datetime import timedelta
 from pathlib import Path
@@ -17,7 +17,7 @@ from fleet2d.logs.frame import Frame
 from fleet2d.logs.log import DAY_US, ActivityLog, LogError, PositionLog
 from fleet2d.logs.read import Layout, read_log
 from fleet2d.logs.rooms import map_rooms
-from fleet2d.logs.visits import Rule, Visit, visits_of
+from fleet2d.logs.visits import LoggedVisit, VisitRule, visits_of
 from fleet2d.paths import folder_of
 from fleet2d.problems import problem, shown
 from fleet2d.units import Duration, Length, PositiveDuration, Speed, micros
@@ -53,7 +53,7 @@ LogPath = Annotated[
 
 
 def _rooms(value: object) -> object:
-    """Let a room be written without a list."""
+    """Accept a room without a list around it."""
     if isinstance(value, dict):
         return {key: (v,) if isinstance(v, str) else v for key, v in value.items()}
     return value
@@ -80,11 +80,11 @@ RoomMap = Annotated[
 
 @register("behavior", "replay")
 class Replay(Behavior):
-    """Be where a log says that somebody was: a smart home's events, a script, or positions.
+    """Be where a person was according to a log: a smart home's events, a script, or positions.
 
-    Where the log names a room the body is in it at that step, having left for it early enough.
-    What the log doesn't tell isn't made up: the body is away then, and events say `unknown` and
-    `known`.
+    When the log names a room, the body is in it at that step, as it left for it early enough. Where
+    the log says nothing, nothing is invented: the body is away then, and the events `unknown` and
+    `known` mark the gap.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
@@ -114,8 +114,8 @@ class Replay(Behavior):
     )
     gaps: Literal["unknown", "hold", "walk"] = Field(
         default="unknown",
-        description="what happens in a gap: nobody knows; or it stays and leaves in time; or it"
-        " goes at once",
+        description="in a gap: unknown: the body is away; hold: it stays and leaves in time; walk:"
+        " it goes at once",
     )
     gap: PositiveDuration | None = Field(
         default=None,
@@ -124,7 +124,7 @@ class Replay(Behavior):
     )
     still: Duration = Field(
         default=timedelta(hours=12),
-        description="silence in one room up to this is no gap: who sleeps trips no sensor",
+        description="silence in one room up to this is no gap: sleepers trip no sensor",
     )
     reach: Length = Field(
         default=1.0, ge=0, description="a position farther than this from free space is left out"
@@ -138,8 +138,8 @@ class Replay(Behavior):
         return tuple(sorted(self.path.glob("*.txt"))) if self.path.is_dir() else (self.path,)
 
     def start(self, actor: "Actor") -> None:
-        """Read the log, lay the way through it, and say what came of it in `notes`."""
-        self.visits: list[Visit] = []
+        """Read the log, plan the way through it, and report on it in `notes`."""
+        self.visits: list[LoggedVisit] = []
         try:
             log = read_log(
                 self.path,
@@ -158,9 +158,10 @@ class Replay(Behavior):
             raise LogError(f"{actor.path}: {error}") from None
 
     def decide(self, now: Situation) -> Plan:
-        """Follow the log to its end; later than at first, go where it has the body by then.
+        """Follow the log to its end, from the present step.
 
-        Positions have no time for that: the body is put where the log has it.
+        After another behavior's turn, the body first walks to where the log has it; in a log of
+        positions, it is put there.
         """
         plan = now.plan()
         if now.step == 0:
@@ -168,8 +169,8 @@ class Replay(Behavior):
                 plan.note("replay", note)
         if isinstance(self.follower, FixFollower):
             return self.follower.follow(plan)
-        here = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
-        return self.follower.follow(plan, here, rejoin=now.step > 0)
+        current = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
+        return self.follower.follow(plan, current, rejoin=now.step > 0)
 
     def _begin(self, log: ActivityLog | PositionLog, actor: "Actor") -> int:
         """Return the moment of the log that is step 0 [us since its first midnight]."""
@@ -192,7 +193,7 @@ class Replay(Behavior):
         mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)
         clock = actor.clock
         gap_us = micros(self.gap or GAP_OF_ROOMS)
-        rule = Rule(
+        rule = VisitRule(
             step_us=clock.step_us,
             begin_us=begin_us,
             steps=clock.steps,
@@ -201,14 +202,14 @@ class Replay(Behavior):
             unknown=self.gaps == "unknown",
             door_us=gap_us,
         )
-        told = visits_of(log, mapped, rule)
-        self.visits = told.visits
+        logged = visits_of(log, mapped, rule)
+        self.visits = logged.visits
         self.follower: RoomFollower | FixFollower = RoomFollower(
             actor, self.visits, self.gaps == "walk", self.fastest
         )
-        trial = self.follower.follow(Plan(actor, 0), 0, rejoin=False)
-        del trial  # laid to know the walks before the run; laid again when it begins
-        self.notes = report_rooms(log, mapped, told, rule, self.follower.paces, self.fastest)
+        # Planned once before the run, for the report on its walks.
+        self.follower.follow(Plan(actor, 0), 0, rejoin=False)
+        self.notes = report_rooms(log, mapped, logged, rule, self.follower.paces, self.fastest)
 
     def _start_fixes(self, actor: "Actor", log: PositionLog, begin_us: int) -> None:
         if self.rooms:
@@ -216,12 +217,13 @@ class Replay(Behavior):
         clock = actor.clock
         time_us = log.time_us - begin_us
         step = time_us // clock.step_us
-        kept = np.append(True, step[1:] != step[:-1]) & (time_us < clock.steps * clock.step_us)
+        # The first fix of each step of the run.
+        used = np.append(True, step[1:] != step[:-1]) & (time_us < clock.steps * clock.step_us)
         fixes = place_fixes(
             actor,
-            time_us[kept],
-            self.frame.to_plan(log.xy[kept]),
-            self.frame.turned(log.heading[kept] / (2 * np.pi)),
+            time_us[used],
+            self.frame.to_plan(log.xy[used]),
+            self.frame.turn_headings(log.heading[used] / (2 * np.pi)),
             self.reach,
         )
         gap_us = micros(self.gap or GAP_OF_FIXES)

@@ -1,4 +1,4 @@
-"""What a replay made of a log, in lines for people."""
+"""Reports of replays: how a log was interpreted, in lines for people."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from fleet2d.logs.frame import Frame
 from fleet2d.logs.log import ActivityLog, PositionLog
 from fleet2d.logs.rooms import RoomChoice
-from fleet2d.logs.visits import UNKNOWN, Rule, Told
+from fleet2d.logs.visits import UNKNOWN, LoggedVisits, VisitRule
 
 if TYPE_CHECKING:
     from fleet2d.entities.users.follow_fixes import Fixes, FixFollower
@@ -16,25 +16,27 @@ if TYPE_CHECKING:
 def report_rooms(
     log: ActivityLog,
     mapped: Mapping[str, RoomChoice | None],
-    told: Told,
-    rule: Rule,
+    logged: LoggedVisits,
+    rule: VisitRule,
     paces: "Paces",
     fastest: float,
 ) -> tuple[str, ...]:
-    """Say which label was taken for which room, what was left out, and what isn't known."""
+    """Return lines about a log of rooms: which room each label means, omissions, gaps, haste."""
     lines = [_head(log, len(log.readings), "readings"), *log.notes]
     for label, count in sorted(log.rooms.items()):
         choice = mapped[label]
         what = "left out" if choice is None else f"taken for {choice[0]}"
         lines.append(f"{label}: {what}, {count} readings")
-    if told.overruled:
-        lines.append(f"{told.overruled} readings yield to later ones of another room in their step")
-    unknown = [visit for visit in told.visits if visit.place == UNKNOWN]
+    if logged.overruled:
+        lines.append(
+            f"{logged.overruled} readings yield to later ones of another room in their step"
+        )
+    gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
     hours = sum(
-        (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in unknown
+        (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in gaps
     )
-    if unknown:
-        lines.append(f"nobody knows where it is in {len(unknown)} gaps, {hours:.1f} h in all")
+    if gaps:
+        lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
     if paces.hurried:
         lines.append(
             f"{paces.hurried} of {paces.walks} walks are faster than the body walks, since the log"
@@ -47,7 +49,7 @@ def report_rooms(
 def report_fixes(
     log: PositionLog, fixes: "Fixes", follower: "FixFollower", thinned: int, frame: Frame
 ) -> tuple[str, ...]:
-    """Say what became of the fixes, and which legs can't have been walked like that."""
+    """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
     lines = [_head(log, len(log.time_us), "fixes"), *log.notes]
     if frame.matches:
         off = frame.errors()

@@ -28,15 +28,20 @@ AWAY = "away"
 SECOND_US = 1_000_000
 # How many visits are planned at once.
 VISITS = 20
-# A stay that the time of ways has used up still lasts this long.
+# The least length of a stay, after the time of ways is taken off.
 SHORTEST_US = 10 * SECOND_US
-# How finely the rooms along a way are told, in points per metre.
+# Points per metre of a way at which the room is looked up.
 POINTS_PER_M = 10
 MILLION = 1_000_000
 
 
 class Stop(NamedTuple):
-    """Where a visit goes: a room, or out of the home (None), and how likely."""
+    """A destination of visits.
+
+    Attributes:
+        room: The room; None is out of the home.
+        chance: Its probability [per million].
+    """
 
     room: "Room | None"
     chance: int
@@ -46,11 +51,11 @@ class Stop(NamedTuple):
 class RoomSampling(Behavior):
     """Be in each room for a given share of the time, in visits of random length.
 
-    A semi-Markov process: the next room is drawn by the shares (the present one, too: then one goes
-    to another spot of it), the stay there from the law of dwell times. Ways cost time in the rooms
-    that they lead through; that is taken off the next stays in those rooms, so that the time in
-    each of the given rooms, ways included, tends to its share of the time in all of them. Only the
-    time in rooms that are not given can't be made up for.
+    A semi-Markov process: the next room is drawn by the shares (if it is the present one, the body
+    goes to another spot of it), the stay there from the law of dwell times. Time spent on ways
+    through a room is taken off the next stays in it, so that the time in each of the given rooms,
+    ways included, tends to its share of the time in all of them. Time on ways through other rooms
+    is not compensated.
     """
 
     shares: dict[str, float] = Field(
@@ -76,19 +81,17 @@ class RoomSampling(Behavior):
     def start(self, actor: "Actor") -> None:
         """Find the rooms; those of a kind have equal parts of its share."""
         names = [(name,) for name in self.shares if name != AWAY]
-        there = {name for (name,) in available_places(actor, "room_sampling.shares", names)} | {
-            AWAY
-        }
-        kept = {name: share for name, share in self.shares.items() if name in there}
-        total = sum(kept.values())
+        available = {name for (name,) in available_places(actor, "room_sampling.shares", names)}
+        shares = {n: share for n, share in self.shares.items() if n == AWAY or n in available}
+        total = sum(shares.values())
         if total <= 0:
             raise PlacementError(
-                f"room_sampling.shares: nothing is left of it in this home: {', '.join(kept)} have"
-                " a share of 0"
+                f"room_sampling.shares: nothing is left of it in this home: {', '.join(shares)}"
+                " have a share of 0"
             )
         chances: dict[int | None, float] = {}
         self.rooms: dict[int | None, Room | None] = {None: None}
-        for name, share in kept.items():
+        for name, share in shares.items():
             rooms: Sequence[Room | None] = [None] if name == AWAY else actor.rooms((name,))
             for room in rooms:
                 index = None if room is None else room.index
@@ -113,7 +116,7 @@ class RoomSampling(Behavior):
         stop = self.stops[weighted(draws, [stop.chance for stop in self.stops])]
         dwell_us = self.law.draw(draws) * SECOND_US
         if stop.room is None:
-            if not plan.away:  # who is out already stays out
+            if not plan.away:
                 self._walk(actor, plan, Spot(*actor.way_out))
                 plan.leave_home()
             plan.stay(timedelta(microseconds=dwell_us))
@@ -125,7 +128,7 @@ class RoomSampling(Behavior):
         plan.stay(timedelta(microseconds=stay_us))
 
     def _walk(self, actor: "Actor", plan: Plan, goal: Spot) -> None:
-        """Walk to a spot, and note how much of the time each room had on the way."""
+        """Walk to a spot, and add the time on the way to the debt of the rooms it leads through."""
         start, began_us = (plan.x, plan.y), plan.time_us
         if start == goal and not plan.away:
             return
@@ -133,14 +136,14 @@ class RoomSampling(Behavior):
         route = actor.space.route(start, tuple(goal))
         if route is None:
             return
-        took_us = plan.time_us - began_us
+        walk_us = plan.time_us - began_us
         for room, share in _rooms_along(actor, route):
             if room in self.debt_us:
-                self.debt_us[room] += int(took_us * share)
+                self.debt_us[room] += int(walk_us * share)
 
 
 def _rooms_along(actor: "Actor", route: NDArray[np.int64]) -> list[tuple[int, float]]:
-    """Return the rooms that a way leads through, by index, and the share of it in each."""
+    """Return the index of each room that a route leads through, and its share of the length."""
     plan = actor.home.plan
     legs = np.diff(route, axis=0).astype(np.float64)
     lengths = np.sqrt(legs[:, 0] * legs[:, 0] + legs[:, 1] * legs[:, 1])

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.place import Point, RoomChoice
 
-# Members of a household may go to the bathroom at night for so long, one after the other.
+# Length of a time slot in which one member of a household may go to a private room.
 TURN_US = 900 * SECOND_US
-# A way there takes less than that.
+# A way there takes less than this.
 WAY_US = 60 * SECOND_US
 
 
@@ -34,9 +34,9 @@ WAY_US = 60 * SECOND_US
 class Routine(Inhabitant):
     """Live by a persona: a day's activities with their times, durations, order and probability.
 
-    Every day is drawn anew and keeps all that the persona's template asks. An activity is done at
-    its furniture, else in its room; within it one turns, gets up and fetches things. Members of a
-    household have the persona that it gives them, and common appointments.
+    Every day is drawn independently and satisfies the persona's template. An activity is done at
+    its furniture, else in its room; meanwhile the person turns, gets up and fetches things. Members
+    of a household have the persona that it gives them, and common appointments.
     """
 
     persona: AnyPersona | None = Field(
@@ -52,7 +52,7 @@ class Routine(Inhabitant):
         default=(), description="when it is out of the home, on holiday"
     )
     visits: tuple[AnyPeriod, ...] = Field(
-        default=(), description="when it is there, if it is only a visitor"
+        default=(), description="when it is in the home, if it is only a visitor"
     )
 
     @model_validator(mode="after")
@@ -61,13 +61,13 @@ class Routine(Inhabitant):
             raise problem("a member of a household has the persona that the household gives it")
         if self.household is not None and (self.away or self.visits):
             raise problem(
-                "when a member of a household is away, or on a visit, is said in the household, by"
-                " 'trips' and 'visits': the others have to know it"
+                "the absences and visits of a member of a household belong in the household's"
+                " 'trips' and 'visits', as the other members depend on them"
             )
         return self
 
     def start(self, actor: "Actor") -> None:
-        """Set up its life, and find where its activities are done."""
+        """Set up the days of the person, and find where the activities are done in the home."""
         self.name = actor.name
         spots, sleeps_in, side = Spots(actor), None, (0, 1)
         if self.household is None:
@@ -90,7 +90,7 @@ class Routine(Inhabitant):
 
     @property
     def who(self) -> Persona:
-        """Its persona."""
+        """The persona, of its own or of the household's member."""
         if self.household is not None:
             members = self.household.members
             return members[getattr(self, "name", next(iter(members)))]
@@ -105,24 +105,24 @@ class Routine(Inhabitant):
         return used
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
-        """Return where one likely is at that time."""
-        likely, today = Life(self.who, 0, "").day, time.toordinal()
+        """Return the rooms of a likely activity at that time."""
+        likely_day, today = Life(self.who, 0, "").day, time.toordinal()
         time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
-        if time_s < likely(today)[0].begin:
+        if time_s < likely_day(today)[0].begin:
             today, time_s = today - 1, time_s + DAY_S
-        return rooms_at(self._there(likely(today), today), time_s, self._activities())
+        return rooms_at(self._with_absences(likely_day(today), today), time_s, self._activities())
 
     def day(self, ordinal: int) -> Sequence[Doing]:
         """Return what is done on the day of a date's ordinal."""
         if self.household is None:
-            return self._there(self.life.day(ordinal), ordinal)
+            return self._with_absences(self.life.day(ordinal), ordinal)
         return self.lives.day(ordinal)[self.name]
 
     def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
-        """Return how long to wait before it may use a room [us]; None: better not at all.
+        """Return how long to wait before it may use a room [us]; None: not now.
 
-        Members of a household take turns at what only one can use at a time: short ways there have
-        a quarter of an hour for each of them in turn, and keep clear of what others do there.
+        Members of a household take turns in private rooms: for short visits, each of them has a
+        slot of a quarter of an hour in turn, outside the planned activities of others there.
         """
         if self.household is None or room not in self.private_rooms:
             return 0
@@ -144,7 +144,7 @@ class Routine(Inhabitant):
                 return None
         return begins_us - begin_us
 
-    def _there(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+    def _with_absences(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
         if not self.away and not self.visits:
             return day
         return without(day, datetime.fromordinal(ordinal), self.away, self.visits)

@@ -45,7 +45,7 @@ class Item(Settings):
         return self
 
 
-class Day(Settings):
+class Agenda(Settings):
     """An agenda, and the days on which it holds."""
 
     on: OnDays = Field(default="daily", description="the days on which it holds")
@@ -57,10 +57,16 @@ class Day(Settings):
         return weekdays_of(self.on)
 
 
-class Entry(NamedTuple):
-    """An item with its time worked out."""
+class AgendaEntry(NamedTuple):
+    """A resolved item of an agenda.
 
-    begins: timedelta  # since midnight
+    Attributes:
+        begins: When it begins, since midnight.
+        place: Where it is; () is out of the home.
+        activity: What is done there.
+    """
+
+    begins: timedelta
     place: RoomChoice | Point | tuple[()]
     activity: str
 
@@ -69,34 +75,36 @@ class Entry(NamedTuple):
 class Schedule(Behavior):
     """Be at fixed places at fixed times, daily or by weekday.
 
-    At an item's time the body walks to its place by the shortest path, to a spot drawn anew in a
-    room. When an item with a dwell is over and nothing is due, it goes to the place `rest`. A later
-    day of the list replaces an earlier one on the weekdays they share.
+    At an item's time the body walks to its place by the shortest path; in a room, to a spot drawn
+    each time. When an item with a dwell is over and no other is due, it goes to the place `rest`. A
+    later day of the list replaces an earlier one on the weekdays they share.
     """
 
-    days: tuple[Day, ...] = Field(min_length=1, description="the agendas of the days of the week")
+    days: tuple[Agenda, ...] = Field(
+        min_length=1, description="the agendas of the days of the week"
+    )
     rest: Place = Field(
         default=("living_room", "any"),
         description="where it goes when an item is over and nothing is due",
     )
 
     @model_validator(mode="after")
-    def _days_work_out(self) -> Self:
+    def _days_are_possible(self) -> Self:
         for number, day in enumerate(self.days):
             _entries(day, self.rest, number)
         return self
 
     def start(self, actor: "Actor") -> None:
-        """Work out the week, and check that every place exists and can be reached."""
+        """Resolve the week, and check that every place exists and can be reached."""
         self.week = self._week()
-        self.plan: Plan | None = None  # the last one it made, and the midnight up to which it is
-        self.until = actor.clock.start
+        self.plan: Plan | None = None  # the last one that it returned
+        self.until = actor.clock.start  # the midnight at which that plan ends
         places = dict.fromkeys(entry.place for day in self.week for entry in day if entry.place)
         for place in places:
             if is_point(place):
                 actor.point(place)  # type: ignore[arg-type]
-        there = {(), *available_places(actor, "schedule.days", places)}
-        self.week = [[entry for entry in day if entry.place in there] for day in self.week]
+        available = {(), *available_places(actor, "schedule.days", places)}
+        self.week = [[entry for entry in day if entry.place in available] for day in self.week]
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
         """Return the place of the last item before the run."""
@@ -104,10 +112,10 @@ class Schedule(Behavior):
         return entry.place if entry else None
 
     def decide(self, now: Situation) -> Plan:
-        """Plan the rest of the day; after another behavior's turn, first go where it should be."""
+        """Plan the rest of the day; after another behavior's turn, first go to the present item."""
         plan = now.plan()
         since = now.time
-        if now.actor.plan is self.plan:  # its own, which may be over later than planned
+        if now.actor.plan is self.plan:  # its own plan, which may end later than midnight
             since = self.until
         elif entry := self._current(self.week, now.time):
             seat = seat_at(now.actor, entry.place) if entry.place else None
@@ -132,8 +140,8 @@ class Schedule(Behavior):
         else:
             plan.leave_home()
 
-    def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, Entry]]:
-        """Yield what begins from `since` on and before the midnight `until`."""
+    def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, AgendaEntry]]:
+        """Yield the entries that begin from `since` on and before the midnight `until`."""
         midnight = datetime.combine(since.date(), datetime.min.time())
         while midnight < until:
             for entry in self.week[midnight.weekday()]:
@@ -141,26 +149,26 @@ class Schedule(Behavior):
                     yield midnight + entry.begins, entry
             midnight += DAY
 
-    def _week(self) -> list[list[Entry]]:
-        week: list[list[Entry]] = [[] for _ in range(7)]
+    def _week(self) -> list[list[AgendaEntry]]:
+        week: list[list[AgendaEntry]] = [[] for _ in range(7)]
         for day in self.days:
             for weekday in day.weekdays:
                 week[weekday] = _entries(day, self.rest)
         return week
 
     @staticmethod
-    def _current(week: list[list[Entry]], time: datetime) -> Entry | None:
+    def _current(week: list[list[AgendaEntry]], time: datetime) -> AgendaEntry | None:
         """Return the last entry that began before `time`, up to a week ago."""
         midnight = datetime.combine(time.date(), datetime.min.time())
         for back in range(8):
             day = midnight - back * DAY
-            begun = [entry for entry in week[day.weekday()] if day + entry.begins < time]
-            if begun:
-                return begun[-1]
+            earlier = [entry for entry in week[day.weekday()] if day + entry.begins < time]
+            if earlier:
+                return earlier[-1]
         return None
 
 
-def _add(plan: Plan, entry: Entry) -> None:
+def _add(plan: Plan, entry: AgendaEntry) -> None:
     if entry.place:
         plan.go_to(entry.place)
     else:
@@ -169,35 +177,38 @@ def _add(plan: Plan, entry: Entry) -> None:
         plan.note("activity", entry.activity)
 
 
-def _entries(day: Day, rest: RoomChoice | Point, number: int = 0) -> list[Entry]:
-    """Work out when each item of a day begins, and when one goes to rest.
+def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[AgendaEntry]:
+    """Resolve the items of a day, and add entries of rest between them.
 
     Raises:
-        ValidationError: The items don't follow each other within the day, `number` of the list.
+        ValidationError: The items don't follow each other within the day, which is `number` in the
+            list of days.
     """
-    entries: list[Entry] = []
+    entries: list[AgendaEntry] = []
     over: timedelta | None = None  # when the item before is over, if it says so
     for index, item in enumerate(day.items):
-        where = ("days", number, "items", index)
+        key = ("days", number, "items", index)
         begins = item.at if item.at is not None else over
         if begins is None:
-            raise problem_at(where, "it needs 'at', or a 'dwell' in the item before it")
+            raise problem_at(key, "it needs 'at', or a 'dwell' in the item before it")
         earliest = over if over is not None else entries[-1].begins if entries else timedelta(0)
         if begins < earliest:
             raise problem_at(
-                where,
+                key,
                 f"it begins at {format_time_of_day(begins)}, but the item before it lasts until"
                 f" {format_time_of_day(earliest)}: list the items of a day in order",
             )
         if begins >= DAY:
             raise problem_at(
-                where,
+                key,
                 f"it begins at {format_time_of_day(begins)}: an item begins before 24:00",
             )
         if over is not None and begins > over:
-            entries.append(Entry(over, rest, "rest"))
-        entries.append(Entry(begins, AWAY if item.away else item.place or AWAY, item.activity))
+            entries.append(AgendaEntry(over, rest, "rest"))
+        entries.append(
+            AgendaEntry(begins, AWAY if item.away else item.place or AWAY, item.activity)
+        )
         over = None if item.dwell is None else begins + item.dwell
     if over is not None and over < DAY:
-        entries.append(Entry(over, rest, "rest"))
+        entries.append(AgendaEntry(over, rest, "rest"))
     return entries

@@ -1,4 +1,4 @@
-"""Spots: where people are in a room, so that two of a household are never in the same."""
+"""Spots: points in rooms where people stand, distinct for the members of a household."""
 
 import math
 from collections.abc import Sequence
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# Between two spots [m]: two bodies of the usual radius of 0.2 m stand clear of each other.
+# Distance between two spots, at which bodies of the usual radius of 0.2 m don't touch [m].
 SPACING = 0.6
-# Of the spots of a room that are its own, a body has so many that it uses.
+# The most spots of a room that a body uses.
 HABITUAL = 8
 
 
 class Spot(NamedTuple):
-    """A place to stand: a lattice point."""
+    """A place to stand, a lattice point."""
 
     x: int
     y: int
@@ -34,7 +34,7 @@ class Spot(NamedTuple):
 
 
 class Seat(NamedTuple):
-    """A place at a piece of furniture: its name, and the number of the place."""
+    """A place at a piece of furniture: the furniture's name, and the number of the place."""
 
     thing: str
     place: int
@@ -47,14 +47,14 @@ class Seat(NamedTuple):
 class Spots:
     """The spots of one body.
 
-    The spots of a room are a grid. The members of a household share them out by their rank: spot i
-    is that of member i modulo their number, so two of them never stand on the same, and nobody has
-    to know where the others are. So with the places at furniture. Where a room has fewer spots than
-    the household has members, they share.
+    The spots of a room are a grid. The members of a household divide them by rank: spot i belongs
+    to the member i modulo the number of members. So two members never stand on the same spot, and
+    none has to know where the others are. Places at furniture are divided likewise. In a room with
+    fewer spots than members, members share spots.
 
     Attributes:
-        rank: Which member of its household the body is.
-        members: How many there are.
+        rank: The number of the body among the members of its household.
+        members: The number of members.
     """
 
     def __init__(self, actor: "Actor", rank: int = 0, members: int = 1) -> None:
@@ -62,10 +62,10 @@ class Spots:
         self.members = members
         self._actor = actor
         self._of_room: dict[int, list[Spot]] = {}
-        self._version = -1  # of the home that the spots were found in
+        self._version = -1  # of the home, when the spots were chosen
 
-    def reached(self, rooms: list["Room"]) -> list["Room"]:
-        """Return the rooms that the body can get to at present: doors may be locked."""
+    def reachable(self, rooms: list["Room"]) -> list["Room"]:
+        """Return those of some rooms that the body can get to at present: doors may be locked."""
         actor = self._actor
         if not actor.home.hinders:
             return rooms
@@ -89,7 +89,7 @@ class Spots:
             grid = self._actor.home.cached(
                 ("spots", space, part, room.index, self.members), lambda: self._grid(room)
             )
-            own = _shared(grid, self.rank, self.members)
+            own = _part_of(grid, self.rank, self.members)
             draws = Draws(self._actor.stream(f"spots of {room.name}"), 0)
             self._of_room[room.index] = draws.shuffled(own)[:HABITUAL]
         return self._of_room[room.index]
@@ -103,14 +103,14 @@ class Spots:
     ) -> list[Seat]:
         """Return the body's own places at the furniture in some rooms.
 
-        Of the types given, the first that is there is used, and the next ones as well while it has
-        fewer places than there are bodies to share them.
+        Places of the first type that exists are used, and those of the next types as long as there
+        are fewer places than bodies that share them.
 
         Args:
             kinds: Types of furniture, to try in turn.
-            rooms: Where.
-            posture: Of the places of a piece, those for this posture, if it has any.
-            share: Which of how many bodies it is that use it; None: as in its household.
+            rooms: The rooms to look in.
+            posture: If a piece has places for this posture, only those of its places are used.
+            share: Rank of the body, and number of bodies that share; None: as in its household.
         """
         home, indices = self._actor.home, {room.index for room in rooms}
         rank, members = share or (self.rank, self.members)
@@ -119,20 +119,20 @@ class Spots:
             for thing in (thing for thing in home.objects if thing.type == kind):
                 room = home.room_of(thing)
                 if room is not None and room.index in indices:
-                    usable = [i for i, use in enumerate(thing.uses) if self._gets_to(use)]
+                    usable = [i for i, use in enumerate(thing.uses) if self._can_reach(use)]
                     fit = [i for i in usable if thing.uses[i].posture == posture]
                     seats += [Seat(thing.name, i) for i in fit or usable]
             if len(seats) >= members:
                 break
-        return list(_shared(seats, rank, members)) if seats else []
+        return list(_part_of(seats, rank, members)) if seats else []
 
-    def _gets_to(self, use: "UsePlace") -> bool:
-        """Tell whether the body gets to a place at furniture, from nearby if that is too tight."""
+    def _can_reach(self, use: "UsePlace") -> bool:
+        """Tell whether the body can get to a place at furniture, or close enough to use it."""
         at = (use.x, use.y) if use.approach is None else use.approach
         return self._actor.space.part_about(at) == self._actor.part
 
     def _grid(self, room: "Room") -> tuple[Spot, ...]:
-        """Return the spots of a room: a grid of cells, a tighter one in a small room."""
+        """Return the spots of a room: a grid of cells, a finer one in a small room."""
         actor, lattice = self._actor, self._actor.home.plan.lattice
         cells = actor.space.cells(room.index, actor.part)
         pitch = math.ceil(SPACING / lattice.cell)
@@ -145,6 +145,6 @@ class Spots:
         return (Spot(*actor.middle(room)),)
 
 
-def _shared(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
-    """Return the part of one of several who share things, at least one."""
+def _part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
+    """Return the things of one of several members who divide them; at least one."""
     return things[rank % members :: members] or [things[rank % len(things)]]
