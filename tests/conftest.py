@@ -7,12 +7,18 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 from tests.scenes import Cli
+from tests.thorough import examples
 
 from fleet2d import cli
 
 _ROOT = Path(__file__).parents[1]
+
+# No property fails by how long an example takes.
+hypothesis.settings.register_profile("fleet2d", max_examples=examples(100), deadline=None)
+hypothesis.settings.load_profile("fleet2d")
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ import shapely
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
+from tests.thorough import examples
 
 GRID = 2
 """Walls lie on even lattice units."""
@@ -11,7 +12,7 @@ STEP = 64
 """Corners of random homes lie on a coarse raster, so that many are in line and many rings touch."""
 
 quick = settings(
-    max_examples=60,
+    max_examples=examples(60),
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.thorough import examples
 
 from fleet2d.artifacts.digest import digest_table, run_digest
 from fleet2d.artifacts.table import Column, TableSpec
@@ -23,7 +24,7 @@ def digest(rows: dict[str, Any], **options: Any) -> str | None:
     return stored(rows, **options).manifest.digest
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25))
 @given(pieces=st.integers(1, 60), flush_rows=st.integers(1, 700))
 def test_digest_independent_of_chunking(pieces: int, flush_rows: int) -> None:
     assert digest(ROWS) == digest(ROWS, pieces=pieces, flush_rows=flush_rows)

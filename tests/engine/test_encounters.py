@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.scenes import scenario
+from tests.thorough import examples
 
 from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.encounters import Encounters
@@ -78,7 +79,7 @@ class Given(Bodies):
         return PoseBlock(*(column[:, first:end] for column in self.poses_at))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80))
 @given(meeting=meetings(), cuts=st.lists(st.integers(1, 7), max_size=40))
 def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
     meeting: list[tuple[int, int, bool]], cuts: list[int]

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.reference.expectations import Formula, robustness
+from tests.thorough import examples
 
 from fleet2d.clock import Clock
 from fleet2d.expectations import (
@@ -85,7 +86,7 @@ def dense(trace: Trace) -> list[float]:
     return np.repeat(trace.value, np.diff(np.append(trace.start, trace.end))).tolist()
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=examples(200))
 @given(formulas, truths, truths, numbers, numbers, st.integers(1, 14), st.booleans(), st.booleans())
 def test_the_robustness_of_each_step_is_that_of_the_twin(
     formula: Formula,
@@ -110,7 +111,6 @@ def violated(expectation: Expectation, signals: dict[str, list[float]]) -> list[
     return [(v.first, v.last) for v in verdict_of("", expectation, known).violations]
 
 
-@settings(deadline=None)
 @given(numbers)
 def test_violations_are_the_longest_stretches_that_fail(x: list[float]) -> None:
     wrong = [step for step, number in enumerate(x) if not number > 0]

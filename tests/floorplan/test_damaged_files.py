@@ -13,6 +13,7 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.thorough import examples
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import read_image
@@ -379,7 +380,9 @@ def test_resolution_that_is_none_is_refused(tmp_path: Path, resolution: float) -
 
 
 @settings(
-    max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
+    max_examples=examples(60),
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    deadline=None,
 )
 @given(st.binary(max_size=80), st.integers(0, len(PGM)), st.booleans())
 def test_image_with_other_bytes_somewhere_is_read_or_refused(
@@ -467,7 +470,9 @@ def read_or_refused(read: Read, path: Path) -> None:
 
 @every_format
 @settings(
-    max_examples=250, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
+    max_examples=examples(250),
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    deadline=None,
 )
 @given(st.data())
 def test_wrong_things_anywhere_are_read_or_refused(

@@ -3,7 +3,7 @@
 from math import hypot
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fleet2d.kernels.measure import count_rooms, rooms_at, sum_moves
@@ -15,7 +15,6 @@ ROOMS = np.random.default_rng(0).integers(-1, 5, (ROWS, COLUMNS)).astype(np.int1
 places = st.lists(st.tuples(st.integers(-200, 600), st.integers(-200, 400)), max_size=30)
 
 
-@settings(deadline=None)
 @given(places)
 def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at: list) -> None:
     x, y = np.array(at, np.int64).reshape(-1, 2).T.copy()
@@ -23,7 +22,6 @@ def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at: list)
     assert np.array_equal(ROOMS[row, column], rooms_at(ROOMS, x, y))
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(*[st.integers(0, 4 * SUB - 1)] * 2, st.booleans()), max_size=30))
 def test_time_in_rooms_and_the_way_are_those_of_plain_loops(steps: list) -> None:
     rows = np.array(steps, np.int64).reshape(-1, 3)

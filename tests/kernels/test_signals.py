@@ -4,7 +4,7 @@ from math import inf
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import signals as slow
 
@@ -52,7 +52,6 @@ def stretches(numbers: list[float]) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero(kept), array[kept]
 
 
-@settings(deadline=None)
 @given(bodies)
 def test_distances_between_bodies_are_those_of_each_step(tracks: list[Track]) -> None:
     window = timelines_of(tracks).window(0, STEPS)
@@ -62,7 +61,6 @@ def test_distances_between_bodies_are_those_of_each_step(tracks: list[Track]) ->
     )
 
 
-@settings(deadline=None)
 @given(bodies, st.lists(st.tuples(spot, spot, spot, spot), max_size=4))
 def test_distances_to_a_shape_are_those_of_each_step(
     tracks: list[Track], boxes: list[slow.Edge]
@@ -78,7 +76,6 @@ def test_distances_to_a_shape_are_those_of_each_step(
     assert dense(signals.distances_to_shape(window, 0, rows)) == pytest.approx(expected)
 
 
-@settings(deadline=None)
 @given(bodies, st.integers(1, STEPS - 1))
 def test_speeds_go_on_from_window_to_window(tracks: list[Track], cut: int) -> None:
     made = timelines_of(tracks)
@@ -91,7 +88,6 @@ def test_speeds_go_on_from_window_to_window(tracks: list[Track], cut: int) -> No
     assert [slow.speed(poses, step) for step in range(STEPS)] == found
 
 
-@settings(deadline=None)
 @given(values, st.integers(-6, 6), st.integers(0, 9), value, value)
 def test_the_greatest_value_of_a_window_is_that_of_its_steps(
     numbers: list[float], low: int, length: int, before: float, after: float
@@ -101,7 +97,6 @@ def test_the_greatest_value_of_a_window_is_that_of_its_steps(
     assert expected == dense(found, len(numbers))
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(value, value), min_size=1, max_size=12), value)
 def test_until_is_the_best_of_all_steps_to_wait_for(
     pairs: list[tuple[float, float]], after: float

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import presence as slow
 
@@ -86,7 +86,6 @@ def twin(of: Case) -> Any:
     )
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 3), st.integers(1, 7), st.integers(1, 4))
 def test_following_is_the_product_of_matrices(
     seed: int, stages: int, count: int, longest: int
@@ -103,7 +102,6 @@ def test_following_is_the_product_of_matrices(
     assert of.stretches.shown[-1].tolist() == shown.tolist()
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 6))
 def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int) -> None:
     of = case(seed, stages, count, longest=3)

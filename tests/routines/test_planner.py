@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from tests.routines.days import DAY_S, MONDAY, violations
+from tests.thorough import examples
 
 from fleet2d.routines.interruptions import uninterrupted
 from fleet2d.routines.life import Life
@@ -247,7 +248,7 @@ def templates(draw: st.DrawFn) -> dict[str, Any]:
     return do
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(do=templates(), seed=st.integers(0, 1000))
 def test_any_template_is_either_refused_or_kept(do: dict[str, Any], seed: int) -> None:
     try:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.thorough import examples
 
 from fleet2d.search.policies import (
     MOST_EXACT,
@@ -44,14 +45,14 @@ def problems(draw: Any, most: int = 6) -> SearchProblem:
 
 
 @given(problems())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_exact_order_is_the_best_of_all_orders(problem: SearchProblem) -> None:
     costs = [play(problem, order).cost for order in permutations(range(len(problem.prior)))]
     assert play(problem, exact(problem)).cost == pytest.approx(min(costs), abs=1e-9)
 
 
 @given(problems(most=10))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> None:
     best = play(problem, exact(problem)).cost
     for policy in HEURISTICS:
@@ -60,7 +61,7 @@ def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> N
 
 
 @given(problems(most=5))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: SearchProblem) -> None:
     """Wherever the target is, and whichever looks would miss it: an account of its own."""
     order = exact(problem)
@@ -82,7 +83,7 @@ def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: Sear
 
 
 @given(problems(most=7))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 def test_what_is_left_of_an_exact_order_is_exact_from_there(problem: SearchProblem) -> None:
     """Bellman's principle: to decide anew after an empty look gives the same, if nobody moves."""
     order = exact(problem)
@@ -129,7 +130,7 @@ def test_a_site_where_nobody_is_waits_until_all_others_are_done() -> None:
 
 
 @given(problems(most=10))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_every_policy_looks_at_every_site_once(problem: SearchProblem) -> None:
     sites = list(range(len(problem.prior)))
     for name in ("random", "nearest", "likeliest", "greedy", "exact", "receding"):
@@ -137,7 +138,7 @@ def test_every_policy_looks_at_every_site_once(problem: SearchProblem) -> None:
 
 
 @given(problems(most=8))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_nobody_is_faster_than_the_clairvoyant_where_ways_are_shortest(
     problem: SearchProblem,
 ) -> None:
@@ -149,7 +150,7 @@ def test_nobody_is_faster_than_the_clairvoyant_where_ways_are_shortest(
 
 
 @given(problems(most=8))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 def test_a_horizon_that_holds_all_sites_is_exact(problem: SearchProblem) -> None:
     assert exact(problem) == receding(problem, horizon=8)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tests.homes import Home, all_homes, awkward_points, home_of
 from tests.reference.sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
+from tests.thorough import examples
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.gates import Gates, Segment
@@ -79,7 +80,7 @@ def compared(home: Home, rng: np.random.Generator, doors: int, eyes: int, points
 
 
 @given(homes(), seeds())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_who_sees_what_past_shut_and_open_doors_is_as_every_wall_says(
     polygons: list[shapely.Polygon], seed: int
 ) -> None:
@@ -94,7 +95,7 @@ def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data: Path) -> No
 
 
 @given(homes(), seeds())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 def test_regions_follow_doors_as_single_sight_lines_do(
     polygons: list[shapely.Polygon], seed: int
 ) -> None:

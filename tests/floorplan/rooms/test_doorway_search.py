@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
+from tests.thorough import examples
 
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
@@ -145,7 +146,7 @@ def grids(draw: st.DrawFn) -> tuple[Polygon, list[shapely.Polygon], int]:
     return free, doors, len(boxes)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(grids())
 def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(
     drawn: tuple[Polygon, list[shapely.Polygon], int],

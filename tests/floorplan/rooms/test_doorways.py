@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given, settings
 from tests.homes import all_homes
 from tests.strategies import homes, seeds
+from tests.thorough import examples
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import Lattice
@@ -119,7 +120,7 @@ def check_fitted(polygons: list[shapely.Polygon], columns: int, rows: int, seed:
 
 
 @given(homes(), seeds())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_fitted_lines_cross_free_space_alone(polygons: list[shapely.Polygon], seed: int) -> None:
     _, _, x1, y1 = shapely.total_bounds(polygons).astype(int).tolist()
     check_fitted(polygons, x1 // 64 + 2, y1 // 64 + 2, seed)
