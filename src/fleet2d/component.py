@@ -59,8 +59,13 @@ PACKAGES = {
 class Settings(BaseModel):
     """A frozen group of configuration keys; the error about an unknown key lists the known ones."""
 
+    # Validators are built when a class is first used: a scenario uses few of all classes.
     model_config = ConfigDict(
-        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False
+        frozen=True,
+        extra="forbid",
+        validate_default=True,
+        allow_inf_nan=False,
+        defer_build=True,
     )
 
     @model_validator(mode="wrap")

@@ -25,6 +25,8 @@ class ComponentClass(ModelMetaclass):
         Raises:
             TypeError: a field is declared in a way that can't be configuration.
         """
+        # A user's class is built at once, so that the error stands where the class is declared.
+        kwargs.setdefault("defer_build", namespace["__module__"].startswith("fleet2d."))
         try:
             return super().__new__(cls, name, bases, namespace, **kwargs)
         except PydanticUserError as error:
