@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -211,7 +212,8 @@ def _convert(column: Column, values: Any) -> tuple[Any, Any]:
     if column.takes_strings:
         return _as_strings(column, values), True
     valid = None
-    if isinstance(values, np.ma.MaskedArray):
+    # There is no masked array before `numpy.ma` is imported, which takes time.
+    if "numpy.ma" in sys.modules and isinstance(values, np.ma.MaskedArray):
         valid = ~np.ma.getmaskarray(values)
         values = np.ma.getdata(values)
     values = np.asarray(values)

@@ -1,5 +1,6 @@
 """The command line: `fleet2d run`, `validate`, `show` and the rest; see `fleet2d --help`."""
 
+import os
 import sys
 from typing import Annotated, NoReturn
 
@@ -54,6 +55,8 @@ def about(
 
 def main() -> NoReturn:
     """Run the command line; exit 0 done, 2 wrong input, 1 our fault, 130 interrupted."""
+    # NumPy starts a thread for each core when it is imported; nothing here multiplies matrices.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app(standalone_mode=True)
     except Fleet2DError as error:

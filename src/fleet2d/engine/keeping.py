@@ -17,6 +17,7 @@ from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.formats.native import native_document
+from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.run import FLOORPLAN_NAME
 from fleet2d.scenario.model import Scenario
@@ -74,7 +75,7 @@ def describe_end(
         )
 
 
-def open_store(store: RunStore, plan: FloorPlan) -> None:
+def open_store(store: RunStore, home: Home) -> None:
     """Make the run directory, and put the floor plan in it.
 
     Raises:
@@ -85,7 +86,7 @@ def open_store(store: RunStore, plan: FloorPlan) -> None:
     if store.directory is None:
         return
     try:
-        keep_plan(store, plan)
+        keep_plan(store, home)
     except ArtifactError as error:
         store.discard()
         reason = error.__cause__
@@ -94,13 +95,14 @@ def open_store(store: RunStore, plan: FloorPlan) -> None:
         ) from reason
 
 
-def keep_plan(store: RunStore, plan: FloorPlan) -> None:
+def keep_plan(store: RunStore, home: Home) -> None:
     """Put the floor plan into the run directory.
 
     Raises:
         ArtifactError: It can't be written.
     """
-    store.keep(FLOORPLAN_NAME, json.dumps(native_document(plan)))
+    document = home.cached("document", lambda: json.dumps(native_document(home.plan)))
+    store.keep(FLOORPLAN_NAME, document)
 
 
 @contextmanager

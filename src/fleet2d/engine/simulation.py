@@ -88,7 +88,7 @@ class Simulation(Judging):
             store = RunStore(out)
             store.check()
             self._prepare(loaded, store, interventions)
-        open_store(self._store, self.home.plan)
+        open_store(self._store, self.home)
         self._setup_s = time.perf_counter() - began
 
     def _prepare(
@@ -139,7 +139,7 @@ class Simulation(Judging):
         run._prepare(scenario, store)
         if checkpoint is None:
             store.reopen(ledger, None)
-            keep_plan(store, run.home.plan)
+            keep_plan(store, run.home)
             run._setup_s = time.perf_counter() - began
             return run
         state = checkpoint.read(run._constants)
