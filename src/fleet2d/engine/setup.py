@@ -26,8 +26,8 @@ from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
-from fleet2d.interventions.home import OfHome
-from fleet2d.interventions.robots import makes_wrong
+from fleet2d.interventions.home import HomeIntervention
+from fleet2d.interventions.robots import causes_errors
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.model import Scenario
 
@@ -50,7 +50,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     gazes, cameras = open_cameras(actors, len(users), scenario.sight)
     _check_reads(scenario, actors)
     for those in cameras:
-        if any(makes_wrong(entry.act, those.owner.name) for entry in scenario.script):
+        if any(causes_errors(entry.act, those.owner.name) for entry in scenario.script):
             those.prepare_to_err()
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
     changes = Changes(scenario.objects, home, clock)
@@ -184,7 +184,7 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
 
 def _may_change(scenario: Scenario) -> bool:
     """Tell whether the home may change during the run."""
-    moves = any(isinstance(entry.act, OfHome) for entry in scenario.script)
+    moves = any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)
     return bool(scenario.objects or scenario.changes or moves)
 
 

@@ -1,1 +1,1 @@
-"""Interventions: all that somebody does to a run from outside, as data; one module a subject."""
+"""Interventions: changes of a run from outside, as data; one module for each subject."""

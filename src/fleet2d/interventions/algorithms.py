@@ -1,4 +1,4 @@
-"""What is done to algorithms: reset, replace."""
+"""Interventions on algorithms: reset, replace."""
 
 from typing import Any, ClassVar, Self
 
@@ -9,15 +9,15 @@ from fleet2d.component import register
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import Intervention, Lasting
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, problem
+from fleet2d.problems import problem, suggest
 from fleet2d.units import InputPath
 
 
 @register("intervention", "reset")
 class Reset(Intervention):
-    """Let an algorithm forget what it has learned, or go on from what another run has learned.
+    """Let an algorithm forget what it has learned, or load what another run has learned.
 
-    Its newest output stands until it is updated next.
+    Its present output remains until its next update.
     """
 
     subject: ClassVar[str] = "algorithm"
@@ -27,31 +27,31 @@ class Reset(Intervention):
     )
 
     def check(self, world: World) -> None:
-        """Refuse an algorithm that there isn't."""
+        """Refuse an unknown algorithm."""
         check_algorithm(world, self.algorithm)
 
     def begin(self, world: World) -> None:
-        """Begin anew."""
+        """Restart the algorithm."""
         world.reset(self.algorithm, self.learned)
 
 
 @register("intervention", "replace")
 class Replace(Lasting):
-    """Let behaviors and other algorithms read something else of an algorithm for a while.
+    """Let behaviors and other algorithms read another output of an algorithm for a while.
 
-    The algorithm itself goes on, and its tables and metrics show what it puts out.
+    The algorithm itself continues, and its tables and metrics show its real output.
     """
 
     subject: ClassVar[str] = "algorithm"
     algorithm: str = Field(description="the algorithm")
     rooms: dict[str, float] = Field(
-        default={}, description="weights of rooms; those left out have none", min_length=0
+        default={}, description="weights of rooms; 0 for those left out", min_length=0
     )
     values: dict[str, float | str] = Field(
-        default={}, description="or numbers and texts by name, as of an output that is a mapping"
+        default={}, description="or numbers and texts by name, for an output that is a mapping"
     )
-    frozen: bool = Field(default=False, description="or its newest output, as it is then")
-    withheld: bool = Field(default=False, description="or nothing, as before its first output")
+    frozen: bool = Field(default=False, description="or its output at that step")
+    withheld: bool = Field(default=False, description="or no output, as before the first one")
 
     @model_validator(mode="after")
     def _is_one_output(self) -> Self:
@@ -62,29 +62,26 @@ class Replace(Lasting):
         return self
 
     def check(self, world: World) -> None:
-        """Refuse an algorithm or rooms that there aren't."""
+        """Refuse an unknown algorithm or room."""
         check_algorithm(world, self.algorithm)
-        known = [room.name for room in world.home.rooms]
+        names = [room.name for room in world.home.rooms]
         for room in self.rooms:
-            if room not in known:
-                raise ScenarioError(
-                    f"there is no room {room!r}{did_you_mean(room, known)}"
-                    f" The rooms are: {', '.join(known)}"
-                )
+            if room not in names:
+                raise ScenarioError(f"there is no room {room!r}{suggest(room, names)}")
 
     def begin(self, world: World) -> None:
-        """Let it be read."""
+        """Replace the output."""
         world.replace(self.algorithm, self._output(world))
 
     def end(self, world: World) -> None:
-        """Let be read what began before and isn't over, else what it puts out."""
-        others = (
+        """Return to the latest intervention that is still active, else to the real output."""
+        active = (
             act
             for act in reversed(world.lasting)
             if isinstance(act, Replace) and act.algorithm == self.algorithm
         )
-        other = next(others, None)
-        world.replace(self.algorithm, None if other is None else other._output(world))
+        latest = next(active, None)
+        world.replace(self.algorithm, None if latest is None else latest._output(world))
 
     def _output(self, world: World) -> Any:
         if self.rooms:
@@ -93,14 +90,10 @@ class Replace(Lasting):
 
 
 def check_algorithm(world: World, name: str) -> None:
-    """Refuse an algorithm that there isn't.
+    """Refuse an unknown algorithm.
 
     Raises:
-        ScenarioError: Says which there are.
+        ScenarioError: There is no such algorithm; the message lists those that there are.
     """
-    known = world.algorithms
-    if name not in known:
-        raise ScenarioError(
-            f"there is no algorithm {name!r}{did_you_mean(name, known)}"
-            f" There are: {', '.join(known) or 'none'}"
-        )
+    if name not in world.algorithms:
+        raise ScenarioError(f"there is no algorithm {name!r}{suggest(name, world.algorithms)}")

@@ -1,4 +1,4 @@
-"""What is done to bodies, people and robots alike: put, send, hold, release, drive."""
+"""Interventions on bodies, people and robots alike: put, send, hold, release, drive."""
 
 from typing import Any
 
@@ -18,46 +18,46 @@ from fleet2d.kernels.headings import TURN
 from fleet2d.units import AngleDeg, PositiveDuration
 
 
-class OfBody(Intervention):
-    """Base of what is done to a body."""
+class BodyIntervention(Intervention):
+    """Base of interventions on a body."""
 
     entity: str = Field(description="the person or robot")
 
     def check(self, world: World) -> None:
-        """Refuse a body that there isn't."""
+        """Refuse an unknown body."""
         body(world, self.entity)
 
 
 @register("intervention", "put")
-class Put(OfBody):
-    """Put a body somewhere at once, as if it were carried; it decides anew there.
+class Put(BodyIntervention):
+    """Put a body at a place at once, as if it were carried; it decides anew there.
 
-    A robot that is put elsewhere is kidnapped: nothing tells it so but where it finds itself. In a
-    room the place is drawn; at furniture it is where one steps up to it.
+    A robot that is put elsewhere is kidnapped: only its new position shows it. In a room the point
+    is drawn at random; at furniture it is the point from which it is used.
     """
 
     to: Place = Field(description="where: a room, furniture, or a point")
     heading_deg: AngleDeg | None = Field(
-        default=None, description="where it faces, counter-clockwise from +x; left out: as before"
+        default=None, description="its heading, counter-clockwise from +x; left out: as before"
     )
 
     def check(self, world: World) -> None:
-        """Refuse a place where its body can't be."""
+        """Refuse a place where the body doesn't fit."""
         self._place(body(world, self.entity), world)
 
     def begin(self, world: World) -> None:
         """Put it there.
 
         Raises:
-            PlacementError: A shut door, or furniture that was moved, leaves no room for it there.
+            PlacementError: A shut door or moved furniture leaves no room for the body there.
         """
         actor = body(world, self.entity)
         x, y = self._place(actor, world)
         part = actor.space.part_at(x, y)
         if part < 0:
-            at = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
+            x_m, y_m = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
             raise PlacementError(
-                f"{actor.path}: there is no room for its body at ({at[0]:g}, {at[1]:g}) m"
+                f"{actor.path}: there is no room for its body at ({x_m:g}, {y_m:g}) m"
             )
         heading = heading_of(self.heading_deg)
         world.move(actor, Pose(x, y, actor.state.heading if heading is None else heading, 0), part)
@@ -70,33 +70,33 @@ class Put(OfBody):
 
 
 @register("intervention", "send")
-class Send(OfBody):
-    """Send a body somewhere on foot: there it stays until it is released.
+class Send(BodyIntervention):
+    """Send a body to a place, where it stays until it is released.
 
-    A person sits or lies on furniture as one does; who was away comes home for it. Where shut doors
-    are in the way, it waits and tries again.
+    A person sits or lies on furniture as is usual there, and comes home if away. While shut doors
+    block the way, the body waits and tries again.
     """
 
     to: Place = Field(description="where to: a room, furniture, or a point")
     heading_deg: AngleDeg | None = Field(
-        default=None, description="where it faces then, counter-clockwise from +x; left out: ahead"
+        default=None, description="its heading there, counter-clockwise from +x; left out: ahead"
     )
     duration: PositiveDuration | None = Field(
         default=None, description="for how long it stays there; left out: until it is released"
     )
 
     def check(self, world: World) -> None:
-        """Refuse a place that there isn't, or that it can't get to."""
+        """Refuse a place that doesn't exist or can't be reached."""
         check_reach(body(world, self.entity), self.to)
 
     def begin(self, world: World) -> None:
-        """Set out."""
+        """Give the order."""
         order = orders.GoTo(self.to, heading_of(self.heading_deg), self.duration)
         body(world, self.entity).obey(order, world.step)
 
 
 @register("intervention", "hold")
-class Hold(OfBody):
+class Hold(BodyIntervention):
     """Let a body stand still where it is, until it is released."""
 
     duration: PositiveDuration | None = Field(
@@ -104,42 +104,42 @@ class Hold(OfBody):
     )
 
     def begin(self, world: World) -> None:
-        """Stop."""
+        """Give the order."""
         body(world, self.entity).obey(orders.Hold(self.duration), world.step)
 
 
 @register("intervention", "release")
-class Release(OfBody):
-    """Hand a body back to its own behaviors."""
+class Release(BodyIntervention):
+    """Return a body to the control of its own behaviors."""
 
     def begin(self, world: World) -> None:
-        """Let them decide anew."""
+        """Cancel its order."""
         body(world, self.entity).obey(None, world.step)
 
 
 @register("intervention", "replan")
-class Replan(OfBody):
+class Replan(BodyIntervention):
     """Let a body decide anew, whatever it is doing."""
 
     def begin(self, world: World) -> None:
-        """Ask its behaviors at the present step."""
+        """Let its behaviors decide at the present step."""
         body(world, self.entity).decide_anew(world.step)
 
 
 @register("intervention", "drive")
-class Drive(OfBody):
-    """Take the decisions of a body out of the hands of its behaviors, for good."""
+class Drive(BodyIntervention):
+    """Let a body follow only plans from outside, not its behaviors, for the rest of the run."""
 
     def begin(self, world: World) -> None:
-        """From now on it follows plans from outside, and stays where it is without one."""
+        """Let it follow plans from outside; without one it stays where it is."""
         world.drive(body(world, self.entity))
 
 
 @register("intervention", "decide")
-class Decide(OfBody):
-    """Give a body that is driven from outside a plan."""
+class Decide(BodyIntervention):
+    """Give a plan to a body that follows plans from outside."""
 
-    plan: dict[str, Any] = Field(description="the plan, as Plan.data() writes it")
+    plan: dict[str, Any] = Field(description="the plan, as Plan.data() returns it")
 
     def begin(self, world: World) -> None:
         """Let the body follow the plan from the present step on."""
@@ -149,17 +149,17 @@ class Decide(OfBody):
 
 
 def heading_of(heading_deg: float | None) -> int | None:
-    """Return a heading [1/4096 turn] of an angle; None for none."""
+    """Return an angle [degrees] as a heading of the kernels; None for None."""
     return None if heading_deg is None else round(heading_deg / 360 * TURN) % TURN
 
 
 def check_reach(actor: Actor, place: RoomChoice | Point) -> None:
-    """Refuse a place that there isn't, or that a body never gets to.
+    """Refuse a place that doesn't exist, or that a body can never reach.
 
-    While doors are shut it is only asked for by name: they may be open by then.
+    While doors are shut only the name of the place is checked: they may open later.
 
     Raises:
-        PlacementError: Says what there is.
+        PlacementError: The message lists the places that there are.
     """
     home = actor.home
     if is_point(place):
@@ -167,8 +167,8 @@ def check_reach(actor: Actor, place: RoomChoice | Point) -> None:
         if not home.hinders or actor.space.part_at(x, y) < 0:
             actor.point(place)  # type: ignore[arg-type]
     elif home.hinders:
-        things = {name for thing in home.objects if thing.uses for name in (thing.name, thing.type)}
-        if not things & set(place):
+        names = {name for item in home.objects if item.uses for name in (item.name, item.type)}
+        if not names & set(place):
             matching_rooms(place, home.rooms, home.rooms, home.objects)  # type: ignore[arg-type]
     elif furniture_of(actor, place) is None:
         actor.rooms(place)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Interventions on bodies as methods: put, send, hold, release, away, activity."""
+"""Interventions on people and robots as methods: put, send, hold, release, away, activity."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -8,44 +8,44 @@ from typing import Any
 from pydantic import ValidationError
 
 from fleet2d.interventions import bodies, people
-from fleet2d.interventions.intervention import Intervention, refused
+from fleet2d.interventions.intervention import Intervention, refusal
 
 Time = str | timedelta
 """A duration: '90 s', '1 h', or a timedelta."""
 
 
 class BodyVerbs(ABC):
-    """What may be done to a run from outside, at the present step.
+    """Interventions on a run, at the present step.
 
-    Each method does what the entry of the same name in a scenario's `script` does. What is done is
-    kept in the manifest, and done again by `fleet2d.reproduce`.
+    Each method has the effect of the entry of the same name in a scenario's `script`. The manifest
+    records it, and `fleet2d.reproduce` repeats it.
     """
 
     @abstractmethod
     def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
-        """Do something at the present step.
+        """Apply an intervention at the present step.
 
         Args:
-            act: An intervention, or one as a script has it: ``{"put": "ana", "to": "kitchen"}``.
+            act: An intervention, or one as in a script: ``{"put": "ana", "to": "kitchen"}``.
 
         Raises:
-            ScenarioError: It is none, or there is nothing of that name.
-            PlacementError: There is no such place, or nobody gets there.
+            ScenarioError: It is not valid, or names something unknown.
+            PlacementError: There is no such place, or it can't be reached.
             InputError: The run is finished.
         """
 
     # Bodies
 
     def put(self, name: str, to: Any, heading_deg: float | None = None) -> None:
-        """Put a body somewhere at the present step, as if it were carried; it decides anew there.
+        """Put a body at a place at the present step, as if it were carried; it decides anew there.
 
         Args:
             name: The person or robot.
             to: A room, furniture, a list of those to try in turn, or a point (x, y) [m].
-            heading_deg: Where it faces, counter-clockwise from +x; None: as before.
+            heading_deg: Its heading there, counter-clockwise from +x; None: as before.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such person or robot.
             PlacementError: There is no such place, or its body doesn't fit there.
 
         Example:
@@ -66,17 +66,17 @@ class BodyVerbs(ABC):
         *,
         duration: Time | None = None,
     ) -> None:
-        """Send a body somewhere on foot; there it stays.
+        """Send a body to a place, where it stays.
 
         Args:
             name: The person or robot.
             to: A room, furniture, a list of those to try in turn, or a point (x, y) [m].
-            heading_deg: Where it faces then, counter-clockwise from +x; None: as it came.
+            heading_deg: Its heading there, counter-clockwise from +x; None: as it arrives.
             duration: For how long it stays there; None: until it is released.
 
         Raises:
-            ScenarioError: There is nobody of that name.
-            PlacementError: There is no such place, or it can't get there.
+            ScenarioError: There is no such person or robot.
+            PlacementError: There is no such place, or it can't be reached.
 
         Example:
             >>> import fleet2d
@@ -89,18 +89,18 @@ class BodyVerbs(ABC):
         self._do(bodies.Send, entity=name, to=to, heading_deg=heading_deg, duration=duration)
 
     def hold(self, name: str, *, duration: Time | None = None) -> None:
-        """Let a body stand still where it is, for so long, or until it is released.
+        """Let a body stand still where it is, for a duration or until it is released.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such person or robot.
         """
         self._do(bodies.Hold, entity=name, duration=duration)
 
     def release(self, name: str) -> None:
-        """Hand a body back to its own behaviors.
+        """Return a body to the control of its own behaviors.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such person or robot.
         """
         self._do(bodies.Release, entity=name)
 
@@ -108,14 +108,14 @@ class BodyVerbs(ABC):
         """Let a body's behaviors decide anew at the present step, whatever it is doing.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such person or robot.
         """
         self._do(bodies.Replan, entity=name)
 
     # People
 
     def away(self, name: str, *, duration: Time | None = None) -> None:
-        """Send a person out of the home, for so long, or until called home or released.
+        """Send a person out of the home, for a duration or until called home or released.
 
         Raises:
             ScenarioError: There is no such person.
@@ -125,37 +125,37 @@ class BodyVerbs(ABC):
     def call_home(
         self, name: str, to: Any = ("living_room", "any"), *, duration: Time | None = None
     ) -> None:
-        """Call a person home, who stays for so long, or until released.
+        """Call a person home, who stays for a duration or until released.
 
         Raises:
             ScenarioError: There is no such person.
-            PlacementError: There is no such place, or nobody gets there.
+            PlacementError: There is no such place, or it can't be reached.
         """
         self._do(people.CallHome, entity=name, to=to, duration=duration)
 
     def guest(self, name: str, to: Any = ("living_room", "any"), *, duration: Time = "2 h") -> None:
-        """Let a guest come, who stays for so long, and leaves: a user with the behavior `guest`.
+        """Let a guest, a user with the behavior `guest`, come, stay for a duration, and leave.
 
         Raises:
-            ScenarioError: There is no such person, or it is no guest.
-            PlacementError: There is no such place, or nobody gets there.
+            ScenarioError: There is no such person, or the person is no guest.
+            PlacementError: There is no such place, or it can't be reached.
         """
         self._do(people.LetIn, entity=name, to=to, duration=duration)
 
     def activity(
         self, name: str, what: str, to: Any = None, *, duration: Time | None = None
     ) -> None:
-        """Let a person do something, for so long, or until released.
+        """Let a person do an activity, for a duration or until released.
 
         Args:
             name: The person.
-            what: Its name in the persona or agenda.
-            to: Where; None: where the person does it by its own behavior.
+            what: The name of the activity in the persona or agenda.
+            to: The place; None: where the person's own behavior does it.
             duration: For how long; None: until released.
 
         Raises:
-            ScenarioError: There is no such person, or it has no place for that activity.
-            PlacementError: There is no such place, or nobody gets there.
+            ScenarioError: There is no such person, or no place for that activity.
+            PlacementError: There is no such place, or it can't be reached.
         """
         self._do(people.Activity, entity=name, what=what, to=to, duration=duration)
 
@@ -163,5 +163,5 @@ class BodyVerbs(ABC):
         try:
             act = verb(**{key: value for key, value in fields.items() if value is not None})
         except ValidationError as error:
-            raise refused(f"{verb.type_name}()", error) from None
+            raise refusal(f"{verb.type_name}()", error) from None
         self.intervene(act)

@@ -1,4 +1,4 @@
-"""What is done to the home: open, shut, lock, unlock, move, room."""
+"""Interventions on the home: open, shut, lock, unlock, move, room."""
 
 from typing import ClassVar
 
@@ -11,94 +11,94 @@ from fleet2d.interventions.intervention import Intervention
 from fleet2d.interventions.world import World
 
 
-class OfHome(Intervention):
-    """Base of what changes the home."""
+class HomeIntervention(Intervention):
+    """Base of interventions that change the home."""
 
     @property
-    def what(self) -> HomeChange:
+    def home_change(self) -> HomeChange:
         """The change."""
         raise NotImplementedError
 
     def check(self, world: World) -> None:
-        """Refuse what names nothing that is there."""
-        world.check_change(self.what)
+        """Refuse a change of something unknown."""
+        world.check_change(self.home_change)
 
     def begin(self, world: World) -> None:
-        """Let the floor plan take it up at the present step."""
-        world.change(self.what)
+        """Change the home at the present step."""
+        world.change(self.home_change)
 
 
 @register("intervention", "change")
-class Change(OfHome):
-    """Change the home, as an entry of `changes` says."""
+class Change(HomeIntervention):
+    """Change the home like an entry of `changes`."""
 
     subject: ClassVar[str] = "change"
-    change: HomeChange = Field(description="what changes, as in `changes` of a scenario")
+    change: HomeChange = Field(description="the change, as in `changes` of a scenario")
 
     @property
-    def what(self) -> HomeChange:
+    def home_change(self) -> HomeChange:
         """The change."""
         return self.change
 
 
-class OfDoor(OfHome):
-    """Base of what is done to a door."""
+class DoorIntervention(HomeIntervention):
+    """Base of interventions on a door."""
 
     subject: ClassVar[str] = "door"
     door: str = Field(description="the door")
 
     @property
-    def what(self) -> HomeChange:
+    def home_change(self) -> HomeChange:
         """The change."""
         return HomeChange.model_validate({self.type_name: self.door})
 
 
 @register("intervention", "open")
-class Open(OfDoor):
+class Open(DoorIntervention):
     """Open a door, even a locked one."""
 
 
 @register("intervention", "shut")
-class Shut(OfDoor):
+class Shut(DoorIntervention):
     """Shut a door, as soon as nobody stands in the doorway."""
 
 
 @register("intervention", "lock")
-class Lock(OfDoor):
+class Lock(DoorIntervention):
     """Lock a door: nobody opens it by hand once it is shut."""
 
 
 @register("intervention", "unlock")
-class Unlock(OfDoor):
+class Unlock(DoorIntervention):
     """Unlock a door."""
 
 
 @register("intervention", "move")
-class Move(OfHome):
+class Move(HomeIntervention):
     """Move a piece of furniture."""
 
     subject: ClassVar[str] = "object"
     object: str = Field(description="the piece of furniture")
-    to: Point = Field(description="where its middle comes to stand, [x, y] in metres")
+    to: Point = Field(description="where its centre is then, [x, y] in metres")
     turn_deg: float = Field(
         default=0.0, ge=-3600, le=3600, description="how far it is turned, counter-clockwise"
     )
 
     @property
-    def what(self) -> HomeChange:
+    def home_change(self) -> HomeChange:
         """The change."""
         return HomeChange(move=self.object, to=self.to, turn_deg=self.turn_deg)
 
 
 @register("intervention", "room")
-class Room(OfHome):
-    """Use a room for something else: behaviors that go to a bedroom find it there from then on."""
+class Room(HomeIntervention):
+    """Change the type of a room: behaviors that go to a bedroom go there from then on."""
 
     subject: ClassVar[str] = "name"
     name: str = Field(description="the room")
-    type: str = Field(description="what it is used for")
+    type: str = Field(description="its new type")
 
     @property
-    def what(self) -> HomeChange:
+    def home_change(self) -> HomeChange:
         """The change."""
         return HomeChange(room=self.name, type=self.type)

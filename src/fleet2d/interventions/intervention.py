@@ -18,45 +18,45 @@ from fleet2d.component import Codec, Component, components
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, problem, problem_at, rewrite
+from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, suggest
 from fleet2d.units import PositiveDuration
 
 
 class Intervention(Component):
-    """Something done to a run from outside: by a script, a test or a person.
+    """A change of a run from outside: by a script, a test or a person.
 
     It is data: the same in a scenario's `script`, as a method of a simulation and in a manifest.
-    What is done at a step holds for everything in that step: interventions come before the floor
-    plan. Nobody else's random draws change by one.
+    Interventions are the first phase of a step, so their effects hold for all of it. The random
+    draws of all other bodies stay the same.
     """
 
     kind: ClassVar[str] = "intervention"
-    # The field that stands behind the verb where it is written short: `put: ana`.
+    # The field whose value follows the verb in the short form: `put: ana`.
     subject: ClassVar[str] = "entity"
 
     @property
     def lasts(self) -> timedelta | None:
-        """After which time `end` is called; None: never."""
+        """The time after which `end` is called; None: never."""
         return None
 
     def check(self, world: World) -> None:
-        """Refuse what can't be: called before the run, or when a script asks for it.
+        """Refuse an impossible intervention; called before the run, or when it is requested.
 
         Raises:
-            ScenarioError: There is nothing of that name.
-            PlacementError: There is no such place, or nobody gets there.
+            ScenarioError: It names something unknown.
+            PlacementError: There is no such place, or it can't be reached.
         """
 
     def begin(self, world: World) -> None:
-        """Do it at the present step."""
+        """Apply it at the present step."""
         raise NotImplementedError
 
     def end(self, world: World) -> None:
-        """Undo it, when its time is over."""
+        """Undo it when its time is over."""
 
 
 class Lasting(Intervention):
-    """Base of what holds for a while: `begin` and `end` go by all that is under way then."""
+    """Base of interventions with a duration; `begin` and `end` apply all that are active then."""
 
     duration: PositiveDuration | None = Field(
         default=None, description="for how long; left out: until it is undone by `restore`"
@@ -69,12 +69,12 @@ class Lasting(Intervention):
 
 
 def body(world: World, name: str) -> DecidingActor:
-    """Return somebody in the run.
+    """Return a person or robot in the run.
 
     Raises:
-        ScenarioError: There is nobody of that name.
+        ScenarioError: There is no such body.
     """
-    return _named(name, "nobody named", {**world.users, **world.robots})
+    return _actor_of(name, "nobody named", {**world.users, **world.robots})
 
 
 def user(world: World, name: str) -> DecidingActor:
@@ -83,7 +83,7 @@ def user(world: World, name: str) -> DecidingActor:
     Raises:
         ScenarioError: There is no such person.
     """
-    return _named(name, "no user", world.users)
+    return _actor_of(name, "no user", world.users)
 
 
 def robot(world: World, name: str) -> DecidingActor:
@@ -92,15 +92,12 @@ def robot(world: World, name: str) -> DecidingActor:
     Raises:
         ScenarioError: There is no such robot.
     """
-    return _named(name, "no robot", world.robots)
+    return _actor_of(name, "no robot", world.robots)
 
 
-def _named(name: str, nobody: str, actors: Mapping[str, DecidingActor]) -> DecidingActor:
+def _actor_of(name: str, noun: str, actors: Mapping[str, DecidingActor]) -> DecidingActor:
     if name not in actors:
-        raise ScenarioError(
-            f"there is {nobody} {name!r}{did_you_mean(name, actors)}"
-            f" There are: {', '.join(actors) or 'none'}"
-        )
+        raise ScenarioError(f"there is {noun} {name!r}{suggest(name, actors)}")
     return actors[name]
 
 
@@ -111,7 +108,7 @@ class Verb(Codec):
     """
 
     def validate(self, value: Any, info: ValidationInfo) -> Intervention:
-        """Build the intervention that a mapping describes."""
+        """Return the intervention that a mapping describes."""
         if isinstance(value, Intervention):
             return value
         if not isinstance(value, Mapping):
@@ -119,14 +116,14 @@ class Verb(Codec):
         fields = dict(value)
         if "do" in fields:
             return _of_name(fields.pop("do")).model_validate(fields, context=info.context)
-        known = verbs()
-        said = [key for key in fields if key in known]
-        if len(said) != 1:
-            raise _not_one_verb(said, fields, known)
-        return _short(said[0], known[said[0]], fields, info)
+        classes = verbs()
+        keys = [key for key in fields if key in classes]
+        if len(keys) != 1:
+            raise _not_one_verb(keys, fields, classes)
+        return _from_short_form(keys[0], classes[keys[0]], fields, info)
 
     def dump(self, value: Intervention, info: SerializationInfo) -> dict[str, Any]:
-        """Write the intervention in the long form."""
+        """Return the intervention in the long form."""
         fields = value.model_dump(
             mode=info.mode, context=info.context, exclude_defaults=info.exclude_defaults
         )
@@ -135,7 +132,7 @@ class Verb(Codec):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Leave it to `fleet2d.scenario.schema`, which knows all verbs."""
+        """Return a mark that `fleet2d.scenario.schema` replaces by all verbs."""
         return {"type": "object", "x-quantity": "intervention"}
 
 
@@ -145,15 +142,18 @@ def verbs() -> dict[str, type[Intervention]]:
 
 
 def _of_name(name: object) -> type[Intervention]:
-    known = verbs()
-    if not isinstance(name, str) or name not in known:
-        text = f"there is no intervention {name!r}{did_you_mean(name, known)}"
-        raise problem_at(("do",), f"{text} There are: {', '.join(known)}", name)
-    return known[str(name)]
+    classes = verbs()
+    if not isinstance(name, str) or name not in classes:
+        raise problem_at(
+            ("do",), f"there is no intervention {name!r}{suggest(name, classes)}", name
+        )
+    return classes[name]
 
 
-def _short(verb: str, cls: Any, fields: dict[str, Any], info: ValidationInfo) -> Intervention:
-    """Build an intervention whose subject stands behind its verb; errors name the verb."""
+def _from_short_form(
+    verb: str, cls: Any, fields: dict[str, Any], info: ValidationInfo
+) -> Intervention:
+    """Return an intervention whose subject follows its verb; errors name the verb."""
     if cls.subject in fields and cls.subject != verb:
         raise problem(f"'{verb}' says which {cls.subject} it is: leave out '{cls.subject}'")
 
@@ -163,20 +163,20 @@ def _short(verb: str, cls: Any, fields: dict[str, Any], info: ValidationInfo) ->
         return line
 
     try:
-        written = {cls.subject: fields.pop(verb), **fields}
-        return cls.model_validate(written, context=info.context)  # type: ignore[no-any-return]
+        long = {cls.subject: fields.pop(verb), **fields}
+        return cls.model_validate(long, context=info.context)  # type: ignore[no-any-return]
     except ValidationError as error:
         raise rewrite(error, move) from None
 
 
 def _not_one_verb(
-    said: list[str], fields: Mapping[str, Any], known: Mapping[str, type[Component]]
+    keys: list[str], fields: Mapping[str, Any], classes: Mapping[str, type[Component]]
 ) -> Exception:
-    if said:
-        return problem(f"{' and '.join(said)} are given: one in each entry is wanted")
-    near = [did_you_mean(key, known) for key in fields]
-    hint = next((text for text in near if text.endswith("?")), ".")
-    return problem(f"it doesn't say what is done{hint} There are: {', '.join(known)}")
+    if keys:
+        return problem(f"{' and '.join(keys)} are given: one in each entry is wanted")
+    hints = [did_you_mean(key, classes) for key in fields]
+    hint = next((text for text in hints if text.endswith("?")), ".")
+    return problem(f"it doesn't say what is done{hint} There are: {', '.join(classes)}")
 
 
 _ADAPTER: TypeAdapter[Intervention] = TypeAdapter(Annotated[Intervention, Verb()])
@@ -186,7 +186,7 @@ def parse_intervention(content: Mapping[str, Any]) -> Intervention:
     """Return the intervention that a mapping describes, by its verb or in the long form.
 
     Raises:
-        ScenarioError: It describes none; says what is wrong.
+        ScenarioError: It is not valid; the message says what is wrong.
 
     Example:
         >>> parse_intervention({"put": "ana", "to": "kitchen"}).to
@@ -195,11 +195,11 @@ def parse_intervention(content: Mapping[str, Any]) -> Intervention:
     try:
         return _ADAPTER.validate_python(content)
     except ValidationError as error:
-        raise refused("", error) from None
+        raise refusal("", error) from None
 
 
 def dump_intervention(act: Intervention) -> dict[str, Any]:
-    """Return an intervention as `parse_intervention` reads it: what differs from the defaults.
+    """Return an intervention as `parse_intervention` reads it, without fields at their defaults.
 
     Example:
         >>> dump_intervention(parse_intervention({"put": "ana", "to": "kitchen"}))
@@ -209,14 +209,14 @@ def dump_intervention(act: Intervention) -> dict[str, Any]:
     return content
 
 
-def refused(what: str, error: ValidationError) -> ScenarioError:
-    """Say in a line what is wrong with an intervention.
+def refusal(prefix: str, error: ValidationError) -> ScenarioError:
+    """Return the error about an intervention that is not valid, in one line.
 
     Args:
-        what: How it was asked for, to begin the message; or empty.
-        error: What the validation found.
+        prefix: The beginning of the message, such as the method that was called; may be empty.
+        error: The error of the validation.
     """
     first = error.errors(include_url=False)[0]
     key = ".".join(str(part) for part in first["loc"])
-    why = first.get("ctx", {}).get("error", first["msg"])
-    return ScenarioError(": ".join(filter(None, [what, key, str(why)])))
+    reason = first.get("ctx", {}).get("error", first["msg"])
+    return ScenarioError(": ".join(filter(None, [prefix, key, str(reason)])))

@@ -1,4 +1,4 @@
-"""What is done to people: away, call_home, guest, activity."""
+"""Interventions on people: away, call_home, guest, activity."""
 
 from datetime import timedelta
 
@@ -12,36 +12,36 @@ from fleet2d.errors import ScenarioError
 from fleet2d.interventions.bodies import check_reach
 from fleet2d.interventions.intervention import Intervention, user
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.units import PositiveDuration
 
 
-class OfPerson(Intervention):
-    """Base of what is done to a person."""
+class PersonIntervention(Intervention):
+    """Base of interventions on a person."""
 
     entity: str = Field(description="the person")
 
     def check(self, world: World) -> None:
-        """Refuse a person that there isn't."""
+        """Refuse an unknown person."""
         user(world, self.entity)
 
 
 @register("intervention", "away")
-class Away(OfPerson):
-    """Send a person out of the home: to the way out on foot, and away until called home."""
+class Away(PersonIntervention):
+    """Send a person to the exit, and away until called home."""
 
     duration: PositiveDuration | None = Field(
         default=None, description="for how long; left out: until called home or released"
     )
 
     def begin(self, world: World) -> None:
-        """Set out."""
+        """Give the order."""
         user(world, self.entity).obey(GoOut(self.duration), world.step)
 
 
 @register("intervention", "call_home")
-class CallHome(OfPerson):
-    """Call a person home, who comes in by the way out and stays until released."""
+class CallHome(PersonIntervention):
+    """Call a person home, who comes in at the exit and stays until released."""
 
     to: Place = Field(
         default=("living_room", "any"), description="where to: a room, furniture, or a point"
@@ -51,17 +51,17 @@ class CallHome(OfPerson):
     )
 
     def check(self, world: World) -> None:
-        """Refuse a place that there isn't, or that nobody gets to."""
+        """Refuse a place that doesn't exist or can't be reached."""
         check_reach(user(world, self.entity), self.to)
 
     def begin(self, world: World) -> None:
-        """Set out."""
+        """Give the order."""
         user(world, self.entity).obey(GoTo(self.to, None, self.duration), world.step)
 
 
 @register("intervention", "guest")
-class LetIn(OfPerson):
-    """Let a guest come, stay for a while, and leave: somebody with the behavior `guest`."""
+class LetIn(PersonIntervention):
+    """Let a guest, a user with the behavior `guest`, come, stay for a while, and leave."""
 
     to: Place = Field(
         default=("living_room", "any"), description="where to: a room, furniture, or a point"
@@ -71,47 +71,46 @@ class LetIn(OfPerson):
     )
 
     def check(self, world: World) -> None:
-        """Refuse somebody who lives here, and a place that there isn't."""
+        """Refuse a user who is no guest, and an unknown place."""
         actor = user(world, self.entity)
         if not any(isinstance(behavior, Guest) for behavior in actor.behaviors):
             raise ScenarioError(
                 f"{self.entity} is no guest: a guest is a user with that behavior, like users:"
-                " {gina: guest}; call_home is for who lives here"
+                " {gina: guest}; use call_home for people who live here"
             )
         check_reach(actor, self.to)
 
     def begin(self, world: World) -> None:
-        """Come in."""
+        """Give the order."""
         user(world, self.entity).obey(GoTo(self.to, None, self.duration), world.step)
 
 
 @register("intervention", "activity")
-class Activity(OfPerson):
-    """Let a person do something: where it is done, sitting or lying as one does."""
+class Activity(PersonIntervention):
+    """Let a person do an activity at its place, sitting or lying as is usual."""
 
     what: str = Field(min_length=1, description="its name in the persona or agenda")
     to: Place | None = Field(
-        default=None, description="where; left out: where the person does it by its own behavior"
+        default=None, description="the place; left out: where the person's own behavior does it"
     )
     duration: PositiveDuration | None = Field(
         default=None, description="for how long; left out: until released"
     )
 
     def check(self, world: World) -> None:
-        """Refuse what the person has no place for."""
+        """Refuse an activity for which the person has no place."""
         actor = user(world, self.entity)
         if self.to is not None:
             check_reach(actor, self.to)
             return
-        known = [name for behavior in actor.behaviors for name in behavior.activities()]
-        if self.what not in known:
+        names = [name for behavior in actor.behaviors for name in behavior.activities()]
+        if self.what not in names:
             raise ScenarioError(
-                f"{self.entity} has no activity {self.what!r}"
-                f"{did_you_mean(self.what, known)} There are: {', '.join(known) or 'none'};"
+                f"{self.entity} has no activity {self.what!r}{suggest(self.what, names)};"
                 " or say where it is done, as to: kitchen"
             )
 
     def begin(self, world: World) -> None:
-        """Set out."""
+        """Give the order."""
         order = DoActivity(self.what, self.to, self.duration)
         user(world, self.entity).obey(order, world.step)

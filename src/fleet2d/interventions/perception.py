@@ -1,4 +1,4 @@
-"""What is done to what a robot perceives: suppress, mistake, inject."""
+"""Interventions on what a robot perceives: suppress, mistake, inject."""
 
 from pydantic import Field
 
@@ -14,8 +14,8 @@ from fleet2d.units import AngleDeg
 UNKNOWN = "unknown"
 
 
-class OfPerception(Lasting):
-    """Base of what is done to what a robot perceives; the other draws of its cameras stay."""
+class PerceptionIntervention(Lasting):
+    """Base of interventions on perception; they don't change the random draws of cameras."""
 
     entity: str = Field(description="the robot")
     camera: str | None = Field(
@@ -24,54 +24,54 @@ class OfPerception(Lasting):
 
     @property
     def disturbance(self) -> Disturbance:
-        """What it does to cameras."""
+        """The effect on cameras."""
         raise NotImplementedError
 
     def check(self, world: World) -> None:
-        """Refuse a robot or a camera that there isn't."""
+        """Refuse an unknown robot or camera."""
         check_camera(robot(world, self.entity), self.camera)
 
     def begin(self, world: World) -> None:
-        """Disturb its cameras."""
+        """Apply all active disturbances of its cameras."""
         disturb(world, self.entity)
 
     def end(self, world: World) -> None:
-        """Leave them alone."""
+        """Apply the active disturbances of its cameras, without this one."""
         disturb(world, self.entity)
 
 
 @register("intervention", "suppress")
-class Suppress(OfPerception):
-    """Let a robot not notice a person who is in view."""
+class Suppress(PerceptionIntervention):
+    """Let a robot miss a person who is in view."""
 
     user: str = Field(description="the person")
 
     @property
     def disturbance(self) -> Disturbance:
-        """What it does to cameras."""
+        """The effect on cameras."""
         return Disturbance(self.camera, missed=self.user)
 
     def check(self, world: World) -> None:
-        """Refuse a person that there isn't."""
+        """Refuse an unknown person."""
         super().check(world)
         user(world, self.user)
 
 
 @register("intervention", "mistake")
-class Mistake(OfPerception):
-    """Let a robot take a person whom it notices for another one."""
+class Mistake(PerceptionIntervention):
+    """Let a robot mistake a person whom it notices for another one."""
 
     user: str = Field(description="the person")
-    taken_for: str = Field(description="for whom, or 'unknown'")
+    taken_for: str = Field(description="the other person, or 'unknown'")
 
     @property
     def disturbance(self) -> Disturbance:
-        """What it does to cameras."""
+        """The effect on cameras."""
         other = "" if self.taken_for == UNKNOWN else self.taken_for
         return Disturbance(self.camera, mistaken=(self.user, other))
 
     def check(self, world: World) -> None:
-        """Refuse people that there aren't."""
+        """Refuse unknown people."""
         super().check(world)
         user(world, self.user)
         if self.taken_for == UNKNOWN:
@@ -81,27 +81,27 @@ class Mistake(OfPerception):
 
 
 @register("intervention", "inject")
-class Inject(OfPerception):
-    """Let a robot perceive somebody who isn't there, in every look, wherever it looks.
+class Inject(PerceptionIntervention):
+    """Let a robot perceive a person who isn't there, in every look, wherever it looks.
 
-    In the table of observations it is a false positive: its true user is nobody.
+    In the table of observations it is a false positive: it has no true user.
     """
 
-    user: str = Field(description="for whom it is taken, or 'unknown'")
-    spot: tuple[float, float] = Field(description="where, [x, y] in metres")
+    user: str = Field(description="the person that it perceives, or 'unknown'")
+    spot: tuple[float, float] = Field(description="the apparent place, [x, y] in metres")
     heading_deg: AngleDeg = Field(
-        default=0.0, description="where it seems to face, counter-clockwise from +x"
+        default=0.0, description="the apparent heading, counter-clockwise from +x"
     )
 
     @property
     def disturbance(self) -> Disturbance:
-        """What it does to cameras."""
+        """The effect on cameras."""
         name = "" if self.user == UNKNOWN else self.user
         heading = heading_of(self.heading_deg) or 0
         return Disturbance(self.camera, injected=FalseSighting(name, *self.spot, heading))
 
     def check(self, world: World) -> None:
-        """Refuse a person that there isn't, and a place outside the home."""
+        """Refuse an unknown person, and a place outside the home."""
         super().check(world)
         if self.user == UNKNOWN:
             check_truth(world, self.entity)

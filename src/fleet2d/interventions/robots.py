@@ -1,4 +1,4 @@
-"""What is done to robots: call, battery, switch_off, switch_on, fault."""
+"""Interventions on robots: call, battery, switch_off, switch_on, fault."""
 
 from typing import Self
 
@@ -13,50 +13,50 @@ from fleet2d.events import EventKind
 from fleet2d.interventions.bodies import check_reach
 from fleet2d.interventions.intervention import Intervention, Lasting, body, robot
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, problem
+from fleet2d.problems import problem, suggest
 from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.perception import Perception
 from fleet2d.units import Share
 
-# The behaviors of Fleet2D that answer.
-ANSWERS = {"come": "come", "find": "find", "dock": "dock"}
+# The behavior of Fleet2D that responds to each command.
+RESPONDERS = {"come": "come", "find": "find", "dock": "dock"}
 
 
-class OfRobot(Intervention):
-    """Base of what is done to a robot."""
+class RobotIntervention(Intervention):
+    """Base of interventions on a robot."""
 
     entity: str = Field(description="the robot")
 
     def check(self, world: World) -> None:
-        """Refuse a robot that there isn't."""
+        """Refuse an unknown robot."""
         robot(world, self.entity)
 
 
 @register("intervention", "call")
-class Call(OfRobot):
-    """Call a robot, as a user or an app does: to a place, to find somebody, or to dock.
+class Call(RobotIntervention):
+    """Call a robot, as a user or an app does: to a place, to find a person, or to dock.
 
-    The first of its behaviors that answers takes the call up: at once, or when the behaviors before
-    it leave the robot to it. A later call replaces one that still waits. Event: `called`.
+    The first of its behaviors that responds follows the call: at once, or when the behaviors before
+    it are idle. A later call replaces one that is still pending. Event: `called`.
     """
 
     to: Place | None = Field(default=None, description="come there: behavior `come`")
     find: str | None = Field(default=None, description="find this person: behavior `find`")
     dock: bool = Field(default=False, description="go to the charger: behavior `dock`")
     command: str | None = Field(
-        default=None, min_length=1, description="a word that a behavior of your own answers to"
+        default=None, min_length=1, description="a word that a behavior of your own responds to"
     )
 
     @model_validator(mode="after")
     def _is_one_command(self) -> Self:
-        wanted = (self.to is not None, self.find is not None, self.dock, self.command is not None)
-        if sum(wanted) != 1:
+        is_set = (self.to is not None, self.find is not None, self.dock, self.command is not None)
+        if sum(is_set) != 1:
             raise problem("one of 'to', 'find', 'dock: true' and 'command' is wanted")
         return self
 
     @property
-    def meaning(self) -> Command:
-        """What the robot is called to do."""
+    def order(self) -> Command:
+        """The command that its behaviors receive."""
         if self.to is not None:
             return Command("come", place=self.to)
         if self.find is not None:
@@ -64,26 +64,26 @@ class Call(OfRobot):
         return Command(self.command or "dock")
 
     def check(self, world: World) -> None:
-        """Refuse a call that none of its behaviors answers."""
-        actor, command = robot(world, self.entity), self.meaning
+        """Refuse a call that none of its behaviors responds to."""
+        actor, command = robot(world, self.entity), self.order
         if self.to is not None:
             check_reach(actor, self.to)
         if not any(behavior.takes(command) for behavior in actor.behaviors):
-            kind = ANSWERS.get(command.do)
+            kind = RESPONDERS.get(command.do)
             hint = f": give it one, like behaviors: [{{type: {kind}}}, …]" if kind else ""
             raise ScenarioError(
                 f"none of the behaviors of {self.entity} answers the call {command.text!r}{hint}"
             )
 
     def begin(self, world: World) -> None:
-        """Let its behaviors hear of it."""
-        command = self.meaning
+        """Pass the command to its behaviors."""
+        command = self.order
         world.emit(self.entity, EventKind.CALLED, command.text)
         robot(world, self.entity).hear(command, world.step)
 
 
 @register("intervention", "battery")
-class SetBattery(OfRobot):
+class SetBattery(RobotIntervention):
     """Set the charge of a robot's battery."""
 
     charge: Share = Field(description="the charge from then on")
@@ -102,41 +102,41 @@ class SetBattery(OfRobot):
 
 
 class Switch(Lasting):
-    """Base of what switches a camera or a behavior of a body."""
+    """Base of interventions that switch a camera or a behavior of a body."""
 
-    entity: str = Field(description="the robot; of behaviors, a person, too")
+    entity: str = Field(description="the robot; for a behavior also a person")
     camera: bool | str | None = Field(
         default=None, description="its camera, by name where it has several; true: all"
     )
     behavior: str | None = Field(default=None, description="its behavior, by its type")
 
     @model_validator(mode="after")
-    def _is_one_thing(self) -> Self:
+    def _has_one_subject(self) -> Self:
         if (self.behavior is None) == (not self.camera):
             raise problem("'camera: true', a camera's name, or 'behavior' is wanted, one of them")
         return self
 
     def check(self, world: World) -> None:
-        """Refuse a camera or a behavior that there isn't."""
+        """Refuse an unknown camera or behavior."""
         if self.behavior is None:
             check_camera(robot(world, self.entity), self.camera)
             return
-        known = [behavior.type_name for behavior in body(world, self.entity).behaviors]
-        if self.behavior not in known:
+        names = [behavior.type_name for behavior in body(world, self.entity).behaviors]
+        if self.behavior not in names:
             raise ScenarioError(
                 f"{self.entity} has no behavior {self.behavior!r}"
-                f"{did_you_mean(self.behavior, known)} It has: {', '.join(known) or 'none'}"
+                f"{suggest(self.behavior, names, 'It has')}"
             )
 
 
 @register("intervention", "switch_off")
 class SwitchOff(Switch):
-    """Switch a camera or a behavior off: it sees nothing, or is never asked."""
+    """Switch a camera or a behavior off: the camera sees nothing, the behavior never decides."""
 
     @property
     def disturbance(self) -> Disturbance | None:
-        """What it does to cameras."""
-        return Disturbance(named(self.camera), dark=True) if self.camera else None
+        """The effect on cameras."""
+        return Disturbance(camera_name(self.camera), dark=True) if self.camera else None
 
     def begin(self, world: World) -> None:
         """Switch it off."""
@@ -147,7 +147,7 @@ class SwitchOff(Switch):
 
     def end(self, world: World) -> None:
         """Switch it on."""
-        self.begin(world)  # both go by all that is switched off at present
+        self.begin(world)  # which applies all active interventions, without this one
 
     def _silence(self, world: World) -> None:
         actor = body(world, self.entity)
@@ -163,7 +163,7 @@ class SwitchOff(Switch):
 
 @register("intervention", "switch_on")
 class SwitchOn(Switch):
-    """Switch a camera or a behavior on that was switched off."""
+    """Switch a camera or a behavior on again."""
 
     duration: None = Field(default=None, description="none: it stays on")
 
@@ -173,17 +173,20 @@ class SwitchOn(Switch):
             lambda act: (
                 isinstance(act, SwitchOff)
                 and (act.entity, act.behavior) == (self.entity, self.behavior)
-                and (self.camera is True or named(act.camera) in (None, named(self.camera)))
+                and (
+                    self.camera is True
+                    or camera_name(act.camera) in (None, camera_name(self.camera))
+                )
             )
         )
 
 
 @register("intervention", "fault")
 class Fault(Lasting):
-    """Let something of a robot fail for a while: wheels that are stuck, a camera that sees worse.
+    """Let a part of a robot fail for a while: stuck wheels, or a camera that sees less.
 
-    With stuck wheels it can neither drive nor turn, and its behaviors aren't asked. A dark camera
-    sees nothing. `detection` and `errs` let it see, but worse.
+    With stuck wheels the robot can neither drive nor turn, and its behaviors don't decide. A dark
+    camera sees nothing; with `detection` and `errs` it perceives with errors.
     """
 
     entity: str = Field(description="the robot")
@@ -195,26 +198,26 @@ class Fault(Lasting):
         default=1.0, description="factor of the probability that a user in view is noticed"
     )
     errs: Perception | None = Field(
-        default=None, description="how its cameras err instead of as before"
+        default=None, description="the errors of its cameras instead of the usual ones"
     )
 
     @model_validator(mode="after")
-    def _is_something(self) -> Self:
+    def _has_effect(self) -> Self:
         if not (self.wheels or self.dark or self.detection < 1 or self.errs):
             raise problem("nothing fails: say 'wheels', 'dark', 'detection' or 'errs'")
         return self
 
     @property
     def disturbance(self) -> Disturbance | None:
-        """What it does to cameras."""
+        """The effect on cameras."""
         if self.dark:
-            return Disturbance(named(self.dark), dark=True)
+            return Disturbance(camera_name(self.dark), dark=True)
         if self.errs or self.detection < 1:
             return Disturbance(detection=self.detection, errs=self.errs)
         return None
 
     def check(self, world: World) -> None:
-        """Refuse a robot or a camera that there isn't."""
+        """Refuse an unknown robot or camera."""
         actor = robot(world, self.entity)
         if self.disturbance is not None:
             check_camera(actor, self.dark or True)
@@ -235,53 +238,51 @@ class Fault(Lasting):
 
     def end(self, world: World) -> None:
         """Repair it."""
-        self.begin(world)  # both go by all that has failed at present
+        self.begin(world)  # which applies all active faults, without this one
 
 
-def named(camera: bool | str | None) -> str | None:
+def camera_name(camera: bool | str | None) -> str | None:
     """Return the name of a camera; None for all."""
     return camera if isinstance(camera, str) else None
 
 
 def check_camera(actor: Actor, camera: bool | str | None) -> None:
-    """Refuse a camera that a robot hasn't.
+    """Refuse an unknown camera of a robot.
 
     Raises:
-        ScenarioError: Says which it has.
+        ScenarioError: The robot doesn't have it; the message lists those that it has.
     """
-    eyes, name = actor.entity.eyes, named(camera)
+    eyes, name = actor.entity.eyes, camera_name(camera)
     if not eyes:
         raise ScenarioError(f"{actor.name} has no camera: give it one")
     if name is not None and name not in eyes:
-        raise ScenarioError(
-            f"{actor.name} has no camera {name!r}{did_you_mean(name, eyes)}"
-            f" It has: {', '.join(eyes)}"
-        )
+        raise ScenarioError(f"{actor.name} has no camera {name!r}{suggest(name, eyes, 'It has')}")
 
 
-def makes_wrong(act: Intervention, robot: str) -> bool:
-    """Tell whether an intervention lets a robot perceive what isn't true."""
-    found = getattr(act, "disturbance", None)
-    wrong = found is not None and (found.errs or found.mistaken or found.injected)
-    return bool(wrong) and getattr(act, "entity", None) == robot
+def causes_errors(act: Intervention, robot: str) -> bool:
+    """Whether an intervention lets a robot perceive something wrong."""
+    disturbance = getattr(act, "disturbance", None)
+    if disturbance is None or getattr(act, "entity", None) != robot:
+        return False
+    return bool(disturbance.errs or disturbance.mistaken or disturbance.injected)
 
 
 def check_truth(world: World, name: str) -> None:
-    """Refuse to let a robot perceive somebody unknown where the run can't keep that.
+    """Refuse to let a robot perceive an unknown person where no table can store that.
 
     Raises:
-        ScenarioError: Says what to do.
+        ScenarioError: The cameras of the robot don't err in this run.
     """
     if not world.keeps_truth(name):
         raise ScenarioError(
-            f"the table of observations has no column for whom {name} doesn't recognize, as its"
-            " cameras don't err: put this into the scenario's script, or let them err, as by"
+            f"the table of observations has no column for people that {name} doesn't recognize, as"
+            " its cameras don't err: put this into the scenario's script, or let them err, as by"
             f" robots.{name}.perception: {{false_positives: {{per_hour: 1e-9}}}}"
         )
 
 
 def disturb(world: World, name: str) -> None:
-    """Disturb the cameras of a robot by all that is under way at present."""
+    """Apply the disturbances of all active interventions to the cameras of a robot."""
     acts = (act for act in world.lasting if getattr(act, "entity", None) == name)
-    found = (getattr(act, "disturbance", None) for act in acts)
-    world.disturb(name, [each for each in found if each is not None])
+    disturbances = (getattr(act, "disturbance", None) for act in acts)
+    world.disturb(name, [each for each in disturbances if each is not None])

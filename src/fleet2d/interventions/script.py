@@ -1,4 +1,4 @@
-"""Scripts: what a scenario lets be done to its run, and when."""
+"""Scripts: the interventions of a scenario, and when they happen."""
 
 from collections.abc import Mapping
 from datetime import timedelta
@@ -14,7 +14,7 @@ from pydantic import (
 from pydantic_core import InitErrorDetails
 
 from fleet2d.component import Settings
-from fleet2d.interventions.intervention import Intervention, Verb, refused
+from fleet2d.interventions.intervention import Intervention, Verb, refusal
 from fleet2d.interventions.when import ClockTime, On, When
 from fleet2d.problems import problem
 from fleet2d.units import Duration
@@ -24,10 +24,10 @@ WHEN = ("at", "on", "each", "delay")
 
 
 class Entry(Settings):
-    """Something that is done at a time, or on an event: ``{at: "19:00", put: ana, to: kitchen}``.
+    """An intervention at a time or on an event: ``{at: "19:00", put: ana, to: kitchen}``.
 
-    An intervention is done at the first step that isn't before its time; on an event, at the step
-    after it, or so much later.
+    It happens at the first step that isn't before its time; or at the step after its event, or
+    later by a delay.
 
     Example:
         >>> entry = Entry(at="19:00", put="ana", to="kitchen")
@@ -42,7 +42,7 @@ class Entry(Settings):
         default=None, description="or the event: [user_seen, astro, ana], or its kind alone"
     )
     each: bool = Field(
-        default=False, description="every time that it is that time or happens, and not only once"
+        default=False, description="at every such time or event, not only at the first"
     )
     delay: Duration = Field(
         default=timedelta(0), description="how long after the event; at least a step"
@@ -51,23 +51,23 @@ class Entry(Settings):
 
     @model_validator(mode="before")
     @classmethod
-    def _part_from_when(cls, data: Any) -> Any:
-        """Put what is done, which is written beside when, below `act`."""
+    def _nest_act(cls, data: Any) -> Any:
+        """Move the keys of the intervention, which are written beside its time, into `act`."""
         if not isinstance(data, dict) or "act" in data:
             return data
-        when = {key: value for key, value in data.items() if key in WHEN}
-        return {**when, "act": {key: value for key, value in data.items() if key not in WHEN}}
+        times = {key: value for key, value in data.items() if key in WHEN}
+        return {**times, "act": {key: value for key, value in data.items() if key not in WHEN}}
 
     @classmethod
     def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:
-        """Name the keys as they are written."""
+        """Return an error that names the keys as they are written."""
         line = super()._explain(line, data)
         if line["loc"][:1] == ("act",):
             line["loc"] = line["loc"][1:]
         return line
 
     @model_validator(mode="after")
-    def _is_at_one_time(self) -> Self:
+    def _has_one_time(self) -> Self:
         if (self.at is None) == (self.on is None):
             raise problem("'at' a time or 'on' an event is wanted, one of them")
         if self.on is None and self.delay:
@@ -80,8 +80,8 @@ class Entry(Settings):
         return self
 
     @model_serializer(mode="wrap")
-    def _beside(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Write what is done beside when."""
+    def _flatten_act(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return the keys of the intervention beside its time."""
         content: dict[str, Any] = handler(self)
         act: dict[str, Any] = content.pop("act", {})
         return {key: value for key, value in content.items() if value is not None} | act
@@ -91,9 +91,9 @@ def parse_entry(content: Mapping[str, Any]) -> Entry:
     """Return the entry of a script that a mapping describes.
 
     Raises:
-        ScenarioError: It describes none; says what is wrong.
+        ScenarioError: It is not valid; the message says what is wrong.
     """
     try:
         return Entry.model_validate(dict(content))
     except ValidationError as error:
-        raise refused("", error) from None
+        raise refusal("", error) from None

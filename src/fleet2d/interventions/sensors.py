@@ -1,4 +1,4 @@
-"""What is done to sensors, and what ends all that lasts: stick, restore."""
+"""Interventions on sensors, and the end of those with a duration: stick, restore."""
 
 from typing import ClassVar
 
@@ -9,30 +9,29 @@ from fleet2d.entities.objects.sensor import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import Intervention, Lasting
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 
 @register("intervention", "stick")
 class Stick(Lasting):
-    """Let a sensor say what it doesn't sense: for a moment a false alarm, for longer a fault."""
+    """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long."""
 
     subject: ClassVar[str] = "sensor"
     sensor: str = Field(description="the sensor")
     says: SensorFault = Field(
         default="silent",
-        description="on: it is excited all the time; off: never; silent: it reports nothing",
+        description="on: it is always excited; off: never; silent: it reports nothing",
     )
 
     def check(self, world: World) -> None:
-        """Refuse a sensor that there isn't."""
+        """Refuse an unknown sensor."""
         if self.sensor not in world.sensors:
             raise ScenarioError(
-                f"there is no sensor {self.sensor!r}{did_you_mean(self.sensor, world.sensors)}"
-                f" There are: {', '.join(world.sensors) or 'none'}"
+                f"there is no sensor {self.sensor!r}{suggest(self.sensor, world.sensors)}"
             )
 
     def begin(self, world: World) -> None:
-        """Let it say what the latest that is under way wants."""
+        """Apply the latest active intervention on the sensor."""
         says = (
             act.says
             for act in reversed(world.lasting)
@@ -41,26 +40,25 @@ class Stick(Lasting):
         world.stick(self.sensor, next(says, None))
 
     def end(self, world: World) -> None:
-        """Let it say what it senses."""
+        """Return to the intervention before, if that is still active, else to its readings."""
         self.begin(world)
 
 
 @register("intervention", "restore")
 class Restore(Intervention):
-    """End all that lasts on a robot's cameras, wheels and behaviors, a sensor, or an algorithm."""
+    """End all active interventions on a robot, a sensor or an algorithm that have a duration."""
 
     subject: ClassVar[str] = "name"
     name: str = Field(description="the robot, sensor or algorithm")
 
     def check(self, world: World) -> None:
-        """Refuse what there isn't."""
-        known = [*world.users, *world.robots, *world.sensors, *world.algorithms]
-        if self.name not in known:
+        """Refuse an unknown name."""
+        names = [*world.users, *world.robots, *world.sensors, *world.algorithms]
+        if self.name not in names:
             raise ScenarioError(
-                f"there is nothing named {self.name!r} to restore{did_you_mean(self.name, known)}"
-                f" There are: {', '.join(known)}"
+                f"there is nothing named {self.name!r} to restore{suggest(self.name, names)}"
             )
 
     def begin(self, world: World) -> None:
-        """End it."""
+        """End them."""
         world.undo(lambda act: isinstance(act, Lasting) and getattr(act, act.subject) == self.name)

@@ -1,4 +1,4 @@
-"""The interventions as methods: what a simulation, and a trial of one, may be told to do."""
+"""The interventions as methods of a simulation, and of a trial of one."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,10 +9,10 @@ from fleet2d.interventions.body_verbs import BodyVerbs, Time
 
 
 class Verbs(BodyVerbs):
-    """What may be done to a run from outside, at the present step.
+    """Interventions on a run, at the present step.
 
-    Each method does what the entry of the same name in a scenario's `script` does. What is done is
-    kept in the manifest, and done again by `fleet2d.reproduce`.
+    Each method has the effect of the entry of the same name in a scenario's `script`. The manifest
+    records it, and `fleet2d.reproduce` repeats it.
     """
 
     # Robots
@@ -33,11 +33,11 @@ class Verbs(BodyVerbs):
             to: Come there: a room, furniture, or a point (x, y) [m]; needs a behavior `come`.
             find: Find that person; needs a behavior `find`.
             dock: Go to the charger; needs a behavior `dock`.
-            command: A word that a behavior of your own answers to.
+            command: A word that a behavior of your own responds to.
 
         Raises:
-            ScenarioError: There is no such robot, or none of its behaviors answers.
-            PlacementError: There is no such place, or it can't get there.
+            ScenarioError: There is no such robot, or none of its behaviors responds.
+            PlacementError: There is no such place, or it can't be reached.
         """
         self._do(robots.Call, entity=name, to=to, find=find, dock=dock, command=command)
 
@@ -57,13 +57,13 @@ class Verbs(BodyVerbs):
         behavior: str | None = None,
         duration: Time | None = None,
     ) -> None:
-        """Switch a camera or a behavior off, for so long, or until it is switched on.
+        """Switch a camera or a behavior off, for a duration or until it is switched on.
 
         Args:
-            name: The robot; of behaviors, a person, too.
+            name: The robot; for a behavior also a person.
             camera: Its camera: True for all, or the name of one.
             behavior: The type of the behavior instead.
-            duration: For how long.
+            duration: For how long; None: until it is switched on.
 
         Raises:
             ScenarioError: There is nothing of that name.
@@ -74,7 +74,7 @@ class Verbs(BodyVerbs):
     def switch_on(
         self, name: str, *, camera: bool | str | None = None, behavior: str | None = None
     ) -> None:
-        """Switch a camera or a behavior on that was switched off; see `switch_off`.
+        """Switch a camera or a behavior on again; see `switch_off`.
 
         Raises:
             ScenarioError: There is nothing of that name.
@@ -91,15 +91,15 @@ class Verbs(BodyVerbs):
         errs: Any = None,
         duration: Time | None = None,
     ) -> None:
-        """Let something of a robot fail, for so long, or until it is restored.
+        """Let a part of a robot fail, for a duration or until it is restored.
 
         Args:
             name: The robot.
             wheels: Whether its wheels are stuck.
-            dark: Whether its cameras see nothing, or the name of one that doesn't.
+            dark: Whether its cameras see nothing, or the name of the one that doesn't.
             detection: Factor of the probability that a user in view is noticed.
-            errs: How its cameras err instead, as `perception` of a robot in a scenario.
-            duration: For how long.
+            errs: The errors of its cameras instead, like `perception` of a robot in a scenario.
+            duration: For how long; None: until it is restored.
 
         Raises:
             ScenarioError: There is no such robot or camera, or nothing fails.
@@ -120,7 +120,7 @@ class Verbs(BodyVerbs):
     def suppress(
         self, name: str, user: str, *, camera: str | None = None, duration: Time | None = None
     ) -> None:
-        """Let a robot not notice a person who is in view, for so long, or until it is restored.
+        """Let a robot miss a person in view, for a duration or until it is restored.
 
         Raises:
             ScenarioError: There is no such robot, camera or person.
@@ -136,7 +136,7 @@ class Verbs(BodyVerbs):
         camera: str | None = None,
         duration: Time | None = None,
     ) -> None:
-        """Let a robot take a person whom it notices for another one, or for "unknown".
+        """Let a robot mistake a person whom it notices for another one, or for "unknown".
 
         Raises:
             ScenarioError: There is no such robot, camera or person.
@@ -154,13 +154,13 @@ class Verbs(BodyVerbs):
         camera: str | None = None,
         duration: Time | None = None,
     ) -> None:
-        """Let a robot perceive somebody who isn't there, in every look, wherever it looks.
+        """Let a robot perceive a person who isn't there, in every look, wherever it looks.
 
         Args:
             name: The robot.
-            user: For whom it takes what isn't there, or "unknown".
-            spot: Where, (x, y) [m].
-            heading_deg: Where it seems to face, counter-clockwise from +x.
+            user: The person that it perceives, or "unknown".
+            spot: The apparent place, (x, y) [m].
+            heading_deg: The apparent heading, counter-clockwise from +x.
             camera: The camera; None: all.
             duration: For how long; None: until it is restored.
 
@@ -174,7 +174,7 @@ class Verbs(BodyVerbs):
     # Algorithms
 
     def reset(self, algorithm: str, learned: Any = None) -> None:
-        """Let an algorithm forget what it has learned, or go on from a file of another run.
+        """Let an algorithm forget what it has learned, or load what another run has learned.
 
         Raises:
             ScenarioError: There is no such algorithm.
@@ -191,18 +191,18 @@ class Verbs(BodyVerbs):
         withheld: bool = False,
         duration: Time | None = None,
     ) -> None:
-        """Let behaviors and other algorithms read something else of an algorithm.
+        """Let behaviors and other algorithms read another output of an algorithm.
 
         Args:
             algorithm: The algorithm.
-            rooms: Weights of rooms; those left out have none.
-            values: Or numbers and texts by name, as of an output that is a mapping.
-            frozen: Or its newest output, as it is now.
-            withheld: Or nothing, as before its first output.
+            rooms: Weights of rooms; 0 for those left out.
+            values: Or numbers and texts by name, for an output that is a mapping.
+            frozen: Or its present output.
+            withheld: Or no output, as before the first one.
             duration: For how long; None: until it is restored.
 
         Raises:
-            ScenarioError: There is no such algorithm or room, or not one of these is given.
+            ScenarioError: There is no such algorithm or room, or not exactly one output is given.
         """
         fields = {"rooms": rooms, "values": values, "frozen": frozen, "withheld": withheld}
         self._do(algorithms.Replace, algorithm=algorithm, duration=duration, **fields)
@@ -212,7 +212,7 @@ class Verbs(BodyVerbs):
     def stick(
         self, sensor: str, says: SensorFault = "silent", *, duration: Time | None = None
     ) -> None:
-        """Let a sensor be "on", "off" or "silent", for so long, or until it is restored.
+        """Let a sensor be "on", "off" or "silent", for a duration or until it is restored.
 
         Raises:
             ScenarioError: There is no such sensor.
@@ -252,7 +252,7 @@ class Verbs(BodyVerbs):
         self._do(home.Unlock, door=door)
 
     def move(self, furniture: str, to: tuple[float, float], turn_deg: float = 0.0) -> None:
-        """Move a piece of furniture: its middle comes to stand at (x, y) [m], turned.
+        """Move a piece of furniture, so that its centre is at (x, y) [m], and turn it.
 
         Raises:
             ScenarioError: There is no such piece, or it can't stand there.
@@ -260,9 +260,9 @@ class Verbs(BodyVerbs):
         self._do(home.Move, object=furniture, to=to, turn_deg=turn_deg)
 
     def room(self, name: str, type: str) -> None:  # noqa: A002
-        """Use a room for something else from now on.
+        """Change the type of a room from now on.
 
         Raises:
-            ScenarioError: There is no such room, or no such type of rooms.
+            ScenarioError: There is no such room, or no such room type.
         """
         self._do(home.Room, name=name, type=type)

@@ -1,4 +1,4 @@
-"""When something of a script is done: at a time, or on an event."""
+"""When an entry of a script happens: at a time, or on an event."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
@@ -22,8 +22,8 @@ class ClockTime(NamedTuple):
 
     Attributes:
         days: The days of the week, 0 is Monday.
-        time: Since midnight.
-        text: As it was written.
+        time: The time since midnight.
+        text: The text in the scenario.
     """
 
     days: tuple[int, ...]
@@ -66,14 +66,14 @@ def parse_when(value: object) -> datetime | timedelta | ClockTime:
     return ClockTime(tuple(sorted(days)), time, f"{name}{format_time_of_day(time)}")
 
 
-def _written(when: datetime | timedelta | ClockTime) -> str:
+def _format_when(when: datetime | timedelta | ClockTime) -> str:
     return when.text if isinstance(when, ClockTime) else format_moment(when)
 
 
 When = Annotated[
     datetime | timedelta | ClockTime,
     BeforeValidator(parse_when),
-    PlainSerializer(_written),
+    PlainSerializer(_format_when),
     WithJsonSchema(
         {
             "description": "a time of day like 19:00, with days of the week before it like 'monday"
@@ -88,14 +88,14 @@ When = Annotated[
 
 
 class Trigger(Settings):
-    """An event at which something is done: ``[user_seen, astro, ana]``, or its kind alone.
+    """An event that triggers an intervention: ``[user_seen, astro, ana]``, or its kind alone.
 
     Example:
         >>> Trigger(event="user_seen", entity="astro").fits(Event(5, "astro", "user_seen", "ana"))
         True
     """
 
-    event: str = Field(min_length=1, description="its kind, as the table of events has it")
+    event: str = Field(min_length=1, description="its kind, as in the table of events")
     entity: str | None = Field(
         default=None, description="the body, door or sensor that it happens to; left out: any"
     )
@@ -104,7 +104,7 @@ class Trigger(Settings):
     )
 
     def fits(self, event: Event) -> bool:
-        """Tell whether an event is meant."""
+        """Whether an event triggers the intervention."""
         return (
             event.event == self.event
             and self.entity in (None, event.entity)
@@ -112,7 +112,7 @@ class Trigger(Settings):
         )
 
 
-def _spelled_out(value: Any) -> Any:
+def _as_mapping(value: Any) -> Any:
     if isinstance(value, str):
         return {"event": value}
     if isinstance(value, Sequence) and 1 <= len(value) <= 3:
@@ -127,7 +127,7 @@ def _spelled_out(value: Any) -> Any:
 
 On = Annotated[
     Trigger,
-    BeforeValidator(_spelled_out),
+    BeforeValidator(_as_mapping),
     PlainSerializer(lambda trigger: trigger.model_dump(exclude_none=True)),
     WithJsonSchema(
         {
@@ -148,4 +148,4 @@ On = Annotated[
         }
     ),
 ]
-"""An event, as a script has it: its kind alone, a list, or a mapping."""
+"""An event in a script: its kind alone, a list, or a mapping."""

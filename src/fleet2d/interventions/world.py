@@ -1,4 +1,4 @@
-"""What interventions act upon: the part of a run that they may see and touch."""
+"""The interface of a run that interventions read and change."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from fleet2d.sight.disturbance import Disturbance
 
 
 class World(Protocol):
-    """A run at the step at which something is done to it."""
+    """A run at the step of an intervention."""
 
     @property
     def step(self) -> int:
@@ -51,41 +51,41 @@ class World(Protocol):
 
     @property
     def lasting(self) -> Sequence[object]:
-        """What was begun and isn't over, in order."""
+        """The active interventions with a duration, in the order of their begin."""
 
-    def undo(self, is_meant: Callable[[object], bool]) -> None:
-        """End what is under way and meant."""
+    def undo(self, applies: Callable[[object], bool]) -> None:
+        """End the active interventions to which a condition applies."""
 
     def keeps_truth(self, robot: str) -> bool:
-        """Tell whether the run keeps what is true beside what a robot perceives."""
+        """Whether the run stores the truth beside what a robot perceives."""
 
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
-        """Disturb the cameras of a robot by these alone from the present step on."""
+        """Set all disturbances of the cameras of a robot from the present step on."""
 
     def stick(self, sensor: str, says: SensorFault | None) -> None:
-        """Let a sensor say what it doesn't sense from the present step on; None: as it senses."""
+        """Set the fault of a sensor from the present step on; None: it works."""
 
     def reset(self, algorithm: str, learned: Path | None) -> None:
-        """Let an algorithm begin anew with nothing learned, or with what a file holds."""
+        """Restart an algorithm with nothing learned, or with what a file holds."""
 
     def replace(self, algorithm: str, output: object) -> None:
-        """Let all but metrics read something else of an algorithm; see `Learners.replace`."""
+        """Let all but metrics read another output of an algorithm; see `Learners.replace`."""
 
     def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
-        """Put a body elsewhere, in a part of its space; it decides anew there."""
+        """Put a body at a pose in a part of its space, where it decides anew."""
 
     def drive(self, actor: DecidingActor) -> None:
-        """Take the decisions of a body out of the hands of its behaviors."""
+        """Let a body follow only plans from outside from now on, not its behaviors."""
 
     def check_change(self, change: HomeChange) -> None:
-        """Refuse a change of the home that can't be.
+        """Refuse an impossible change of the home.
 
         Raises:
-            ScenarioError: There is nothing of that name to change.
+            ScenarioError: It names something unknown.
         """
 
     def change(self, change: HomeChange) -> None:
         """Change the home at the present step."""
 
     def emit(self, entity: str, event: EventKind, detail: str) -> None:
-        """Record that something happened at the present step."""
+        """Record an event at the present step."""
