@@ -38,9 +38,9 @@ import fleet2d
 import fleet2d.routines.survey as survey
 from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
 from fleet2d.fit.visits import Visits, count_visits, spread, stays
-from fleet2d.routines.interruptions import uninterrupted
+from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
-from fleet2d.routines.persona import bundled, bundled_persona
+from fleet2d.routines.persona import bundled_names, bundled_persona
 from fleet2d.streams import Draws, stream_key
 
 LOGS = {
@@ -265,7 +265,7 @@ def rooms_over_time(days: int, seeds: int) -> list[tuple[int, float, float]]:
 def show_visits(data: Path, days: int, seed: int) -> bool:
     """Print the table of visits; return whether every persona is within the real homes' spread."""
     homes = {name: trace_of_log(data / path) for name, path in LOGS.items()}
-    lives = {name: trace_of_persona(name, days, seed) for name in bundled()}
+    lives = {name: trace_of_persona(name, days, seed) for name in bundled_names()}
     print(f"personas: {days} days from Monday, 2026-01-05, seed {seed}, bundled home, furnished")
     print("per day: mean [lowest to highest day]")
     print(f"{'':18}" + "".join(f"{name.replace('_', ' '):>20}" for name in Visits._fields))
@@ -279,7 +279,7 @@ def show_visits(data: Path, days: int, seed: int) -> bool:
     show_dwell(homes | lives)
     show_hours(days, seed)
     good = True
-    for name in bundled():
+    for name in bundled_names():
         for field, a, b, values in zip(Visits._fields, low, high, counted[name], strict=True):
             if not a <= statistics.mean(values) <= b:
                 print(f"{name}: {field} {statistics.mean(values):.1f} is outside {a} to {b}")
@@ -310,7 +310,7 @@ def show_hours(days: int, seed: int) -> None:
         for ordinal in range(MONDAY, MONDAY + days):
             if date.fromordinal(ordinal).weekday() > 4:
                 continue
-            for doing in uninterrupted(life.day(ordinal)):
+            for doing in without_interruptions(life.day(ordinal)):
                 first = -(-(doing.begin - 1800) // 3600)
                 for hour in range(first, (doing.end - 1 - 1800) // 3600 + 1):
                     counts[hour % 24][CATEGORY_OF.get(doing.activity, "other")] += 1
@@ -337,7 +337,7 @@ def draw_rooms(found: list[tuple[int, float, float]], path: Path) -> None:
 
 def time_planning() -> None:
     """Print how long the planning of a day takes."""
-    for name in bundled():
+    for name in bundled_names():
         life = Life(bundled_persona(name), 4, "users.ana")
         life.day(MONDAY - 1)
         began = time.process_time()
@@ -350,7 +350,7 @@ def time_month(repeats: int = 5) -> None:
     """Print how long the base month takes with a schedule, and with routines."""
     best: dict[str, float] = {}
     for turn in range(repeats + 1):
-        for who in ("schedule", *bundled()):
+        for who in ("schedule", *bundled_names()):
             content = fleet2d.load_scenario("bundled:rounds").resolved()
             if who != "schedule":
                 content["users"] = {"ana": {"type": "routine", "persona": who}}
@@ -367,7 +367,7 @@ def time_month(repeats: int = 5) -> None:
 
 def time_crowd(users: int, days: int) -> None:
     """Print how long so many people take, and how much memory."""
-    personas = bundled()
+    personas = bundled_names()
     content = {
         "simulation": {"start": "2026-01-05", "duration": f"{days} d", "seed": 4},
         "floorplan": {"type": "bundled", "furnish": True},

@@ -8,7 +8,7 @@ import pytest
 
 from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
 from fleet2d.fit.visits import Visits, count_visits, spread, stays
-from fleet2d.routines.persona import bundled
+from fleet2d.routines.persona import bundled_names
 
 KINDS = ("away", "bathroom", "hallway", "kitchen", "living_room")
 HOUR = 3600
@@ -50,7 +50,7 @@ def real_homes(shared_data: Path) -> list[Visits]:
     return [count_visits(*trace_of_log(shared_data / "activity" / log)) for log in logs]
 
 
-@pytest.mark.parametrize("name", bundled())
+@pytest.mark.parametrize("name", bundled_names())
 def test_a_persona_moves_about_as_people_of_real_homes_do(
     name: str, real_homes: list[Visits]
 ) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import date
 from itertools import pairwise
 
-from fleet2d.routines.interruptions import uninterrupted
+from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.persona import DayTemplate, Persona
 from fleet2d.routines.planner import Doing
 from fleet2d.routines.templates import REACH
@@ -17,7 +17,7 @@ def violations(
     persona: Persona, ordinal: int, day: Sequence[Doing], next_day: Sequence[Doing]
 ) -> list[str]:
     """Say in words what a day breaks, needs and errands left out."""
-    day = uninterrupted(day)
+    day = without_interruptions(day)
     template = persona.days[persona.day(date.fromordinal(ordinal))]
     found = [f"gap or overlap before {b}" for a, b in pairwise(day) if a.end != b.begin]
     found += [f"{doing} takes no time" for doing in day if doing.end <= doing.begin]

@@ -10,7 +10,7 @@ from tests.routines.days import DAY_S, MONDAY, violations
 
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.household import LONG_GONE_S, WELCOME, Household, Lives
-from fleet2d.routines.interruptions import uninterrupted
+from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.planner import Doing
 
 CROWD = {
@@ -70,7 +70,7 @@ def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
     times = []
     for i in range(100):
         day = home.day(MONDAY + i)
-        planned = [doing for name in day for doing in uninterrupted(day[name])]
+        planned = [doing for name in day for doing in without_interruptions(day[name])]
         found = {(d.begin, d.end) for d in planned if d.task == "dinner"}
         assert len(found) == 1
         times += found

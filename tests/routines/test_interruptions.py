@@ -8,9 +8,9 @@ import pytest
 from pydantic import ValidationError
 from tests.routines.days import DAY_S, MONDAY
 
-from fleet2d.routines.interruptions import MOST, uninterrupted
+from fleet2d.routines.interruptions import MOST, without_interruptions
 from fleet2d.routines.life import Life
-from fleet2d.routines.persona import Persona, bundled, bundled_persona
+from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
 from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Doing
 
 HOUR = 3600
@@ -29,22 +29,22 @@ def days(lived: Life, count: int = 100) -> list[list[Doing]]:
     return [list(lived.day(MONDAY + i)) for i in range(count)]
 
 
-@pytest.mark.parametrize("name", bundled())
+@pytest.mark.parametrize("name", bundled_names())
 def test_a_day_without_its_interruptions_is_the_planned_day(name: str) -> None:
     lived = life(bundled_persona(name))
     for ordinal in range(MONDAY, MONDAY + 400):
-        plan = lived.planned(ordinal, lived.template(ordinal))
-        assert plan == uninterrupted(lived.day(ordinal))
+        plan = lived.draw_uninterrupted(ordinal, lived.template(ordinal))
+        assert plan == without_interruptions(lived.day(ordinal))
 
 
-@pytest.mark.parametrize("name", bundled())
+@pytest.mark.parametrize("name", bundled_names())
 def test_an_interrupted_day_has_no_gap_and_nothing_that_takes_no_time(name: str) -> None:
     for day in days(life(bundled_persona(name))):
         assert all(a.end == b.begin for a, b in pairwise(day))
         assert all(doing.begin < doing.end for doing in day)
 
 
-@pytest.mark.parametrize("name", bundled())
+@pytest.mark.parametrize("name", bundled_names())
 def test_every_persona_uses_the_toilet_as_often_as_people_do(name: str) -> None:
     lived = days(life(bundled_persona(name)), 140)
     visits = [sum(doing.activity == "toilet" for doing in day) for day in lived]
@@ -54,7 +54,7 @@ def test_every_persona_uses_the_toilet_as_often_as_people_do(name: str) -> None:
 
 def test_without_needs_and_errands_a_day_is_its_plan() -> None:
     lived = of()
-    assert all(day == uninterrupted(day) for day in days(lived, 20))
+    assert all(day == without_interruptions(day) for day in days(lived, 20))
     assert {0} == {doing.role for day in days(lived, 20) for doing in day}
 
 

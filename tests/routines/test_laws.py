@@ -12,6 +12,7 @@ from fleet2d.routines.laws import (
     KNOTS,
     NORMAL,
     Law,
+    draw_weighted,
     empirical,
     exp,
     exponential,
@@ -20,7 +21,6 @@ from fleet2d.routines.laws import (
     lognormal,
     normal,
     uniform,
-    weighted,
 )
 from fleet2d.streams import Draws, stream_key
 
@@ -102,8 +102,8 @@ def test_between_equal_bounds_there_is_one_value() -> None:
 
 def test_weights_are_shares() -> None:
     draws = Draws(KEY, 2)
-    found = [weighted(draws, [1, 0, 3]) for _ in range(4000)]
+    found = [draw_weighted(draws, [1, 0, 3]) for _ in range(4000)]
     assert 0 == found.count(1)
     assert 0.25 == pytest.approx(found.count(0) / 4000, abs=0.03)
     with pytest.raises(ValueError, match="bound"):
-        weighted(draws, [0, 0])
+        draw_weighted(draws, [0, 0])

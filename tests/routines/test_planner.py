@@ -12,9 +12,9 @@ from pydantic import ValidationError
 from tests.routines.days import DAY_S, MONDAY, violations
 from tests.thorough import examples
 
-from fleet2d.routines.interruptions import uninterrupted
+from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
-from fleet2d.routines.persona import Persona, bundled, bundled_persona
+from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
 from fleet2d.routines.planner import Doing
 
 HOUR = 3600
@@ -33,7 +33,7 @@ def tasks(day: list[Doing]) -> list[str]:
     return [doing.task for doing in day if doing.task]
 
 
-@pytest.mark.parametrize("name", bundled())
+@pytest.mark.parametrize("name", bundled_names())
 def test_no_day_of_ten_thousand_breaks_a_constraint(name: str) -> None:
     persona = bundled_persona(name)
     for seed in range(5):
@@ -46,7 +46,9 @@ def test_no_day_of_ten_thousand_breaks_a_constraint(name: str) -> None:
 def test_wake_meal_and_bed_times_spread_as_stated() -> None:
     persona = bundled_persona("works_outside")
     lived = life(persona)
-    days = [uninterrupted(lived.day(MONDAY + 7 * w + i)) for w in range(300) for i in range(5)]
+    days = [
+        without_interruptions(lived.day(MONDAY + 7 * w + i)) for w in range(300) for i in range(5)
+    ]
     template = persona.days["weekdays"]
     wakes = [day[0].begin for day in days]
     cooking = [d.begin for day in days for d in day if d.task == "cook"]
@@ -85,7 +87,7 @@ def test_durations_are_not_geometric_but_as_their_law_says() -> None:
         {"cook": {"between": ["10:00", "12:00"], "takes": {"mean": "1 h", "std": "10 min"}}}
     )
     lived = life(persona)
-    days = [uninterrupted(lived.day(MONDAY + i)) for i in range(2000)]
+    days = [without_interruptions(lived.day(MONDAY + i)) for i in range(2000)]
     lasted = [d.end - d.begin for day in days for d in day if d.task]
     assert HOUR == pytest.approx(statistics.mean(lasted), rel=0.02)
     assert HOUR / 6 == pytest.approx(statistics.pstdev(lasted), rel=0.1)  # a geometric law: 1 h
@@ -108,7 +110,7 @@ def test_what_follows_comes_at_once_and_only_after_what_it_follows() -> None:
     )
     lived = life(persona)
     for i in range(200):
-        names = tasks(uninterrupted(lived.day(MONDAY + i)))
+        names = tasks(without_interruptions(lived.day(MONDAY + i)))
         assert ("dinner" in names) == ("dishes" in names)
         if "dinner" in names:
             assert names.index("dishes") == names.index("dinner") + 1
@@ -122,7 +124,7 @@ def test_an_appointment_is_kept_to_the_second_however_full_the_day() -> None:
     persona = of({**crowd, "doctor": {"activity": "errand", "at": "11:20", "fixed": True}})
     lived = life(persona)
     for i in range(300):
-        day = uninterrupted(lived.day(MONDAY + i))
+        day = without_interruptions(lived.day(MONDAY + i))
         assert [11 * HOUR + 20 * 60] == [d.begin for d in day if d.task == "doctor"]
         assert [] == violations(persona, MONDAY + i, day, lived.day(MONDAY + i + 1))
 
@@ -169,7 +171,7 @@ def test_waiting_is_filled_with_what_the_hour_allows() -> None:
     )
     lived = life(persona)
     for i in range(50):
-        for doing in uninterrupted(lived.day(MONDAY + i)):
+        for doing in without_interruptions(lived.day(MONDAY + i)):
             if doing.activity == "tv":
                 assert 18 * HOUR <= doing.begin % DAY_S <= 21 * HOUR
 
@@ -263,7 +265,7 @@ def test_any_template_is_either_refused_or_kept(do: dict[str, Any], seed: int) -
 
 def test_sleep_over_midnight_belongs_to_the_day_before() -> None:
     lived = life(bundled_persona("student"))
-    late = [uninterrupted(lived.day(MONDAY + i))[-1] for i in range(60)]
+    late = [without_interruptions(lived.day(MONDAY + i))[-1] for i in range(60)]
     assert any(doing.begin > DAY_S for doing in late)
     assert all(doing.end > DAY_S for doing in late)
     assert all(timedelta(seconds=doing.end - doing.begin) >= timedelta(hours=4) for doing in late)

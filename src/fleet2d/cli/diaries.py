@@ -20,16 +20,18 @@ def show_diary(what: str | None, out: Path | None, days: int, seed: int) -> list
     """
     from pydantic import TypeAdapter, ValidationError
 
-    from fleet2d.routines.persona import AnyPersona, bundled
+    from fleet2d.routines.persona import AnyPersona, bundled_names
     from fleet2d.view.diary import diary_days, draw_diary, written_diary
 
     if what is None:
-        raise InputError(f"--diary wants a persona: one of {', '.join(bundled())}, or a YAML file")
-    path = Path(what)
-    if what not in bundled() and not path.is_file():
         raise InputError(
-            f"there is no persona {what!r}{did_you_mean(what, bundled())} There are:"
-            f" {', '.join(bundled())}; your own is the path of a YAML file"
+            f"--diary wants a persona: one of {', '.join(bundled_names())}, or a YAML file"
+        )
+    path = Path(what)
+    if what not in bundled_names() and not path.is_file():
+        raise InputError(
+            f"there is no persona {what!r}{did_you_mean(what, bundled_names())} There are:"
+            f" {', '.join(bundled_names())}; your own is the path of a YAML file"
         )
     try:
         persona = TypeAdapter(AnyPersona).validate_python(what)

@@ -1,1 +1,1 @@
-"""How people spend their days: activities, personas, the planner, households, the survey."""
+"""Routines of people: activities, personas, the planner of days, households, the survey."""

@@ -1,4 +1,4 @@
-"""Activities: where people do what, for how long, and how still they keep at it."""
+"""Activities: what people do, where, for how long, and how much they move meanwhile."""
 
 from datetime import timedelta
 from functools import cache
@@ -11,12 +11,12 @@ from fleet2d.component import Settings
 from fleet2d.document import read_document
 from fleet2d.problems import did_you_mean, problem
 from fleet2d.routines import laws
-from fleet2d.routines.written import OrWritten
+from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.units import Duration, PositiveDuration, format_duration
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 SECOND = timedelta(seconds=1)
-# Of a duration of which only the mean is given: how wide it spreads about it.
+# Standard deviation of a duration of which only the mean is given, relative to the mean.
 USUAL_SPREAD = 0.3
 
 
@@ -25,11 +25,10 @@ def seconds(duration: timedelta) -> int:
     return duration // SECOND
 
 
-class Takes(Settings):
-    """How long something takes: a law of durations.
+class DurationLaw(Settings):
+    """A law of durations: how long something takes.
 
-    Short forms: ``30 min`` is a lognormal law of that mean, ``[20 min, 40 min]`` is anything
-    between, as likely as any other.
+    Short forms: ``30 min`` is a lognormal law of that mean, ``[20 min, 40 min]`` a uniform law.
     """
 
     law: Literal["lognormal", "gamma", "normal", "uniform", "exponential", "fixed", "measured"] = (
@@ -73,7 +72,7 @@ class Takes(Settings):
                 f" {format_duration(self.at_most)}"
             )
         if (self.at_most or self.mean) < SECOND:
-            raise problem("what is done takes a second or more")
+            raise problem("the longest duration is below one second: make it longer")
         return self
 
     def table(self) -> laws.Law:
@@ -94,50 +93,51 @@ class Takes(Settings):
         return make(mean, std).within(low, high)
 
 
-AnyTakes = Annotated[Takes, OrWritten("text", "number", "pair")]
+AnyDurationLaw = Annotated[DurationLaw, SchemaForms("text", "number", "pair")]
 """A law of durations, in any form."""
 
 
 class Activity(Settings):
-    """Something that people do: where, how, how long, and how still they keep."""
+    """Something that people do: where, how, how long, and how much they move meanwhile."""
 
     rooms: tuple[str, ...] = Field(
         default=("any",), description="rooms or kinds of rooms to try, in turn"
     )
     objects: tuple[str, ...] = Field(
-        default=(), description="kinds of furniture that it uses, to try in turn; else a spot"
+        default=(), description="kinds of furniture to use, tried in turn; none: a spot in the room"
     )
     posture: Literal["stand", "sit", "lie"] = Field(
-        default="stand", description="how one does it where there is no such furniture"
+        default="stand", description="posture if there is no such furniture"
     )
     away: bool = Field(default=False, description="out of the home")
     exclusive: bool = Field(
-        default=False, description="one member of a household at a time, as a bathroom is used"
+        default=False, description="one member of a household at a time, as in a bathroom"
     )
     choose: Literal["own", "nearest", "each_time", "here"] = Field(
         default="own",
-        description="which room, where several fit: own: one of the first kind that there is, for"
-        " good; nearest: of all kinds listed, the nearest; each_time: of all kinds listed, another"
-        " each time; here: the room that one is in",
+        description="which of several rooms: own: one of the first kind that exists, always the"
+        " same; nearest: the nearest of all listed kinds; each_time: one of all listed kinds, drawn"
+        " each time; here: the room that the person is in",
     )
     interruptible: bool = Field(
-        default=True, description="whether needs interrupt it; else they wait until it is over"
+        default=True, description="whether needs interrupt it; else they wait for its end"
     )
-    takes: AnyTakes = Field(default=Takes(), description="how long it takes")
+    takes: AnyDurationLaw = Field(default=DurationLaw(), description="how long it takes")
     shifts: PositiveDuration | None = Field(
-        default=None, description="mean time between turns on the spot; left out: never"
+        default=None, description="mean time between turns on the spot; left out: no turns"
     )
     moves: PositiveDuration | None = Field(
         default=None, description="mean time between walks to another spot of the room"
     )
     fetches: PositiveDuration | None = Field(
-        default=None, description="mean time between short ways elsewhere and back"
+        default=None, description="mean time between short trips to another room and back"
     )
     fetches_from: tuple[str, ...] = Field(
-        default=("kitchen", "any"), description="rooms to try for that, in turn"
+        default=("kitchen", "any"), description="rooms to try for such trips, in turn"
     )
-    fetch_takes: AnyTakes = Field(
-        default=Takes(mean=timedelta(minutes=2)), description="how long one stays there"
+    fetch_takes: AnyDurationLaw = Field(
+        default=DurationLaw(mean=timedelta(minutes=2)),
+        description="how long such a trip stays there",
     )
 
 
@@ -148,12 +148,12 @@ def catalogue() -> dict[str, Activity]:
     >>> catalogue()["cook"].rooms, catalogue()["work"].away
     (('kitchen', 'any'), True)
     """
-    data = read_document(HERE / "activities.yaml").data
+    data = read_document(FOLDER / "activities.yaml").data
     return {name: Activity.model_validate(fields) for name, fields in data.items()}
 
 
 def find_activity(name: str, own: dict[str, Activity]) -> Activity:
-    """Return an activity by its name, own ones first.
+    """Return an activity by its name, `own` ones before those of the catalogue.
 
     Raises:
         PydanticCustomError: There is none of that name.

@@ -1,9 +1,9 @@
-"""Households: people whose days have something to do with each other.
+"""Households: people whose days depend on each other.
 
-Every member works out the days of all, from the same streams: they agree without a word, and
-nothing depends on the order in which they are asked. In the order of the members, a day is drawn
-for each, with what they do together as appointments, and round the times at which others use what
-only one can use at a time: those before them, and all whose day before isn't over yet.
+Every member computes the days of all members, from the same random streams: they agree, and nothing
+depends on the order in which they are asked. Days are drawn in the order of the members, with joint
+activities as appointments. A member keeps out of private rooms while they are used by earlier
+members, and by all members whose previous day isn't over yet.
 """
 
 from bisect import insort
@@ -20,11 +20,11 @@ from fleet2d.document import read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import Location, did_you_mean, problem, problem_at, shown
-from fleet2d.routines.activity import AnyTakes, find_activity
-from fleet2d.routines.busy import ANY_ROOM, Busy
+from fleet2d.routines.activity import AnyDurationLaw, find_activity
 from fleet2d.routines.laws import uniform
 from fleet2d.routines.life import Life
-from fleet2d.routines.periods import AnyPeriod, without
+from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
+from fleet2d.routines.periods import AnyPeriod, with_absences
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, holds_on
 from fleet2d.routines.planner import (
     DAY_S,
@@ -39,34 +39,36 @@ from fleet2d.routines.planner import (
     Doing,
     Job,
 )
+from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.routines.templates import starts
-from fleet2d.routines.written import OrWritten
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import Share
 from fleet2d.weekdays import OnDays, weekdays_of
 
 MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
-# So many days are remembered.
-REMEMBERED = 8
-# Somebody is welcomed after so long a time.
+# The number of days that are kept after they were drawn.
+CACHED_DAYS = 8
+# The least absence after which a member is welcomed [s].
 LONG_GONE_S = 1800
 WELCOME = "welcome"
 WELCOME_S = 90
 
 
-class Together(Timing):
+class JointActivity(Timing):
     """Something that members of a household do together.
 
-    It takes the place of a member's own task of that name. Whose day has no room for it (at work,
-    asleep) isn't there.
+    It replaces a member's own task of that name. Members whose day has no room for it (at work,
+    asleep) don't take part.
     """
 
-    activity: str = Field(default="", description="what; left out: as it is called")
+    activity: str = Field(default="", description="the activity; left out: its own name")
     who: tuple[str, ...] = Field(default=(), description="which members; left out: all")
     on: OnDays | None = Field(default=None, description="its days of the week")
     dates: Dates = Field(default=(), description="further dates, and [first, last] ranges")
-    takes: AnyTakes | None = Field(default=None, description="how long; left out: as the activity")
-    probability: Share = Field(default=1.0, description="on how many of those days it is done")
+    takes: AnyDurationLaw | None = Field(
+        default=None, description="how long; left out: as the activity"
+    )
+    probability: Share = Field(default=1.0, description="its probability on each of those days")
 
     @model_validator(mode="after")
     def _has_a_time(self) -> Self:
@@ -78,16 +80,16 @@ class Together(Timing):
 
 
 class Household(Settings):
-    """Who lives together, and what they share."""
+    """The members of a household, and what they do together."""
 
-    name: str = Field(default="home", min_length=1, description="names its random streams")
+    name: str = Field(default="home", min_length=1, description="the name of its random streams")
     members: dict[str, AnyPersona] = Field(
         min_length=1, description="the persona of each member, by the user's name"
     )
     couples: tuple[tuple[str, str], ...] = Field(
         default=(), description="members who sleep in the same room and bed"
     )
-    together: dict[str, Annotated[Together, OrWritten("text")]] = Field(
+    together: dict[str, Annotated[JointActivity, SchemaForms("text")]] = Field(
         default_factory=dict, description="what several of them do together, by name"
     )
     away: tuple[AnyPeriod, ...] = Field(default=(), description="when nobody is at home")
@@ -95,11 +97,11 @@ class Household(Settings):
         default_factory=dict, description="when some members are away, by name"
     )
     visits: dict[str, tuple[AnyPeriod, ...]] = Field(
-        default_factory=dict, description="members who are there in these periods only, by name"
+        default_factory=dict, description="members who are at home in these periods only, by name"
     )
     welcome: Share = Field(
         default=0.0,
-        description="how likely those at leisure come to the door when somebody comes home",
+        description="probability that members at leisure come to the door when one comes home",
     )
 
     @model_validator(mode="after")
@@ -121,7 +123,7 @@ class Household(Settings):
         return self
 
     def bedrooms(self) -> dict[str, int]:
-        """Return which bedroom each member has, counted from 0: couples share one."""
+        """Return the number of each member's bedroom, from 0; couples share one."""
         groups: dict[str, int] = {}
         for member in self.members:
             partners = [n for pair in self.couples if member in pair for n in pair if n in groups]
@@ -129,7 +131,7 @@ class Household(Settings):
         return groups
 
     def side_of_bed(self, member: str) -> tuple[int, int]:
-        """Return which of how many sleepers of its bed a member is."""
+        """Return the rank of a member among those who sleep in its bed, and their number."""
         pair = next((pair for pair in self.couples if member in pair), (member,))
         return pair.index(member), len(pair)
 
@@ -149,14 +151,15 @@ def read_household(value: object) -> Any:
         raise problem(str(error)) from None
 
 
-AnyHousehold = Annotated[Household, BeforeValidator(read_household), OrWritten("text")]
+AnyHousehold = Annotated[Household, BeforeValidator(read_household), SchemaForms("text")]
 """A household in a scenario: a mapping or a YAML file; dumped whole."""
 
 
 class Lives:
     """The days of all members of a household, from the day before a run begins.
 
-    A day depends on the one before: who is up all night is in the bathroom when others get up.
+    A day depends on the one before: a member who is up all night may use the bathroom when others
+    get up.
     """
 
     def __init__(
@@ -165,11 +168,11 @@ class Lives:
         """Prepare to draw days.
 
         Args:
-            household: Whose.
-            seed: Of the run.
+            household: The household.
+            seed: The seed of the run.
             first: The ordinal of the first day.
-            rooms: Where each member does what wants a room to itself: rooms by index, by activity,
-                by member; None: one unknown room for all.
+            rooms: The rooms of each member's exclusive activities: indices by activity, by member;
+                None: one unknown room for all.
         """
         self.household = household
         self._seed = seed
@@ -179,42 +182,43 @@ class Lives:
             for name, persona in household.members.items()
         }
         self._rooms = {
-            name: self._in_order_of_preference(name, (rooms or {}).get(name, {}))
+            name: self._by_preference(name, (rooms or {}).get(name, {}))
             for name in household.members
         }
-        self._known: dict[int, Mapping[str, Sequence[Doing]]] = {}
+        self._cache: dict[int, Mapping[str, Sequence[Doing]]] = {}
         self._first = self._next = first
 
     def day(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
-        """Return what each member does on the day of a date's ordinal.
+        """Return the doings of each member on the day of a date's ordinal.
 
         Raises:
             ValueError: It is before the first day.
         """
         if ordinal < self._first:
             raise ValueError(f"the days of a household are known from {self._first} on")
-        if ordinal < self._next and ordinal not in self._known:  # forgotten: begin again
-            self._known.clear()
+        if ordinal < self._next and ordinal not in self._cache:  # draw all days again
+            self._cache.clear()
             self._next = self._first
         while self._next <= ordinal:
-            self._known.pop(self._next - REMEMBERED, None)
-            self._known[self._next] = self._draw(self._next)
+            self._cache.pop(self._next - CACHED_DAYS, None)
+            self._cache[self._next] = self._draw(self._next)
             self._next += 1
-        return self._known[ordinal]
+        return self._cache[ordinal]
 
-    def _in_order_of_preference(
+    def _by_preference(
         self, name: str, rooms: Mapping[str, Sequence[int]]
     ) -> dict[str, Sequence[int]]:
-        """Return a member's rooms, its own one first."""
-        own = Draws(stream_key(self._seed, f"{self._path}.{name}", "own room"), 0).below(1 << 20)
+        """Return a member's rooms by activity, each list rotated by a number drawn once."""
+        draws = Draws(stream_key(self._seed, f"{self._path}.{name}", "own room"), 0)
+        shift = draws.below(1 << 20)
         return {
-            activity: [*some[own % len(some) :], *some[: own % len(some)]]
-            for activity, some in rooms.items()
-            if some
+            activity: [*indices[shift % len(indices) :], *indices[: shift % len(indices)]]
+            for activity, indices in rooms.items()
+            if indices
         }
 
     def in_use(self, ordinal: int, member: str, room: int) -> list[tuple[int, int]]:
-        """Return when others use a room that only one uses at a time, on a date [s]."""
+        """Return when others use a private room [s since the midnight of a date]."""
         return [
             (doing.begin + shift, doing.end + shift)
             for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
@@ -232,80 +236,80 @@ class Lives:
         return find_activity(doing.activity, self.household.members[name].activities).away
 
     def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
-        joint = self._together(ordinal)
-        before = self._known.get(ordinal - 1, {})
-        busy: dict[int, list[tuple[int, int]]] = {}
-        for name, doings in before.items():
-            self._note_use(busy, name, doings, -DAY_S)
+        """Draw the days of all members for a date."""
+        joint_jobs = self._joint_jobs(ordinal)
+        yesterday = self._cache.get(ordinal - 1, {})
+        times: dict[int, list[tuple[int, int]]] = {}
+        for name, doings in yesterday.items():
+            self._add_use(times, name, doings, -DAY_S)
         days: dict[str, Sequence[Doing]] = {}
         for name, life in self._lives.items():
             plan = life.template(ordinal)
-            for job, who in joint:
-                if not who or name in who:
-                    plan = _with(plan, job)
-            day = life.draw_day(ordinal, plan, Busy(self._rooms[name], busy))
-            days[name] = self._there(name, day, ordinal)
-            self._note_use(busy, name, days[name])
-        return self._welcomed(ordinal, days) if self.household.welcome else days
+            for job, members in joint_jobs:
+                if not members or name in members:
+                    plan = _with_job(plan, job)
+            day = life.draw_day(ordinal, plan, Occupancy(self._rooms[name], times))
+            days[name] = self._with_absences(name, day, ordinal)
+            self._add_use(times, name, days[name])
+        return self._with_welcomes(ordinal, days) if self.household.welcome else days
 
-    def _note_use(
+    def _add_use(
         self,
-        busy: dict[int, list[tuple[int, int]]],
+        times: dict[int, list[tuple[int, int]]],
         name: str,
         doings: Sequence[Doing],
         shift: int = 0,
     ) -> None:
-        """Add when a member uses rooms that only one uses at a time."""
+        """Add the times at which a member uses private rooms, by room, shifted by some seconds."""
         for doing in doings:
             if doing.end + shift > 0 and self._is_exclusive(name, doing):
-                times = busy.setdefault(doing.room, [])
-                insort(times, (doing.begin + shift, doing.end + shift))
+                insort(times.setdefault(doing.room, []), (doing.begin + shift, doing.end + shift))
 
-    def _there(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
-        """Return a member's day, out of the home when it is on a trip or not on a visit."""
+    def _with_absences(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+        """Return a member's day, away from home on trips and, for visitors, between visits."""
         household = self.household
         away = (*household.away, *household.trips.get(name, ()))
         visits = household.visits.get(name, ())
         if not away and not visits:
             return day
-        return without(day, datetime.fromordinal(ordinal), away, visits)
+        return with_absences(day, datetime.fromordinal(ordinal), away, visits)
 
-    def _welcomed(
+    def _with_welcomes(
         self, ordinal: int, days: Mapping[str, Sequence[Doing]]
     ) -> Mapping[str, Sequence[Doing]]:
-        """Let those who are at leisure come to the door when somebody comes home."""
+        """Return days in which members at leisure come to the door when one comes home."""
         key = stream_key(self._seed, self._path, "welcome")
         draws = Draws(key, ordinal)
         result = dict(days)
-        for comer, doings in days.items():
-            for gone, back in pairwise(doings):
-                comes_home = self._is_out(comer, gone) and not self._is_out(comer, back)
-                if not comes_home or gone.end - gone.begin < LONG_GONE_S:
+        for member, doings in days.items():
+            for absence, return_home in pairwise(doings):
+                comes_home = self._is_out(member, absence) and not self._is_out(member, return_home)
+                if not comes_home or absence.end - absence.begin < LONG_GONE_S:
                     continue
                 for name in result:
                     comes = draws.below(MILLION) < self.household.welcome * MILLION
-                    if name == comer or comes:
-                        result[name] = self._interrupted(name, result[name], back.begin)
+                    if name == member or comes:
+                        result[name] = self._with_welcome(name, result[name], return_home.begin)
         return result
 
-    def _interrupted(self, name: str, day: Sequence[Doing], at: int) -> Sequence[Doing]:
-        """Return a day in which a member comes to the door, if it is at home, at leisure."""
+    def _with_welcome(self, name: str, day: Sequence[Doing], at: int) -> Sequence[Doing]:
+        """Return a day in which a member comes to the door at a time, if it is at leisure then."""
         for i, doing in enumerate(day):
-            over = at + WELCOME_S
+            end = at + WELCOME_S
             if doing.begin <= at < doing.end:
-                busy = doing.task or doing.activity == SLEEP or self._is_out(name, doing)
-                busy = busy or self._is_exclusive(name, doing)
-                if busy or doing.end - over < NO_GAP_S:
+                is_busy = doing.task or doing.activity == SLEEP or self._is_out(name, doing)
+                is_busy = is_busy or self._is_exclusive(name, doing)
+                if is_busy or doing.end - end < NO_GAP_S:
                     return day
                 before = [doing._replace(end=at)] if doing.begin < at else []
-                welcome = Doing(WELCOME, at, over, role=INTERRUPTS)
+                welcome = Doing(WELCOME, at, end, role=INTERRUPTS)
                 role = RESUMES if doing.begin < at and doing.role == PLANNED else doing.role
-                after = doing._replace(begin=over, role=role)
+                after = doing._replace(begin=end, role=role)
                 return [*day[:i], *before, welcome, after, *day[i + 1 :]]
         return day
 
-    def _together(self, ordinal: int) -> list[tuple[Job, tuple[str, ...]]]:
-        """Draw what is done together on a day: a job, and whose."""
+    def _joint_jobs(self, ordinal: int) -> list[tuple[Job, tuple[str, ...]]]:
+        """Draw the joint activities of a day: each a job and its members, () for all."""
         day = date.fromordinal(ordinal)
         jobs = []
         for name, joint in self.household.together.items():
@@ -314,20 +318,21 @@ class Lives:
             draws = Draws(stream_key(self._seed, self._path, f"together {name}"), ordinal)
             if draws.below(MILLION) >= joint.probability * MILLION:
                 continue
-            what = joint.activity or name
+            activity = joint.activity or name
             begin = starts(joint, 0).draw(draws)
-            takes = (joint.takes or find_activity(what, {}).takes).table().draw(draws)
-            at, long = uniform(begin, begin), uniform(takes, takes)
-            jobs.append((Job(name, what, at, long, until=NEVER, needed=False), joint.who))
+            takes = (joint.takes or find_activity(activity, {}).takes).table().draw(draws)
+            at, duration = uniform(begin, begin), uniform(takes, takes)
+            job = Job(name, activity, at, duration, until=NEVER, needed=False)
+            jobs.append((job, joint.who))
         return jobs
 
 
-def _with(plan: DayPlan, job: Job) -> DayPlan:
-    """Return a template with a job, in place of one of the same name if there is one."""
+def _with_job(plan: DayPlan, job: Job) -> DayPlan:
+    """Return a plan with a job, which replaces one of the same task."""
     jobs = list(plan.jobs)
-    at = next((i for i, own in enumerate(jobs) if own.task == job.task), None)
-    if at is None:
+    index = next((i for i, own in enumerate(jobs) if own.task == job.task), None)
+    if index is None:
         jobs.append(job)
     else:
-        jobs[at] = job._replace(after=jobs[at].after)
+        jobs[index] = job._replace(after=jobs[index].after)
     return plan._replace(jobs=tuple(jobs))

@@ -1,7 +1,7 @@
-"""Interruptions: needs and errands put into a planned day, which they leave as it is otherwise.
+"""Interruptions: needs and errands that are inserted into a planned day.
 
-Each interruption lies within one activity, which goes on afterwards: no activity of the plan begins
-or ends at another time. A day's interruptions are a function of its date and its plan alone.
+Each interruption lies within one activity, which is resumed afterwards: all activities of the plan
+begin and end as planned. A day's interruptions are a function of its date and its plan alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from fleet2d.kernels.random import Bits
 from fleet2d.routines.activity import seconds
-from fleet2d.routines.busy import Busy
 from fleet2d.routines.laws import Law
+from fleet2d.routines.occupancy import Occupancy
 from fleet2d.routines.planner import DAY_S, FINISHES, INTERRUPTS, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
 
@@ -18,28 +18,28 @@ if TYPE_CHECKING:
     from fleet2d.routines.activity import Activity
     from fleet2d.routines.needs import Errand, Need
 
-# Chances are of that, and laws are drawn from so many quantiles: a few bits of a draw do.
+# Probabilities have this many bits, and laws 2 to this power quantiles: few bits of a draw suffice.
 CHANCE_BITS, QUANTILE_BITS = 10, 8
 CERTAIN = 1 << CHANCE_BITS
-# Nobody goes on with something for less than this [s].
+# The least duration of the rest of an activity after an interruption [s].
 SHORTEST_REST_S = 60
-# Nobody gets up in the night shortly before waking [s].
+# Within this time before waking, no need interrupts sleep [s].
 LAST_SLEEP_S = 1800
-# So many stretches a day has at most: what is done has its random draws by its number in the day.
+# The most doings of a day, whose numbers are part of the addresses of random draws.
 MOST = 480
 
 
 Quantiles = tuple[int, ...]
 
 
-class Step(NamedTuple):
-    """One thing done in an interruption.
+class InterruptionStep(NamedTuple):
+    """One activity of an interruption.
 
     Attributes:
-        activity: What.
-        chance: On how many of CERTAIN occasions.
-        takes: How long: quantiles [s].
-        exclusive: Whether it has to wait while others of the household do the like.
+        activity: The activity.
+        chance: Its probability, in parts of CERTAIN.
+        takes: Quantiles of its duration [s].
+        exclusive: Whether it needs a room that no other member of the household uses.
     """
 
     activity: str
@@ -48,10 +48,10 @@ class Step(NamedTuple):
     exclusive: bool
 
 
-class Urge(NamedTuple):
-    """A need as the planner uses it; chances are of CERTAIN, times in seconds."""
+class NeedRule(NamedTuple):
+    """A need in the form used here; probabilities in parts of CERTAIN, times in seconds."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[InterruptionStep, ...]
     every: Quantiles
     asleep: Quantiles | None
     on_waking: int
@@ -63,70 +63,70 @@ class Urge(NamedTuple):
     met_by: frozenset[str]
 
 
-class Chore(NamedTuple):
-    """An errand as the planner uses it."""
+class ErrandRule(NamedTuple):
+    """An errand in the form used here."""
 
-    step: Step
+    step: InterruptionStep
     after: frozenset[str]
     before: frozenset[str]
 
 
-class Body(NamedTuple):
-    """What interrupts somebody's days.
+class InterruptionRules(NamedTuple):
+    """What interrupts the days of a person.
 
     Attributes:
-        urges: Their needs.
-        chores: Their errands.
+        needs: The needs of the person.
+        errands: The errands of the person.
         away: Activities out of the home.
-        kept: Activities that a need does not interrupt.
-        private: Activities that one does alone in their room.
+        uninterruptible: Activities that needs don't interrupt.
+        private: Exclusive activities, which are done alone in their room.
     """
 
-    urges: tuple[Urge, ...]
-    chores: tuple[Chore, ...]
+    needs: tuple[NeedRule, ...]
+    errands: tuple[ErrandRule, ...]
     away: frozenset[str]
-    kept: frozenset[str]
+    uninterruptible: frozenset[str]
     private: frozenset[str]
 
 
-def body_of(
+def interruption_rules(
     needs: Mapping[str, "Need"],
     errands: Mapping[str, "Errand"],
     activities: Mapping[str, "Activity"],
-) -> Body:
-    """Return what the planner uses of needs and errands.
+) -> InterruptionRules:
+    """Return the rules of needs and errands.
 
     Args:
-        needs: By name.
-        errands: By name.
-        activities: All that a day may hold, those of needs and errands among them.
+        needs: The needs, by name.
+        errands: The errands, by name.
+        activities: All activities that a day may have, with those of needs and errands.
     """
-    urges = tuple(_urge(name, need, activities) for name, need in needs.items())
-    chores = tuple(
-        Chore(
+    need_rules = tuple(_need_rule(name, need, activities) for name, need in needs.items())
+    errand_rules = tuple(
+        ErrandRule(
             _step(errand.activity or name, errand.probability, errand.takes, activities),
             frozenset(errand.after),
             frozenset(errand.before),
         )
         for name, errand in errands.items()
     )
-    return Body(
-        urges,
-        chores,
+    return InterruptionRules(
+        need_rules,
+        errand_rules,
         frozenset(name for name, activity in activities.items() if activity.away),
         frozenset(n for n, a in activities.items() if a.exclusive or not a.interruptible),
         frozenset(name for name, activity in activities.items() if activity.exclusive),
     )
 
 
-def _urge(name: str, need: "Need", activities: Mapping[str, "Activity"]) -> Urge:
+def _need_rule(name: str, need: "Need", activities: Mapping[str, "Activity"]) -> NeedRule:
     steps = [_step(need.activity or name, 1.0, need.takes, activities)]
-    steps += [_step(what, chance, None, activities) for what, chance in need.then.items()]
+    steps += [_step(then, chance, None, activities) for then, chance in need.then.items()]
     window = None
     if need.between is not None:
         first = seconds(need.between[0])
         window = first, (seconds(need.between[1]) - first) % DAY_S
-    return Urge(
+    return NeedRule(
         tuple(steps),
         _quantiles(need.every.table()),
         None if need.asleep is None else _quantiles(need.asleep.table()),
@@ -145,10 +145,12 @@ def _chance(share: float) -> int:
     return round(share * CERTAIN)
 
 
-def _step(name: str, chance: float, takes: object, activities: Mapping[str, "Activity"]) -> Step:
+def _step(
+    name: str, chance: float, takes: object, activities: Mapping[str, "Activity"]
+) -> InterruptionStep:
     activity = activities[name]
     law = (takes or activity.takes).table()  # type: ignore[attr-defined]
-    return Step(name, _chance(chance), _quantiles(law), activity.exclusive)
+    return InterruptionStep(name, _chance(chance), _quantiles(law), activity.exclusive)
 
 
 def _quantiles(law: Law) -> Quantiles:
@@ -156,22 +158,25 @@ def _quantiles(law: Law) -> Quantiles:
     return tuple(max(1, value) for value in law.quantiles(1 << QUANTILE_BITS))
 
 
-def interrupted(
-    body: Body, draws: Draws, day: Sequence[Doing], busy: Busy | None = None
+def interrupt(
+    rules: InterruptionRules,
+    draws: Draws,
+    day: Sequence[Doing],
+    occupancy: Occupancy | None = None,
 ) -> list[Doing]:
-    """Return a day with what comes up in it.
+    """Return a day with interruptions.
 
     Args:
-        body: What comes up.
+        rules: The needs and errands of the person.
         draws: The random draws of the day's interruptions.
         day: The planned day, without a gap.
-        busy: When the rooms that only one can use are in use by others; None: never.
+        occupancy: When others use private rooms; None: never.
     """
-    return _Interruptions(body, draws, day, busy).result
+    return _InterruptedDay(rules, draws, day, occupancy).result
 
 
-def uninterrupted(day: Sequence[Doing]) -> list[Doing]:
-    """Return a day as it was planned, before anything came up in it."""
+def without_interruptions(day: Sequence[Doing]) -> list[Doing]:
+    """Return a day as it was planned, without its interruptions."""
     planned: list[Doing] = []
     begin = day[0].begin
     for doing in day:
@@ -186,148 +191,167 @@ def uninterrupted(day: Sequence[Doing]) -> list[Doing]:
     return planned
 
 
-class _Interruptions:
-    """A day in the making."""
+class _InterruptedDay:
+    """A day to which interruptions are added, doing by doing.
 
-    def __init__(self, body: Body, draws: Draws, day: Sequence[Doing], busy: Busy | None) -> None:
-        self.body, self.bits, self.busy = body, Bits(draws), busy
+    Attributes:
+        result: The doings so far.
+        due: When each need occurs next [s].
+        has_waited: Whether each need has waited for the end of an activity since it was due.
+        doing: The planned doing to which interruptions are added.
+        now: The end of its last part so far [s].
+        end: Its end [s].
+        is_fresh: Whether no interruption was added to it so far.
+    """
+
+    def __init__(
+        self,
+        rules: InterruptionRules,
+        draws: Draws,
+        day: Sequence[Doing],
+        occupancy: Occupancy | None,
+    ) -> None:
+        self.rules, self.bits, self.occupancy = rules, Bits(draws), occupancy
         self.result: list[Doing] = []
         begin = day[0].begin
-        self.due = [begin + self._part_of(urge.every) for urge in body.urges]
-        self.waited = [False] * len(body.urges)
+        self.due = [begin + self._draw_part(need.every) for need in rules.needs]
+        self.has_waited = [False] * len(rules.needs)
         for k, doing in enumerate(day):
-            self.now, self.end, self.doing, self.fresh = doing.begin, doing.end, doing, True
+            self.now, self.end, self.doing, self.is_fresh = doing.begin, doing.end, doing, True
             before = day[k - 1].activity if k else SLEEP
             after = day[k + 1].activity if k + 1 < len(day) else SLEEP
-            if doing.activity in body.away:
-                self._go_out()
+            if doing.activity in rules.away:
+                self._skip_needs()
             elif doing.activity == SLEEP:
-                self._sleep(before)
+                self._interrupt_sleep(before)
             else:
-                self._be_at_home(before, after)
+                self._interrupt_activity(before, after)
             if self.now == doing.begin:
                 self.result.append(doing)
             elif self.now < self.end:
-                self._go_on(self.end)
+                self._continue(self.end)
             else:
-                self._finish()
+                self._mark_finishing()
 
-    def _finish(self) -> None:
-        """Let the last interruption be over when the activity is, which isn't gone on with."""
+    def _mark_finishing(self) -> None:
+        """Mark the last interruptions as the end of their activity, which isn't resumed."""
         i = len(self.result) - 1
         while self.result[i].role == INTERRUPTS:
             self.result[i] = self.result[i]._replace(role=FINISHES)
             i -= 1
 
-    def _go_out(self) -> None:
-        """Let needs that come up out of the home be met there."""
-        for i, urge in enumerate(self.body.urges):
+    def _skip_needs(self) -> None:
+        """Let needs that occur out of the home be met there."""
+        for i, need in enumerate(self.rules.needs):
             if self.due[i] < self.end:
-                self.due[i] = self.end + self._part_of(urge.every)
+                self.due[i] = self.end + self._draw_part(need.every)
 
-    def _sleep(self, before: str) -> None:
-        """Go to bed, and get up in the night."""
+    def _interrupt_sleep(self, before: str) -> None:
+        """Add errands and needs before sleep, and needs in the night."""
         if before != SLEEP:
-            self._errands(before)
-            for i, urge in enumerate(self.body.urges):
-                if self._happens(urge.before_bed):
+            self._do_errands(before)
+            for i, need in enumerate(self.rules.needs):
+                if self._happens(need.before_bed):
                     self._meet(i, self.now)
-        for i, urge in enumerate(self.body.urges):
+        for i, need in enumerate(self.rules.needs):
             self.due[i] = max(self.due[i], self.end)
-            if urge.asleep is None:
+            if need.asleep is None:
                 continue
-            at = self.now + self._time(urge.asleep)
+            at = self.now + self._draw_time(need.asleep)
             while at < self.end - LAST_SLEEP_S:
                 self._meet(i, at)
-                at = max(at, self.now) + self._time(urge.asleep)
-            self.due[i] = self.end + self._part_of(urge.every)
+                at = max(at, self.now) + self._draw_time(need.asleep)
+            self.due[i] = self.end + self._draw_part(need.every)
 
-    def _be_at_home(self, before: str, after: str) -> None:
-        """Meet the needs that come up while one does something at home, in order of time."""
-        urges, body = self.body.urges, self.body
+    def _interrupt_activity(self, before: str, after: str) -> None:
+        """Add errands and needs to an activity at home, in order of time."""
+        needs, away = self.rules.needs, self.rules.away
         if before != self.doing.activity and before != SLEEP:
-            self._errands(before)
-        for i, urge in enumerate(urges):
-            chance = urge.on_waking if before == SLEEP else urge.on_return
-            if (before == SLEEP or before in body.away) and self._happens(chance):
+            self._do_errands(before)
+        for i, need in enumerate(needs):
+            chance = need.on_waking if before == SLEEP else need.on_return
+            if (before == SLEEP or before in away) and self._happens(chance):
                 self._meet(i, self.now)
-            if self.doing.activity in urge.met_by:
-                self.due[i] = self.end + self._time(urge.every)
-        self._meet_those_due(after)
-        if after in body.away:
-            for i, urge in enumerate(urges):
-                if self._happens(urge.before_leaving):
+            if self.doing.activity in need.met_by:
+                self.due[i] = self.end + self._draw_time(need.every)
+        self._meet_due_needs(after)
+        if after in away:
+            for i, need in enumerate(needs):
+                if self._happens(need.before_leaving):
                     self._meet(i, self.end)
 
-    def _meet_those_due(self, after: str) -> None:
-        """Meet the needs that come up before one is done, or put them off until then."""
-        urges, body = self.body.urges, self.body
-        kept = self.doing.activity in body.kept
-        while urges:
-            i = min(range(len(urges)), key=self.due.__getitem__)
+    def _meet_due_needs(self, after: str) -> None:
+        """Meet the needs that are due before the activity ends, or put them off until its end."""
+        needs = self.rules.needs
+        is_uninterruptible = self.doing.activity in self.rules.uninterruptible
+        while needs:
+            i = min(range(len(needs)), key=self.due.__getitem__)
             at = max(self.due[i], self.now)
             if at >= self.end:
                 return
-            waits = kept or (not self.waited[i] and self.end - at <= urges[i].patience)
-            if waits and after not in body.away:
-                self.due[i], self.waited[i] = self.end, True
+            waits = is_uninterruptible or (
+                not self.has_waited[i] and self.end - at <= needs[i].patience
+            )
+            if waits and after not in self.rules.away:
+                self.due[i], self.has_waited[i] = self.end, True
             else:
                 self._meet(i, self.end if waits else at)
 
     def _happens(self, chance: int) -> bool:
+        """Draw whether something of a probability happens, given in parts of CERTAIN."""
         return chance > 0 and (chance >= CERTAIN or self.bits.take(CHANCE_BITS) < chance)
 
-    def _time(self, quantiles: Quantiles) -> int:
+    def _draw_time(self, quantiles: Quantiles) -> int:
         """Draw a time from a law [s]."""
         return quantiles[self.bits.take(QUANTILE_BITS)]
 
-    def _part_of(self, quantiles: Quantiles) -> int:
-        """Draw what is left of a time drawn from a law, of which some is over [s]."""
-        return (self._time(quantiles) * self.bits.take(QUANTILE_BITS)) >> QUANTILE_BITS
+    def _draw_part(self, quantiles: Quantiles) -> int:
+        """Draw a time from a law, and a uniform part of it [s]."""
+        return (self._draw_time(quantiles) * self.bits.take(QUANTILE_BITS)) >> QUANTILE_BITS
 
-    def _errands(self, before: str) -> None:
-        """Do errands where one activity follows another."""
-        for chore in self.body.chores:
-            fits = (not chore.after or before in chore.after) and (
-                not chore.before or self.doing.activity in chore.before
+    def _do_errands(self, before: str) -> None:
+        """Add the errands between the activity before and the present one."""
+        for errand in self.rules.errands:
+            fits = (not errand.after or before in errand.after) and (
+                not errand.before or self.doing.activity in errand.before
             )
-            if fits and self._happens(chore.step.chance):
-                self._insert([(chore.step, self._time(chore.step.takes))], self.now)
+            if fits and self._happens(errand.step.chance):
+                self._insert([(errand.step, self._draw_time(errand.step.takes))], self.now)
 
     def _meet(self, number: int, at: int) -> None:
-        """Meet a need at a time or a little before the activity is over, if there is time."""
-        urge = self.body.urges[number]
-        self.due[number] = max(at, self.now) + self._time(urge.every)
-        self.waited[number] = False
-        if urge.window and (at - urge.window[0]) % DAY_S > urge.window[1]:
+        """Meet a need at a time, or shortly before the end of the activity, if there is time."""
+        need = self.rules.needs[number]
+        self.due[number] = max(at, self.now) + self._draw_time(need.every)
+        self.has_waited[number] = False
+        if need.window and (at - need.window[0]) % DAY_S > need.window[1]:
             return
-        here = self.doing.activity
+        activity = self.doing.activity
         steps = [
-            (step, self._time(step.takes))
-            for step in urge.steps
-            if step.activity != here and self._happens(step.chance)
+            (step, self._draw_time(step.takes))
+            for step in need.steps
+            if step.activity != activity and self._happens(step.chance)
         ]
         if steps and not self._insert(steps, at):
             self.due[number] = self.end
 
-    def _insert(self, steps: Sequence[tuple[Step, int]], at: int) -> bool:
-        """Put something into the activity from about a time on; tell whether there was room."""
-        long = sum(takes for _, takes in steps)
-        latest = self.end - long
+    def _insert(self, steps: Sequence[tuple[InterruptionStep, int]], at: int) -> bool:
+        """Insert steps into the activity at about a time; return whether there is room for them."""
+        duration = sum(takes for _, takes in steps)
+        latest = self.end - duration
         if latest < self.end and latest >= at > latest - SHORTEST_REST_S:
             at = latest
         at = min(at, latest)
-        first = self.now + SHORTEST_REST_S if self.fresh else self.now
+        first = self.now + SHORTEST_REST_S if self.is_fresh else self.now
         if latest < first or len(self.result) > MOST - 2 * len(steps):
             return False
         room = -1
-        if self.busy is not None and any(step.exclusive for step, _ in steps):
-            found = self._free_room(steps, at, latest, long)
-            if found is None:
+        if self.occupancy is not None and any(step.exclusive for step, _ in steps):
+            slot = self._free_room(steps, at, latest, duration)
+            if slot is None:
                 return False
-            at, room = found
+            at, room = slot
         if at > self.now:
-            self._go_on(at)
+            self._continue(at)
         for step, takes in steps:
             self.result.append(Doing(step.activity, at, at + takes, "", room, INTERRUPTS))
             at += takes
@@ -335,19 +359,20 @@ class _Interruptions:
         return True
 
     def _free_room(
-        self, steps: Sequence[tuple[Step, int]], at: int, latest: int, long: int
+        self, steps: Sequence[tuple[InterruptionStep, int]], at: int, latest: int, duration: int
     ) -> tuple[int, int] | None:
         """Return the first time at which one of the rooms is free for long enough, and the room."""
-        assert self.busy is not None
+        assert self.occupancy is not None
         name = next(step.activity for step, _ in steps if step.exclusive)
-        if self.doing.activity in self.body.private and self.doing.room in self.busy.rooms_of(name):
-            return at, self.doing.room  # one has it to oneself
-        found = self.busy.free(name, at, latest, long, self.end)
-        return None if found is None else (found.begin, found.room)
+        room, rooms = self.doing.room, self.occupancy.rooms_of(name)
+        if self.doing.activity in self.rules.private and room in rooms:
+            return at, room  # the person is already alone in it
+        slot = self.occupancy.free(name, at, latest, duration, self.end)
+        return None if slot is None else (slot.begin, slot.room)
 
-    def _go_on(self, until: int) -> None:
-        """Do what was planned up to a time."""
+    def _continue(self, until: int) -> None:
+        """Add the planned doing up to a time."""
         activity, _, _, task, room, role = self.doing
-        role = role if self.fresh else RESUMES
+        role = role if self.is_fresh else RESUMES
         self.result.append(Doing(activity, self.now, until, task, room, role))
-        self.now, self.fresh = until, False
+        self.now, self.is_fresh = until, False

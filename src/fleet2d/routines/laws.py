@@ -1,8 +1,8 @@
-"""Laws of durations and times of day, as tables of quantiles: exact on every machine.
+"""Laws of durations and times of day, as tables of quantiles: the same on every machine.
 
-A law is kept as its quantiles at (i + 1/2) / KNOTS, in whole seconds, joined by straight lines. A
-draw within bounds inverts that curve between them: no rejection, and a law that is cut stays the
-same law, conditioned. The tables come from + - * / and sqrt alone.
+A law is stored as its quantiles at (i + 1/2) / KNOTS, in whole seconds, with linear interpolation.
+A draw within bounds inverts that curve between them: nothing is rejected, and the result has the
+conditional law. The tables are computed by + - * / and sqrt only.
 """
 
 import math
@@ -36,9 +36,9 @@ class Law(NamedTuple):
     """A distribution over whole seconds.
 
     Attributes:
-        knots: Quantiles at evenly spaced probabilities, rising [s].
-        shortest: Nothing below is drawn [s].
-        longest: Nothing above is drawn [s].
+        knots: Quantiles at evenly spaced probabilities, ascending [s].
+        shortest: The least value that is drawn [s].
+        longest: The largest value that is drawn [s].
 
     Example:
         >>> from fleet2d.streams import Draws, stream_key
@@ -53,9 +53,9 @@ class Law(NamedTuple):
     longest: int
 
     def draw(self, draws: Draws, low: int | None = None, high: int | None = None) -> int:
-        """Return a value of the law given that it is from `low` to `high` [s].
+        """Draw a value from the law, conditional on being from `low` to `high` [s].
 
-        Where the law has nothing between them, the end nearer to it.
+        If the law has no values between them, the result is the bound nearer to the law.
         """
         low = self.shortest if low is None or low < self.shortest else low
         high = self.longest if high is None or high > self.longest else high
@@ -102,7 +102,7 @@ class Law(NamedTuple):
 
 
 def position(knots: Sequence[int], value: int) -> int:
-    """Return how far along the knots a value is, in 2**-24 of the way from one to the next."""
+    """Return the fractional index of a value among the knots, in units of 2**-24."""
     i = bisect_right(knots, value) - 1
     if i < 0:
         return 0
@@ -112,7 +112,7 @@ def position(knots: Sequence[int], value: int) -> int:
 
 
 def _law(quantile: Callable[[float], float]) -> Law:
-    """Make a law of the value that belongs to each standard normal quantile."""
+    """Return the law whose quantiles are a function of those of the standard normal law."""
     knots: list[int] = []
     for z in NORMAL:
         value = int(quantile(z) + 0.5)
@@ -155,7 +155,7 @@ def exponential(mean_s: float) -> Law:
 
 
 def uniform(low_s: int, high_s: int) -> Law:
-    """Return the law under which every second from `low_s` to `high_s` is as likely."""
+    """Return the uniform law of whole seconds from `low_s` to `high_s`."""
     return Law((low_s, high_s), low_s, high_s)
 
 
@@ -164,12 +164,12 @@ def empirical(quantiles: Sequence[int]) -> Law:
     return Law(tuple(quantiles), quantiles[0], quantiles[-1])
 
 
-def weighted(draws: Draws, weights: Sequence[int]) -> int:
-    """Return a number from 0 to len(weights) - 1, each as likely as its weight says.
+def draw_weighted(draws: Draws, weights: Sequence[int]) -> int:
+    """Draw an index of `weights` with a probability proportional to its weight.
 
     >>> from fleet2d.streams import Draws, stream_key
     >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
-    >>> [weighted(draws, [0, 8, 0]) for _ in range(8)]
+    >>> [draw_weighted(draws, [0, 8, 0]) for _ in range(8)]
     [1, 1, 1, 1, 1, 1, 1, 1]
     """
     at = draws.below(sum(weights))

@@ -1,4 +1,4 @@
-"""Needs and errands: what comes up in a day again and again, as laws with their sources."""
+"""Needs and errands: what interrupts a day again and again, as laws with their sources."""
 
 from collections.abc import Mapping
 from datetime import timedelta
@@ -11,45 +11,47 @@ from pydantic import Field, model_validator
 from fleet2d.component import Settings
 from fleet2d.document import read_document
 from fleet2d.problems import problem
-from fleet2d.routines.activity import AnyTakes, seconds
-from fleet2d.routines.written import OrWritten
+from fleet2d.routines.activity import AnyDurationLaw, seconds
+from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.units import Duration, Share, TimeOfDay
 
-HERE = Path(__file__).parent
-# Nothing comes up more often than that on average.
+FOLDER = Path(__file__).parent
+# The least mean time between two occurrences of a need.
 SHORTEST_INTERVAL = timedelta(minutes=5)
 
 
 class Need(Settings):
-    """Something that builds up: it interrupts what one does, and afterwards one goes on.
+    """Something that builds up, and then interrupts an activity, which is resumed afterwards.
 
-    Short form: ``2 h`` is a need with that mean time from one time to the next.
+    Short form: ``2 h`` is a need with that mean time between two occurrences.
     """
 
-    activity: str = Field(default="", description="what is done; left out: as the need is called")
-    every: AnyTakes = Field(description="time awake from one time to the next")
-    asleep: AnyTakes | None = Field(
-        default=None, description="time asleep until it wakes one; left out: it never does"
+    activity: str = Field(default="", description="the activity; left out: the name of the need")
+    every: AnyDurationLaw = Field(description="time awake between two occurrences")
+    asleep: AnyDurationLaw | None = Field(
+        default=None, description="time asleep until it wakes the person; left out: it never does"
     )
-    on_waking: Share = Field(default=0.0, description="how likely it is the first thing on waking")
-    before_bed: Share = Field(default=0.0, description="how likely it is done right before sleep")
+    on_waking: Share = Field(default=0.0, description="probability of being first on waking")
+    before_bed: Share = Field(default=0.0, description="probability of being last before sleep")
     before_leaving: Share = Field(
-        default=0.0, description="how likely it is done right before leaving home"
+        default=0.0, description="probability of being last before leaving home"
     )
-    on_return: Share = Field(default=0.0, description="how likely it is done on coming home")
+    on_return: Share = Field(default=0.0, description="probability of being first on coming home")
     between: tuple[TimeOfDay, TimeOfDay] | None = Field(
-        default=None, description="the times of day at which it comes up; left out: at any"
+        default=None, description="the times of day at which it occurs; left out: at any"
     )
     met_by: tuple[str, ...] = Field(
-        default=(), description="activities that meet it, too: it builds up anew after them"
+        default=(), description="activities that meet it, too: it builds up again after them"
     )
-    takes: AnyTakes | None = Field(default=None, description="how long; left out: as the activity")
+    takes: AnyDurationLaw | None = Field(
+        default=None, description="how long; left out: as the activity"
+    )
     then: dict[str, Share] = Field(
-        default_factory=dict, description="activities that follow at once, and how likely each does"
+        default_factory=dict, description="activities that follow at once, with their probability"
     )
     patience: Duration = Field(
         default=timedelta(minutes=10),
-        description="it waits for the end of what one does if that is no later than this",
+        description="it waits for the end of an activity that ends within this time",
     )
     source: str = Field(default="", description="where its numbers come from, for people to read")
 
@@ -62,25 +64,27 @@ class Need(Settings):
     def _leaves_time(self) -> Self:
         for key, law in (("every", self.every), ("asleep", self.asleep)):
             if law is not None and law.table().mean() < seconds(SHORTEST_INTERVAL):
-                raise problem(f"'{key}' is less than 5 min on average: that leaves no time to live")
+                raise problem(f"'{key}' is less than 5 min on average: make it 5 min or longer")
         return self
 
 
 class Errand(Settings):
-    """A short way between two activities: something is fetched, put away, looked at.
+    """A short task between two activities: to fetch, put away or look at something.
 
     Short form: a number is its probability.
     """
 
-    activity: str = Field(default="", description="what is done; left out: as the errand is called")
-    probability: Share = Field(description="how likely it is done at each such change of activity")
+    activity: str = Field(default="", description="the activity; left out: the name of the errand")
+    probability: Share = Field(description="its probability at each such change of activity")
     after: tuple[str, ...] = Field(
         default=(), description="activities after which it is done; left out: after any"
     )
     before: tuple[str, ...] = Field(
         default=(), description="activities before which it is done; left out: before any"
     )
-    takes: AnyTakes | None = Field(default=None, description="how long; left out: as the activity")
+    takes: AnyDurationLaw | None = Field(
+        default=None, description="how long; left out: as the activity"
+    )
     source: str = Field(default="", description="where its numbers come from, for people to read")
 
     @model_validator(mode="before")
@@ -89,30 +93,30 @@ class Errand(Settings):
         return {"probability": data} if isinstance(data, int | float) else data
 
 
-AnyNeed = Annotated[Need, OrWritten("text", "number")]
-AnyErrand = Annotated[Errand, OrWritten("number")]
+AnyNeed = Annotated[Need, SchemaForms("text", "number")]
+AnyErrand = Annotated[Errand, SchemaForms("number")]
 
 
 @cache
 def usual_needs() -> dict[str, Need]:
-    """Return the needs of an adult, those of personas that state none.
+    """Return the needs of an adult, which personas without needs of their own have.
 
     >>> sorted(usual_needs())
     ['call', 'drink', 'toilet']
     """
-    data = read_document(HERE / "needs.yaml").data["needs"]
+    data = read_document(FOLDER / "needs.yaml").data["needs"]
     return {name: Need.model_validate(fields) for name, fields in data.items()}
 
 
 @cache
 def usual_errands() -> dict[str, Errand]:
-    """Return the errands of an adult, those of personas that state none."""
-    data = read_document(HERE / "needs.yaml").data["errands"]
+    """Return the errands of an adult, which personas without errands of their own have."""
+    data = read_document(FOLDER / "needs.yaml").data["errands"]
     return {name: Errand.model_validate(fields) for name, fields in data.items()}
 
 
 def activities_of(needs: Mapping[str, Need], errands: Mapping[str, Errand]) -> set[str]:
-    """Return the names of the activities that needs and errands consist of."""
+    """Return the names of the activities of needs and errands."""
     names = {need.activity or name for name, need in needs.items()}
     names |= {what for need in needs.values() for what in need.then}
     return names | {errand.activity or name for name, errand in errands.items()}
@@ -121,7 +125,7 @@ def activities_of(needs: Mapping[str, Need], errands: Mapping[str, Errand]) -> s
 def named_activities(
     needs: Mapping[str, Need], errands: Mapping[str, Errand]
 ) -> list[tuple[tuple[str, ...], str]]:
-    """Return every activity that needs and errands name, each with its keys in the persona."""
+    """Return pairs of keys in the persona and the activity that needs and errands name there."""
     named: list[tuple[tuple[str, ...], str]] = []
     for name, need in needs.items():
         named.append((("needs", name), need.activity or name))

@@ -1,4 +1,4 @@
-"""Periods: when somebody isn't there at all, whatever their days would be."""
+"""Periods in which a person is away from home, whatever the plan of the day is."""
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
@@ -9,14 +9,14 @@ from pydantic import BeforeValidator, Field, model_validator
 from fleet2d.component import Settings
 from fleet2d.problems import problem
 from fleet2d.routines.planner import Doing
-from fleet2d.routines.written import OrWritten
+from fleet2d.routines.schema_forms import SchemaForms
 
 SECOND = timedelta(seconds=1)
 AWAY = "holiday"
 
 
 def _moment(value: Any) -> Any:
-    """Read a date as its first moment."""
+    """Read a date as the midnight that begins it."""
     if isinstance(value, str) and len(value) == 10:
         return f"{value}T00:00"
     if hasattr(value, "year") and not isinstance(value, datetime):
@@ -28,7 +28,7 @@ Moment = Annotated[datetime, BeforeValidator(_moment)]
 
 
 class Period(Settings):
-    """A stretch of time; short form: ``[2026-02-14, 2026-02-21T18:00]``."""
+    """A period of time; short form: ``[2026-02-14, 2026-02-21T18:00]``."""
 
     begins: Moment = Field(description="when it begins, local time")
     ends: Moment = Field(description="when it is over")
@@ -45,42 +45,44 @@ class Period(Settings):
         if self.begins.tzinfo or self.ends.tzinfo:
             raise problem("times of a scenario are local: leave out the time zone")
         if self.ends <= self.begins:
-            raise problem(f"it begins at {self.begins} and is over at {self.ends}: that is no time")
+            raise problem(
+                f"it begins at {self.begins}, which is not before its end at {self.ends}: swap them"
+            )
         return self
 
-    def within(self, midnight: datetime) -> tuple[int, int]:
-        """Return its beginning and end [s since a midnight]."""
+    def seconds_since(self, midnight: datetime) -> tuple[int, int]:
+        """Return its begin and end [s since a midnight]."""
         return (self.begins - midnight) // SECOND, (self.ends - midnight) // SECOND
 
 
-AnyPeriod = Annotated[Period, OrWritten("pair")]
+AnyPeriod = Annotated[Period, SchemaForms("pair")]
 """A period, in any form."""
 
 
-def without(
+def with_absences(
     day: Sequence[Doing], midnight: datetime, away: Sequence[Period], visits: Sequence[Period]
 ) -> list[Doing]:
-    """Return a day in which one is out of the home in some periods, or except in some.
+    """Return a day with a person's absences from home in place of what is planned then.
 
     Args:
-        day: What would be done, without a gap.
-        midnight: Of the day's date.
-        away: When one isn't there.
-        visits: When one is there, and at no other time; empty: always.
+        day: The doings of the day, without a gap.
+        midnight: The midnight that begins the day's date.
+        away: The periods in which the person is away.
+        visits: If any, the only periods in which the person is at home.
     """
     begin, end = day[0].begin, day[-1].end
-    absent = [period.within(midnight) for period in away]
+    absences = [period.seconds_since(midnight) for period in away]
     if visits:
-        here = sorted(period.within(midnight) for period in visits)
-        lasts, firsts = [begin, *(b for _, b in here)], [*(a for a, _ in here), end]
-        absent += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
-    for first, last in absent:
+        stays = sorted(period.seconds_since(midnight) for period in visits)
+        lasts, firsts = [begin, *(b for _, b in stays)], [*(a for a, _ in stays), end]
+        absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
+    for first, last in absences:
         day = _cut(day, max(first, begin), min(last, end))
     return list(day)
 
 
 def _cut(day: Sequence[Doing], first: int, last: int) -> list[Doing]:
-    """Return a day in which one is away from `first` to `last`."""
+    """Return a day with an absence from `first` to `last` [s]."""
     if first >= last:
         return list(day)
     before = [doing._replace(end=min(doing.end, first)) for doing in day if doing.begin < first]

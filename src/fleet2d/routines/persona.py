@@ -1,4 +1,4 @@
-"""Personas: who somebody is, as the template of their days."""
+"""Personas: descriptions of people by their activities and the templates of their days."""
 
 from collections.abc import Mapping
 from datetime import date, timedelta
@@ -19,8 +19,8 @@ from fleet2d.document import read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at, shown
-from fleet2d.routines.activity import Activity, AnyTakes, catalogue, find_activity
-from fleet2d.routines.interruptions import Body, body_of
+from fleet2d.routines.activity import Activity, AnyDurationLaw, catalogue, find_activity
+from fleet2d.routines.interruptions import InterruptionRules, interruption_rules
 from fleet2d.routines.manners import Manners
 from fleet2d.routines.needs import (
     AnyErrand,
@@ -32,8 +32,8 @@ from fleet2d.routines.needs import (
 )
 from fleet2d.routines.planner import REST, SLEEP, DayPlan
 from fleet2d.routines.recorded import AnyRecordedDay
+from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.routines.templates import check, day_plans
-from fleet2d.routines.written import OrWritten
 from fleet2d.units import Duration, Share, TimeOfDay, format_time_of_day
 from fleet2d.weekdays import WEEKDAYS, OnDays, weekdays_of
 
@@ -43,19 +43,18 @@ Dates = tuple[date | tuple[date, date], ...]
 
 
 class Timing(Settings):
-    """When something begins: about a time of day, and never outside a window.
+    """When something begins: at about a time of day, always within a window.
 
-    A window that ends before it begins reaches over midnight.
+    A window that ends before it begins lasts past midnight.
     """
 
     at: TimeOfDay | None = Field(default=None, description="when it begins on average")
     spread: Duration = Field(
-        default=timedelta(minutes=15), description="standard deviation of its beginning"
+        default=timedelta(minutes=15), description="standard deviation of its begin"
     )
     between: tuple[TimeOfDay, TimeOfDay] | None = Field(
         default=None,
-        description="the earliest and latest beginning; left out: 2.5 standard deviations about"
-        " `at`",
+        description="the earliest and latest begin; left out: 2.5 standard deviations around `at`",
     )
 
     @model_validator(mode="before")
@@ -80,32 +79,32 @@ class Timing(Settings):
 class Wake(Timing):
     """When the day begins."""
 
-    at: TimeOfDay = Field(default=timedelta(hours=7), description="when one wakes on average")
+    at: TimeOfDay = Field(default=timedelta(hours=7), description="mean time of waking")
 
 
 class Sleep(Timing):
-    """When the day ends: one sleeps from then until waking."""
+    """When the day ends: the person sleeps from then until waking."""
 
-    at: TimeOfDay = Field(
-        default=timedelta(hours=23), description="when one goes to bed on average"
-    )
+    at: TimeOfDay = Field(default=timedelta(hours=23), description="mean time of going to bed")
     at_least: Duration = Field(default=timedelta(hours=4), description="shortest sleep")
 
 
 class Task(Timing):
     """Something to do in a day."""
 
-    activity: str = Field(default="", description="what; left out: as the task is called")
-    until: TimeOfDay | None = Field(default=None, description="it is over by then")
-    takes: AnyTakes | None = Field(default=None, description="how long; left out: as the activity")
+    activity: str = Field(default="", description="the activity; left out: the name of the task")
+    until: TimeOfDay | None = Field(default=None, description="its latest end")
+    takes: AnyDurationLaw | None = Field(
+        default=None, description="how long; left out: as the activity"
+    )
     after: tuple[str, ...] = Field(
         default=(),
-        description="tasks that come before it; without 'at' and 'between' it follows at once, and"
-        " only on days that have one of them",
+        description="tasks that come before it; without 'at' and 'between' it follows them at once,"
+        " and only on days that have one of them",
     )
     on_waking: bool = Field(default=False, description="it is the first thing of the day")
     before_bed: bool = Field(default=False, description="it is done right before going to bed")
-    probability: Share = Field(default=1.0, description="on how many of the days it is done")
+    probability: Share = Field(default=1.0, description="its probability on each of the days")
     fixed: bool = Field(
         default=False, description="an appointment: it begins at `at` exactly, and isn't left out"
     )
@@ -123,9 +122,11 @@ class Task(Timing):
 
 
 class Pastime(Settings):
-    """What fills the time that nothing else wants."""
+    """An activity for the time between tasks."""
 
-    weight: float = Field(default=1.0, gt=0, description="how often it is chosen, beside others")
+    weight: float = Field(
+        default=1.0, gt=0, description="how often it is chosen, relative to others"
+    )
     between: tuple[TimeOfDay, TimeOfDay] | None = Field(
         default=None, description="the times of day at which it may begin"
     )
@@ -136,7 +137,7 @@ class Pastime(Settings):
         return {"weight": data} if isinstance(data, int | float) else data
 
 
-AnyPastime = Annotated[Pastime, OrWritten("number")]
+AnyPastime = Annotated[Pastime, SchemaForms("number")]
 
 
 class DayTemplate(Settings):
@@ -146,23 +147,24 @@ class DayTemplate(Settings):
         default=None, description="its days of the week; left out: only its `dates`"
     )
     dates: Dates = Field(
-        default=(), description="dates and [first, last] ranges on which it holds before all others"
+        default=(), description="dates and [first, last] ranges on which it precedes all others"
     )
-    wake: Annotated[Wake, OrWritten("text")] = Field(
+    wake: Annotated[Wake, SchemaForms("text")] = Field(
         default=Wake(), description="when the day begins"
     )
-    sleep: Annotated[Sleep, OrWritten("text")] = Field(default=Sleep(), description="when it ends")
-    do: dict[str, Annotated[Task, OrWritten("text")]] = Field(
-        default_factory=dict, description="what is done, by name"
+    sleep: Annotated[Sleep, SchemaForms("text")] = Field(
+        default=Sleep(), description="when it ends"
+    )
+    do: dict[str, Annotated[Task, SchemaForms("text")]] = Field(
+        default_factory=dict, description="the tasks, by name"
     )
     leisure: dict[str, AnyPastime] | None = Field(
-        default=None, description="what fills the rest; left out: as the persona's"
+        default=None, description="the pastimes; left out: those of the persona"
     )
-
     recorded: tuple[AnyRecordedDay, ...] = Field(
         default=(),
-        description="days as they were lived, '07:00 wash, 07:20 work, …, 23:00 sleep, 31:00 end':"
-        " new days are drawn from them, instead of from `do` and `leisure`",
+        description="recorded days, '07:00 wash, 07:20 work, …, 23:00 sleep, 31:00 end': new days"
+        " are drawn from them, instead of from `do` and `leisure`",
     )
 
     @model_validator(mode="before")
@@ -187,14 +189,14 @@ class DayTemplate(Settings):
         while len(done) < len(self.do):
             ready = [n for n, t in self.do.items() if n not in done and done.issuperset(t.after)]
             if not ready:
-                left = ", ".join(n for n in self.do if n not in done)
-                raise problem_at(("do",), f"these tasks wait for each other: {left}")
+                waiting = ", ".join(n for n in self.do if n not in done)
+                raise problem_at(("do",), f"these tasks wait for each other: {waiting}")
             done.update(ready)
         return self
 
     @property
     def weekdays(self) -> set[int]:
-        """The days of the week it holds on, 0 = Monday."""
+        """The days of the week on which it holds, 0 = Monday."""
         return weekdays_of(self.on)
 
 
@@ -205,30 +207,31 @@ def holds_on(dates: Dates, day: date) -> bool:
 
 
 class Persona(Settings):
-    """Who somebody is: how they walk, what they do, and when."""
+    """A person: walking speed, manners, activities, and the templates of the days."""
 
-    about: str = Field(default="", description="who this is, for people to read")
+    about: str = Field(default="", description="a description for people to read")
     pace: float = Field(
         default=1.0, ge=0.1, le=3, description="walking speed, as a multiple of the body's"
     )
     manners: Manners = Field(
         default=Manners(),
-        description="how it reacts to robots where it has the behavior `reactions`",
+        description="how the person reacts to robots, with the behavior `reactions`",
     )
     activities: dict[str, Activity] = Field(
-        default_factory=dict, description="activities of its own, or changed ones"
+        default_factory=dict, description="new activities, or changed ones of the catalogue"
     )
     leisure: dict[str, AnyPastime] = Field(
-        default_factory=lambda: {"rest": Pastime()}, description="what fills the rest of a day"
+        default_factory=lambda: {"rest": Pastime()},
+        description="what fills the time between the tasks of a day",
     )
     needs: dict[str, AnyNeed] = Field(
         default_factory=lambda: dict(usual_needs()),
         description="what builds up and interrupts a day, by name; left out: an adult's;"
-        " null: nothing",
+        " null: none",
     )
     errands: dict[str, AnyErrand] = Field(
         default_factory=lambda: dict(usual_errands()),
-        description="short ways between activities, by name; left out: an adult's; null: none",
+        description="short tasks between activities, by name; left out: an adult's; null: none",
     )
     days: dict[str, DayTemplate] = Field(min_length=1, description="the kinds of days, by name")
 
@@ -243,40 +246,40 @@ class Persona(Settings):
             for task, fields in day.do.items():
                 self._check_activity(fields.activity or task, ("days", name, "do", task))
             for recorded in day.recorded:
-                for what in recorded.activities:
-                    self._check_activity(what, ("days", name, "recorded"))
+                for activity in recorded.activities:
+                    self._check_activity(activity, ("days", name, "recorded"))
             for pastime in day.leisure or ():
                 self._check_activity(pastime, ("days", name, "leisure", pastime))
         for pastime in self.leisure:
             self._check_activity(pastime, ("leisure", pastime))
-        for where, name in named_activities(self.needs, self.errands):
-            self._check_activity(name, where)
+        for key, name in named_activities(self.needs, self.errands):
+            self._check_activity(name, key)
         covered = {weekday for day in self.days.values() for weekday in day.weekdays}
         if missing := [WEEKDAYS[i] for i in range(7) if i not in covered]:
             raise problem_at(
-                ("days",), f"no day is described for {', '.join(missing)}: say so by 'on'"
+                ("days",), f"no day is described for {', '.join(missing)}: add them to 'on'"
             )
         check(self)
         return self
 
     @cached_property
     def plans(self) -> dict[str, DayPlan]:
-        """What the planner uses of each kind of day."""
+        """The plan of each template, for the planner, by the template's name."""
         return day_plans(self)
 
     @cached_property
-    def body(self) -> Body:
-        """What the planner uses of its needs and errands."""
-        return body_of(self.needs, self.errands, {**catalogue(), **self.activities})
+    def interruptions(self) -> InterruptionRules:
+        """The rules of its needs and errands."""
+        return interruption_rules(self.needs, self.errands, {**catalogue(), **self.activities})
 
-    def _check_activity(self, name: str, where: tuple[str, ...]) -> None:
+    def _check_activity(self, name: str, key: tuple[str, ...]) -> None:
         try:
             self.activity(name)
         except ValueError as error:
-            raise problem_at(where, str(error)) from None
+            raise problem_at(key, str(error)) from None
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> "Persona":
-        """Return itself: nothing in it changes."""
+        """Return itself, as personas never change."""
         return self
 
     def activity(self, name: str) -> Activity:
@@ -285,7 +288,7 @@ class Persona(Settings):
 
     @cached_property
     def used_activities(self) -> dict[str, Activity]:
-        """The activities that its days may hold, by name."""
+        """The activities that its days may have, by name."""
         names = {job.activity for plan in self.plans.values() for job in plan.jobs}
         names |= {fill.activity for plan in self.plans.values() for fill in plan.fills}
         names |= {n for day in self.days.values() for r in day.recorded for n in r.activities}
@@ -293,7 +296,7 @@ class Persona(Settings):
         return {name: self.activity(name) for name in sorted(names | {REST, SLEEP})}
 
     def day(self, day: date) -> str:
-        """Return the name of the template of a date: the last of those that fit."""
+        """Return the name of the template of a date: of several, the last one."""
         names = list(self.days)
         for name in reversed(names):
             if holds_on(self.days[name].dates, day):
@@ -302,7 +305,7 @@ class Persona(Settings):
 
 
 def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
-    """Drop named entries that are null: how one removes what a persona below has."""
+    """Drop entries that are null: with null, a persona removes an entry of the one it extends."""
     if not isinstance(data, Mapping):
         return data
     result = dict(data)
@@ -323,22 +326,26 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
     """
     if isinstance(value, Persona) or (isinstance(value, Mapping) and "extends" not in value):
         return value
-    if isinstance(value, str) and value in bundled() and not chain:
+    if isinstance(value, str) and value in bundled_names() and not chain:
         return bundled_persona(str(value))
     if isinstance(value, Mapping):
         below = read_persona(value["extends"], (*chain, ""))
-        return merged(below, {key: v for key, v in value.items() if key != "extends"})
+        return merge(below, {key: v for key, v in value.items() if key != "extends"})
     if not isinstance(value, str | Path) or not str(value):
         raise problem(
-            f"found {shown(value)}; a persona is wanted: one of {', '.join(bundled())}, a YAML"
+            f"found {shown(value)}; a persona is wanted: one of {', '.join(bundled_names())}, a YAML"
             " file, or a mapping like {extends: retired, pace: 0.8}"
         )
     bundled_file = BUNDLED / f"{value}.yaml"
-    path = bundled_file if str(value) in bundled() else folder_of(value) / Path(value).expanduser()
+    path = (
+        bundled_file
+        if str(value) in bundled_names()
+        else folder_of(value) / Path(value).expanduser()
+    )
     if not path.is_file():
         raise problem(
-            f"there is no persona {str(value)!r}{did_you_mean(value, bundled())} There are:"
-            f" {', '.join(bundled())}; your own is the path of a YAML file"
+            f"there is no persona {str(value)!r}{did_you_mean(value, bundled_names())} There are:"
+            f" {', '.join(bundled_names())}; your own is the path of a YAML file"
         )
     if str(path.resolve()) in chain:
         raise problem(f"the persona {path.name} extends itself")
@@ -350,21 +357,21 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
 
 
 @cache
-def bundled() -> list[str]:
+def bundled_names() -> list[str]:
     """Return the names of the personas that come with Fleet2D.
 
-    >>> bundled()
+    >>> bundled_names()
     ['child', 'night_shift', 'retired', 'student', 'works_from_home', 'works_outside']
     """
     return sorted(path.stem for path in BUNDLED.glob("*.yaml"))
 
 
-def merged(below: Any, above: Any) -> Any:
+def merge(below: Any, above: Any) -> Any:
     """Return plain data changed by other plain data: mappings key by key, all else replaced."""
     if isinstance(below, Mapping) and isinstance(above, Mapping):
         keys = dict.fromkeys((*below, *above))
         return {
-            key: merged(below[key], above[key])
+            key: merge(below[key], above[key])
             if key in below and key in above
             else (above if key in above else below)[key]
             for key in keys
@@ -372,22 +379,23 @@ def merged(below: Any, above: Any) -> Any:
     return above
 
 
-_READ: dict[str, Persona] = {}  # bundled personas that were asked for
+_LOADED: dict[str, Persona] = {}  # bundled personas, by name
 
 
 def bundled_persona(name: str) -> Persona:
     """Return a persona that comes with Fleet2D: the same each time."""
-    if name not in _READ:
-        _READ[name] = Persona.model_validate(read_document(BUNDLED / f"{name}.yaml").data)
-    return _READ[name]
+    if name not in _LOADED:
+        _LOADED[name] = Persona.model_validate(read_document(BUNDLED / f"{name}.yaml").data)
+    return _LOADED[name]
 
 
 def _dump(persona: Persona, dump: SerializerFunctionWrapHandler) -> Any:
-    """Write the name of a bundled persona, any other whole: no stored run depends on its file."""
-    return next((name for name, read in _READ.items() if read is persona), None) or dump(persona)
+    """Write a bundled persona by its name, and others in full: no run depends on their files."""
+    name = next((name for name, loaded in _LOADED.items() if loaded is persona), None)
+    return name or dump(persona)
 
 
 AnyPersona = Annotated[
-    Persona, BeforeValidator(read_persona), WrapSerializer(_dump), OrWritten("text", "extension")
+    Persona, BeforeValidator(read_persona), WrapSerializer(_dump), SchemaForms("text", "extension")
 ]
 """A persona in a scenario: a bundled name, a file, or a mapping that may extend either."""

@@ -1,21 +1,21 @@
-"""The planner of days: from a template to a day that keeps every constraint, drawn at random.
+"""The planner of days: draws a random day that satisfies all constraints of a template.
 
-A day goes from waking to the next waking. It is a chain of jobs in a drawn order. With windows for
-their beginnings and bounds on their durations that is a simple temporal network, which two passes
-solve: forward for the earliest beginnings, backward for the latest. Beginnings and durations are
-then drawn from left to right, cut to what the backward pass leaves, so that no draw makes the rest
-impossible. (In the manner of Idrees, Singh, Xu and Glas: "A Framework for Realistic Simulation of
-Daily Human Activity", 2023, arXiv 2311.15400, who propagate constraints both ways through a day.)
+A day lasts from waking to the next waking. It is a chain of jobs in a drawn order. With windows for
+their begins and bounds on their durations, it is a simple temporal network, which two passes solve:
+forward for the earliest begins, backward for the latest. Begins and durations are then drawn in
+order, within the bounds of the backward pass, so that no draw makes the rest impossible. (Similar
+to Idrees, Singh, Xu and Glas: "A Framework for Realistic Simulation of Daily Human Activity", 2023,
+arXiv 2311.15400, who propagate constraints both ways through a day.)
 
-Where the jobs of a day don't fit, another order is drawn, a few times; then one is left out by a
-rule: of those that needn't be done every day, the one that is done on the fewest days.
+If the jobs of a day don't fit, another order is drawn, a few times; then one job is left out: of
+those that aren't needed every day, the one that is done on the fewest days.
 """
 
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from fleet2d.routines.busy import ANY_ROOM, Busy
-from fleet2d.routines.laws import Law, weighted
+from fleet2d.routines.laws import Law, draw_weighted
+from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -23,25 +23,26 @@ if TYPE_CHECKING:
 
 DAY_S = 86_400
 ORDERS = 5  # drawn before a job is left out
-# A wait shorter than this isn't worth starting something else: what is next begins at once.
+# A gap shorter than this is not filled: the next doing begins at once [s].
 NO_GAP_S = 300
 MILLION = 1_000_000
-NEVER = 1 << 40  # a time that nobody sees [s]
+NEVER = 1 << 40  # later than any time [s]
 PLANNED, INTERRUPTS, RESUMES, FINISHES = 0, 1, 2, 3
 REST = "rest"
 SLEEP = "sleep"
 
 
 class Doing(NamedTuple):
-    """A stretch of a day in which one thing is done.
+    """A part of a day in which one activity is done.
 
     Attributes:
-        activity: What.
-        begin: When [s since the midnight of the day's date].
-        end: When it is over, and the next one begins.
-        task: The task that it is in the template; empty for what fills the time, and for sleep.
-        room: The room where it is done, by index, if its household has chosen one; else -1.
-        role: Whether it was PLANNED, INTERRUPTS what was, RESUMES that afterwards, or FINISHES it.
+        activity: The activity.
+        begin: Its begin [s since the midnight of the day's date].
+        end: Its end, which is the begin of the next doing.
+        task: The template's task; empty for pastimes and sleep.
+        room: The index of its room, if its household has chosen one; else -1.
+        role: PLANNED, or of an interruption: INTERRUPTS a planned doing, RESUMES it afterwards, or
+            FINISHES it, so that it isn't resumed.
     """
 
     activity: str
@@ -53,18 +54,18 @@ class Doing(NamedTuple):
 
 
 class Job(NamedTuple):
-    """A task as the planner uses it; times in seconds since the day's midnight.
+    """A task in the form that the planner uses; times in seconds since the day's midnight.
 
     Attributes:
-        task: Its name.
-        activity: What is done.
-        starts: When it begins; None: at once after what it follows, on waking or before bed.
-        takes: How long.
-        until: It is over by then.
-        after: The jobs before it, by index; all have lower ones.
-        chance: On how many of a million days it is done.
-        needed: Whether it must not be left out where a day is too full.
-        exclusive: Whether it has to wait while others of the household do the like.
+        task: The name of the task.
+        activity: Its activity.
+        starts: The law of its begin; None: right after the job before it, on waking or before bed.
+        takes: The law of its duration.
+        until: Its latest end.
+        after: The indices of the jobs before it, all lower than its own.
+        chance: Its probability on a day [per million].
+        needed: Whether it must not be left out if a day is too full.
+        exclusive: Whether it needs a room that no other member of the household uses.
         place: -1 on waking, 1 before bed, else 0.
     """
 
@@ -81,12 +82,12 @@ class Job(NamedTuple):
 
     @property
     def follows(self) -> bool:
-        """Whether it begins as soon as another is over."""
+        """Whether it begins right after another job."""
         return self.starts is None and self.place == 0
 
 
 class Fill(NamedTuple):
-    """A pastime as the planner uses it: it may begin from `first` to `last`."""
+    """A pastime in the form that the planner uses; it may begin from `first` to `last` [s]."""
 
     activity: str
     weight: int
@@ -96,7 +97,17 @@ class Fill(NamedTuple):
 
 
 class DayPlan(NamedTuple):
-    """A template as the planner uses it; days are drawn from `recorded` ones where it has them."""
+    """A template in the form that the planner uses; with `recorded` days, new ones resemble those.
+
+    Attributes:
+        name: The name of the template.
+        wake: The law of waking [s].
+        sleep: The law of going to bed [s].
+        least_sleep: The least duration of sleep [s].
+        jobs: The tasks.
+        fills: The pastimes.
+        recorded: The recorded days, if the template has some.
+    """
 
     name: str
     wake: Law
@@ -108,10 +119,16 @@ class DayPlan(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """Jobs in order, when each would like to begin, and the latest that it can; sleep last."""
+    """Jobs in order, with sleep as an additional last one in `preferred` and `latest`.
+
+    Attributes:
+        jobs: The jobs.
+        preferred: The drawn begin of each [s].
+        latest: The latest possible begin of each [s].
+    """
 
     jobs: list[Job]
-    wished: list[int]
+    preferred: list[int]
     latest: list[int]
 
 
@@ -120,52 +137,53 @@ def plan_day(
     draws: Draws,
     wake: int,
     next_wake: int,
-    busy: Busy | None = None,
+    occupancy: Occupancy | None = None,
 ) -> list[Doing]:
     """Draw a day.
 
     Args:
-        plan: The day's template.
-        draws: Its random draws.
-        wake: When it begins [s since its midnight].
+        plan: The plan of the day's template.
+        draws: The day's random draws.
+        wake: When the day begins [s since its midnight].
         next_wake: When the next day begins [s since its midnight].
-        busy: When the rooms that only one can use are in use by others; None: never.
+        occupancy: When others use private rooms; None: never.
 
     Returns:
-        What is done from `wake` to `next_wake`, without a gap.
+        The doings from `wake` to `next_wake`, without a gap.
     """
     chain = _feasible_chain(plan, draws, wake, next_wake)
     day: list[Doing] = []
     now = wake
     for i, job in enumerate(chain.jobs):
         end_by = min(job.until, chain.latest[i + 1])
-        begin = min(_next_begin(job, now, chain.wished[i]), chain.latest[i])
+        begin = min(_next_begin(job, now, chain.preferred[i]), chain.latest[i])
         room = ANY_ROOM
-        if busy is not None and (job.exclusive or job.activity in busy.rooms):
-            free = busy.free(job.activity, begin, chain.latest[i], job.takes.shortest, end_by)
-            if free is None:  # others are in there all the time: the day goes on without
+        if occupancy is not None and (job.exclusive or job.activity in occupancy.rooms):
+            shortest = job.takes.shortest
+            slot = occupancy.free(job.activity, begin, chain.latest[i], shortest, end_by)
+            if slot is None:  # others use its rooms all the time: it is left out
                 continue
-            begin, end_by, room = free
+            begin, end_by, room = slot
         end = begin + job.takes.draw(draws, None, end_by - begin)
         _fill(plan.fills, day, draws, now, begin)
         day.append(Doing(job.activity, begin, end, job.task, room))
         now = end
-    bed = min(max(now, chain.wished[-1]), chain.latest[-1])
+    bed = min(max(now, chain.preferred[-1]), chain.latest[-1])
     bed = now if bed - now < NO_GAP_S and now >= plan.sleep.shortest else bed
     _fill(plan.fills, day, draws, now, bed)
     day.append(Doing(SLEEP, bed, next_wake))
     return day
 
 
-def _next_begin(job: Job, now: int, wished: int) -> int:
-    """Return when a job would begin: as wished, and at once rather than after a short wait."""
-    begin = max(now, wished)
-    at_once = begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now)
-    return now if at_once else begin
+def _next_begin(job: Job, now: int, preferred: int) -> int:
+    """Return the begin of a job: the preferred one, or `now` if that is only a little earlier."""
+    begin = max(now, preferred)
+    is_soon = begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now)
+    return now if is_soon else begin
 
 
 def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> Chain:
-    """Draw what is done and in which order until it fits."""
+    """Draw jobs and their order, until they fit into the day."""
     chosen = {i for i, job in enumerate(plan.jobs) if draws.below(MILLION) < job.chance}
     tries = 0
     while True:
@@ -174,14 +192,14 @@ def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> C
             return chain
         tries += 1
         if tries % ORDERS == 0:
-            left_out = _least_needed(plan.jobs, chosen)
-            if left_out is None:
+            job = _least_needed(plan.jobs, chosen)
+            if job is None:
                 raise RuntimeError(f"no order of the tasks of day {plan.name!r} fits")
-            chosen.remove(left_out)
+            chosen.remove(job)
 
 
 def _least_needed(jobs: Sequence[Job], chosen: Collection[int]) -> int | None:
-    """Return the job to leave out first: done on the fewest days, of equal ones the last."""
+    """Return the index of the job to leave out: the least probable, of equal ones the last."""
     return min(
         (i for i in chosen if not jobs[i].needed), key=lambda i: (jobs[i].chance, -i), default=None
     )
@@ -195,45 +213,45 @@ def draw_chain(
     next_wake: int,
     by_deadline: bool = False,
 ) -> Chain:
-    """Order the chosen jobs by the times at which they would like to begin.
+    """Draw preferred begins of the chosen jobs, and order the jobs by them.
 
     Args:
-        plan: The day's template.
-        draws: Its random draws.
-        chosen: The jobs to do, by index.
+        plan: The plan of the day's template.
+        draws: The day's random draws.
+        chosen: The indices of the jobs to do.
         wake: When the day begins [s].
-        next_wake: When the next one begins [s].
-        by_deadline: Order them by the latest times at which they may begin instead.
+        next_wake: When the next day begins [s].
+        by_deadline: Order them by their latest begins instead.
     """
     latest_bed = min(plan.sleep.longest, next_wake - plan.least_sleep)
     bed = plan.sleep.draw(draws, None, latest_bed)
-    wished: dict[int, int] = {}
+    preferred: dict[int, int] = {}
     ranks: dict[int, tuple[int, int, int]] = {}  # part of the day, time, index
     for i, job in enumerate(plan.jobs):
-        before = [k for k in job.after if k in wished]
+        before = [k for k in job.after if k in preferred]
         if i not in chosen or (job.follows and not before):
             continue
-        part, wish = job.place, wake
+        part, begin = job.place, wake
         if job.starts is not None:
-            wish = job.starts.draw(draws)
+            begin = job.starts.draw(draws)
         elif job.place > 0:
-            wish = bed - job.takes.knots[len(job.takes.knots) // 2]
+            begin = bed - job.takes.knots[len(job.takes.knots) // 2]
         elif before:
             part = -1
-        wished[i] = max([wish, *(wished[k] for k in before)])
-        rank = job.starts.longest if by_deadline and job.starts is not None else wish
+        preferred[i] = max([begin, *(preferred[k] for k in before)])
+        rank = job.starts.longest if by_deadline and job.starts is not None else begin
         ranks[i] = (
             max([part, *(ranks[k][0] for k in before)]),
             max([rank, *(ranks[k][1] for k in before)]),
             i,
         )
-    order = sorted(wished, key=lambda i: ranks[i])
+    order = sorted(preferred, key=lambda i: ranks[i])
     jobs = [plan.jobs[i] for i in order]
-    return Chain(jobs, [*(wished[i] for i in order), bed], _latest(jobs, latest_bed))
+    return Chain(jobs, [*(preferred[i] for i in order), bed], _latest(jobs, latest_bed))
 
 
 def _latest(jobs: Sequence[Job], bed: int) -> list[int]:
-    """Return how late each job may begin so that the rest still fits before `bed`; that last."""
+    """Return the latest begin of each job so that all later ones fit before `bed`, and `bed`."""
     latest = [bed]
     for job in reversed(jobs):
         last = min(job.until, latest[-1]) - job.takes.shortest
@@ -242,7 +260,7 @@ def _latest(jobs: Sequence[Job], bed: int) -> list[int]:
 
 
 def fits(plan: DayPlan, chain: Chain, wake: int) -> bool:
-    """Tell whether every job of a chain can begin as late as it has to, in a day from `wake`."""
+    """Tell whether all jobs of a chain fit into a day that begins at `wake`."""
     earliest = wake
     for job, last in zip(chain.jobs, chain.latest, strict=False):
         if job.starts is not None:
@@ -254,7 +272,7 @@ def fits(plan: DayPlan, chain: Chain, wake: int) -> bool:
 
 
 def _fill(fills: Sequence[Fill], day: list[Doing], draws: Draws, begin: int, end: int) -> None:
-    """Fill the time from `begin` to `end` with pastimes; with rest where none fits."""
+    """Fill the time from `begin` to `end` with pastimes, and with rest where no pastime fits."""
     while begin < end:
         last = day[-1].activity if day else ""
         options = [
@@ -272,7 +290,7 @@ def _fill(fills: Sequence[Fill], day: list[Doing], draws: Draws, begin: int, end
                 day.append(Doing(REST, begin, over))
             begin = over
             continue
-        fill = options[weighted(draws, [fill.weight for fill in options])]
+        fill = options[draw_weighted(draws, [fill.weight for fill in options])]
         over = begin + fill.takes.draw(draws, None, end - begin)
         if end - over < NO_GAP_S and end - begin <= fill.takes.longest:
             over = end

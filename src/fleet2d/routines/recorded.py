@@ -1,9 +1,9 @@
-"""Recorded days: days of a log as they were lived, and new ones that go from one to another.
+"""Recorded days: days of a log, and new days that switch between recorded ones.
 
-A day is drawn by following a recorded one. Where what one does is over at about the time of day at
-which the same was over on another recorded day, one may go on with that day instead. So durations
-and hours are those of the log, and yet no two days need be alike. (Local resampling, as with k
-nearest neighbours by Lall and Sharma 1996, Water Resources Research 32:679.)
+A day is drawn by following a recorded one. When an activity ends at about the time of day at which
+the same activity ended on another recorded day, the new day may continue with that one instead. So
+durations and hours are those of the log, but new days differ from the recorded ones. (Local
+resampling, as with k nearest neighbours by Lall and Sharma 1996, Water Resources Research 32:679.)
 """
 
 from bisect import bisect_left, bisect_right
@@ -14,25 +14,26 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.problems import problem
-from fleet2d.routines.busy import ANY_ROOM, Busy
+from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
 from fleet2d.routines.planner import SLEEP, Doing, Job
 from fleet2d.streams import Draws
 
-# How likely one goes on with another day where one can, of 16, and how far apart both may be [s].
+# Probability of a switch to another day where one is possible [in 16ths], and the largest distance
+# between the times of both days [s].
 CROSSING, REACH_S = 6, 1200
-# A doing takes up an earlier or later beginning if it lasts so many times as long.
+# A doing that lasts at least this many times the shift ends at its recorded time.
 TAKES_UP = 4
-LEAST_S = 30
+LEAST_S = 30  # the least duration of a doing
 END = "end"
 
 
 class RecordedDay(NamedTuple):
-    """A day as it was lived: from when on which activity is done [s of its midnight].
+    """A recorded day; times in seconds since its midnight.
 
     Attributes:
-        begins: When each begins, rising.
-        activities: What, of each; the last is sleep.
-        end: When the next day begins.
+        begins: The begin of each activity, ascending.
+        activities: The activities; the last one is sleep.
+        end: The begin of the next day.
     """
 
     begins: tuple[int, ...]
@@ -70,7 +71,7 @@ def parse_day(value: Any) -> RecordedDay:
 
 
 def write_day(day: RecordedDay) -> str:
-    """Write a recorded day as it is read."""
+    """Write a recorded day in the form that `parse_day` reads."""
     entries = [*zip(day.begins, day.activities, strict=True), (day.end, END)]
     return ", ".join(f"{at // 3600:02}:{at // 60 % 60:02} {name}" for at, name in entries)
 
@@ -86,49 +87,50 @@ AnyRecordedDay = Annotated[
 
 
 class Recording(NamedTuple):
-    """Recorded days, as days are drawn from them.
+    """Recorded days, with an index of the ends of their activities.
 
     Attributes:
-        days: They.
-        endings: For each activity, when it was over, rising [s], and of which day and which number.
+        days: The recorded days.
+        endings: For each activity, the times at which it ended, ascending [s], and the numbers of
+            the day and of the activity in the day for each of them.
     """
 
     days: tuple[RecordedDay, ...]
     endings: dict[str, tuple[list[int], list[tuple[int, int]]]]
 
 
-def recording(days: Iterable[RecordedDay]) -> Recording:
-    """Return recorded days as days are drawn from them."""
-    kept = tuple(days)
-    found: dict[str, list[tuple[int, tuple[int, int]]]] = {}
-    for d, day in enumerate(kept):
+def to_recording(days: Sequence[RecordedDay]) -> Recording:
+    """Return recorded days with the index of their endings."""
+    ends: dict[str, list[tuple[int, tuple[int, int]]]] = {}
+    for d, day in enumerate(days):
         for i, name in enumerate(day.activities[:-1]):
-            found.setdefault(name, []).append((day.begins[i + 1], (d, i)))
-    endings = {name: sorted(ends) for name, ends in found.items()}
-    return Recording(
-        kept, {name: ([t for t, _ in e], [at for _, at in e]) for name, e in endings.items()}
-    )
+            ends.setdefault(name, []).append((day.begins[i + 1], (d, i)))
+    endings = {}
+    for name, of_activity in ends.items():
+        of_activity.sort()
+        endings[name] = ([time for time, _ in of_activity], [at for _, at in of_activity])
+    return Recording(tuple(days), endings)
 
 
-def source(kept: Recording, draws: Draws) -> int:
-    """Draw the recorded day with which a day begins, by its number."""
-    return draws.below(len(kept.days))
+def draw_source(recording: Recording, draws: Draws) -> int:
+    """Draw the number of the recorded day with which a new day begins."""
+    return draws.below(len(recording.days))
 
 
-def draw_recorded(kept: Recording, first: int, draws: Draws, next_wake: int) -> list[Doing]:
-    """Draw a day that begins as a recorded one.
+def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int) -> list[Doing]:
+    """Draw a day that begins like a recorded one.
 
     Args:
-        kept: The recorded days.
-        first: The number of the one that it begins as.
-        draws: Its random draws.
+        recording: The recorded days.
+        first: The number of the recorded day that it begins like.
+        draws: The day's random draws.
         next_wake: When the next day begins [s].
 
     Returns:
-        What is done until `next_wake`, without a gap; it ends asleep.
+        The doings until `next_wake`, without a gap; the last one is sleep.
     """
     d, i = first, 0
-    day = kept.days[d]
+    day = recording.days[d]
     now, shift = day.begins[0], 0
     result: list[Doing] = []
     while i < len(day.activities) - 1 and now < next_wake - LEAST_S:
@@ -139,8 +141,8 @@ def draw_recorded(kept: Recording, first: int, draws: Draws, next_wake: int) -> 
         result.append(Doing(day.activities[i], now, end))
         now = end
         if draws.below(16) < CROSSING:
-            d, i = _elsewhere(kept, day.activities[i], now, draws) or (d, i)
-            day = kept.days[d]
+            d, i = _draw_ending(recording, day.activities[i], now, draws) or (d, i)
+            day = recording.days[d]
             shift = now - day.begins[i + 1]
         i += 1
     if now < next_wake:
@@ -150,15 +152,17 @@ def draw_recorded(kept: Recording, first: int, draws: Draws, next_wake: int) -> 
     return _joined(result)
 
 
-def _elsewhere(kept: Recording, activity: str, now: int, draws: Draws) -> tuple[int, int] | None:
-    """Draw where else an activity was over at about that time, if anywhere."""
-    times, where = kept.endings[activity]
+def _draw_ending(
+    recording: Recording, activity: str, now: int, draws: Draws
+) -> tuple[int, int] | None:
+    """Draw an ending of an activity at about a time: numbers of the day and of the activity."""
+    times, positions = recording.endings[activity]
     low, high = bisect_left(times, now - REACH_S), bisect_right(times, now + REACH_S)
-    return where[low + draws.below(high - low)] if high > low else None
+    return positions[low + draws.below(high - low)] if high > low else None
 
 
 def _joined(day: Sequence[Doing]) -> list[Doing]:
-    """Return a day in which nothing follows on the same."""
+    """Return a day in which successive doings of the same activity are joined."""
     result: list[Doing] = []
     for doing in day:
         if result and result[-1].activity == doing.activity:
@@ -168,26 +172,28 @@ def _joined(day: Sequence[Doing]) -> list[Doing]:
     return result
 
 
-def in_free_rooms(day: Sequence[Doing], alone: Iterable[str], busy: Busy | None) -> list[Doing]:
-    """Return a day in which rooms that others use are left to them: one goes on with what one did.
+def in_free_rooms(
+    day: Sequence[Doing], private: Iterable[str], occupancy: Occupancy | None
+) -> list[Doing]:
+    """Return a day without doings whose private rooms others use; the doing before lasts longer.
 
     Args:
-        day: What would be done.
-        alone: Activities that want a room to themselves.
-        busy: When others use such rooms; None: never.
+        day: The doings of the day.
+        private: The exclusive activities, which need a room that nobody else uses.
+        occupancy: When others use such rooms; None: never.
     """
-    if busy is None:
+    if occupancy is None:
         return list(day)
-    wanted, result = {*alone, *busy.rooms}, list[Doing]()
+    exclusive, result = {*private, *occupancy.rooms}, list[Doing]()
     begin = day[0].begin
     for doing in day:
         room = ANY_ROOM
-        if doing.activity in wanted:
-            long = doing.end - doing.begin
-            free = busy.free(doing.activity, doing.begin, doing.begin, long, doing.end)
-            if free is None or free.end < doing.end:
-                continue  # what was before goes on, or what is next begins earlier
-            room = free.room
+        if doing.activity in exclusive:
+            duration = doing.end - doing.begin
+            slot = occupancy.free(doing.activity, doing.begin, doing.begin, duration, doing.end)
+            if slot is None or slot.end < doing.end:
+                continue  # the doing before lasts longer, or the next one begins earlier
+            room = slot.room
         if result:
             result[-1] = result[-1]._replace(end=doing.begin)
         result.append(doing._replace(begin=doing.begin if result else begin, room=room))
@@ -197,7 +203,7 @@ def in_free_rooms(day: Sequence[Doing], alone: Iterable[str], busy: Busy | None)
 
 
 def with_jobs(day: Sequence[Doing], jobs: Iterable[Job]) -> list[Doing]:
-    """Return a day with what is done together in place of what would be, unless one sleeps."""
+    """Return a day with joint jobs in place of what is planned then, unless the person sleeps."""
     for job in jobs:
         assert job.starts is not None
         begin = job.starts.shortest

@@ -1,17 +1,17 @@
-"""Time use as a survey found it, and lives whose shares follow it.
+"""Time use of a survey, and random days whose shares of activities are those of the survey.
 
-The survey says which share of people does what at each hour. A person goes through the day in steps
-of ten minutes. From one step to the next, those whose episode is over by its law of durations
-leave, and as many more of an activity as it has to shrink by; everybody who left goes where people
-are wanted. With the numbers of people by activity and age of episode followed through the week,
-both can be worked out beforehand, so that every person draws alone and yet the shares come out
-exactly, but for chance:
+The survey has the share of people who do each activity at each hour. A person's day is a Markov
+chain in steps of ten minutes. After a step, an episode ends by its law of durations, or because the
+share of its activity has to shrink; then the next activity is drawn by the shares that have to
+grow. The probabilities of both are computed beforehand, by following the shares of people by
+activity and age of their episode through a week. So every person is drawn independently, and the
+expected shares are exactly those of the survey:
 
-    stay(a, age) = (1 - hazard(a, age)) * min(1, wanted(a) / would stay(a))
-    go to b      ~ wanted(b) - staying(b)
+    stay(a, age)  = (1 - hazard(a, age)) * min(1, target(a) / stayers(a))
+    next(b)       ~ target(b) - staying(b)
 
-A leaver who draws what they did before just goes on. Durations so follow the survey's means where
-the shares leave room for it.
+An episode whose next activity is the same continues. Durations have the survey's means as far as
+the shares allow.
 """
 
 import json
@@ -36,39 +36,40 @@ STEP_S = 600
 DAY_STEPS = 144
 WEEK_STEPS = 7 * DAY_STEPS
 DAWN_S = 4 * 3600  # the survey's days begin at 04:00
-AGES = 96  # steps that an episode's age is followed; older ones count as that old
+AGES = 96  # the largest age of an episode that is distinguished [steps]
 ONE = 1 << 24
 WARM_UP_WEEKS = 2
-SLEEP_S = (8 * 3600, 3600)  # the survey cuts nights at 04:00, so its mean is of no use
-SPREAD = 0.6  # of an episode's duration, beside its mean
+SLEEP_S = (8 * 3600, 3600)  # mean and deviation; the survey's mean is of nights cut at 04:00
+SPREAD = 0.6  # standard deviation of an episode's duration, relative to its mean
 
 F64 = NDArray[np.float64]
 
 
-class Block(NamedTuple):
-    """A stretch of time in one category [s since the midnight of the day's date]."""
+class Episode(NamedTuple):
+    """A time spent in one category; times in seconds since the midnight of the day's date."""
 
     category: str
     begin: int
     end: int
 
 
-class State(NamedTuple):
-    """What somebody is in the middle of: the category's number, and since how many steps."""
+class EpisodeState(NamedTuple):
+    """The episode that a person is in: the category's number, and the episode's age [steps]."""
 
     category: int
     age: int
 
 
-class Group(NamedTuple):
-    """A group of people, worked out.
+class SurveyGroup(NamedTuple):
+    """A group of people, with the probabilities of its Markov chain.
 
     Attributes:
-        name: What it is called.
-        facts: What the table says of it.
-        leave: int32 (WEEK_STEPS, 9, AGES), how likely one leaves after a step, of ONE.
-        enter: int32 (WEEK_STEPS, 9), where leavers go: cumulative, of ONE.
-        people: float64 (7, 9, AGES), shares by activity and age at each day's beginning.
+        name: The name of the group.
+        facts: Its entry in the survey's table.
+        leave: Probability that an episode ends after a step, in parts of ONE, int32 (WEEK_STEPS, 9,
+            AGES).
+        enter: Cumulative probability of the next category, in parts of ONE, int32 (WEEK_STEPS, 9).
+        people: Shares of people by category and age at the begin of each day, float64 (7, 9, AGES).
     """
 
     name: str
@@ -81,8 +82,8 @@ class Group(NamedTuple):
 @cache
 def table() -> dict[str, Any]:
     """Return the survey's numbers."""
-    found: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
-    return found
+    numbers: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
+    return numbers
 
 
 def groups() -> list[str]:
@@ -103,92 +104,104 @@ def shares(group: str, kind: str) -> list[dict[str, float]]:
 
 
 @cache
-def group(name: str) -> Group:
-    """Work out a group's week."""
+def group(name: str) -> SurveyGroup:
+    """Compute the probabilities of a group for a week."""
     facts = table()["groups"][name]
-    wanted = _wanted(facts)
-    goes_on = np.array([_survival(facts, c) for c in CATEGORIES])
+    targets = _targets(facts)
+    survival = np.array([_survival(facts, c) for c in CATEGORIES])
     leave = np.empty((WEEK_STEPS, len(CATEGORIES), AGES), np.int32)
     enter = np.empty((WEEK_STEPS, len(CATEGORIES)), np.int32)
     people = np.empty((7, len(CATEGORIES), AGES))
     now = np.zeros((len(CATEGORIES), AGES))
-    now[:, 0] = wanted[0]
+    now[:, 0] = targets[0]
     for step in range((WARM_UP_WEEKS + 1) * WEEK_STEPS):
         k = step % WEEK_STEPS
         if k % DAY_STEPS == 0:
             people[k // DAY_STEPS] = now
-        stay, into, now = _next(now, wanted[(k + 1) % WEEK_STEPS], goes_on)
+        stay, into, now = _next(now, targets[(k + 1) % WEEK_STEPS], survival)
         leave[k] = (1 - stay) * ONE
         enter[k] = np.cumsum(into) * ONE
     enter[:, -1] = ONE
-    return Group(name, facts, leave, enter, people)
+    return SurveyGroup(name, facts, leave, enter, people)
 
 
-def _wanted(facts: dict[str, Any]) -> F64:
-    """Return the shares at each step of a week from Monday 04:00, (WEEK_STEPS, 9)."""
+def _targets(facts: dict[str, Any]) -> F64:
+    """Return the survey's shares at each step of a week from Monday 04:00, (WEEK_STEPS, 9)."""
     points = []
     for day in range(7):
         hours = np.array(facts["weekend" if day > 4 else "weekday"], np.float64) / 10_000
         points += [hours[hour % 24] for hour in range(4, 28)]
-    at = np.array(points)  # at 04:30, 05:30, …: three steps after each hour's beginning
-    wanted = np.empty((WEEK_STEPS, len(CATEGORIES)))
+    at = np.array(points)  # at 04:30, 05:30, …: three steps after each hour's begin
+    targets = np.empty((WEEK_STEPS, len(CATEGORIES)))
     for step in range(WEEK_STEPS):
         hour, part = divmod(step - 3, 6)
-        wanted[step] = (at[hour] * (6 - part) + at[(hour + 1) % 168] * part) / 6
-    return wanted
+        targets[step] = (at[hour] * (6 - part) + at[(hour + 1) % 168] * part) / 6
+    return targets
 
 
 def _survival(facts: dict[str, Any], category: str) -> list[float]:
-    """Return how likely an episode of each age outlives another step."""
+    """Return the probability that an episode of each age lasts another step."""
     mean_s = facts["minutes"].get(category, 60) * 60
     law = lognormal(*SLEEP_S) if category == "sleeping" else lognormal(mean_s, SPREAD * mean_s)
-    over = [_share_below(law, age * STEP_S) for age in range(AGES + 1)]
-    return [(1 - b) / (1 - a) if a < 1 else 0.5 for a, b in pairwise(over)]
+    ended = [_share_below(law, age * STEP_S) for age in range(AGES + 1)]
+    return [(1 - b) / (1 - a) if a < 1 else 0.5 for a, b in pairwise(ended)]
 
 
 def _share_below(law: Law, value: int) -> float:
     return position(law.knots, value) / ((KNOTS - 1) << 24)
 
 
-def _next(now: F64, wanted: F64, goes_on: F64) -> tuple[F64, F64, F64]:
-    """Take a population one step on: who stays, where the others go, and what comes of it."""
-    # Sums by cumsum: they are taken in order on every machine.
-    staying = now * goes_on
+def _next(now: F64, target: F64, survival: F64) -> tuple[F64, F64, F64]:
+    """Advance the shares of people by one step.
+
+    Args:
+        now: Shares by category and age, (9, AGES).
+        target: Shares by category after the step, (9,).
+        survival: Probability that an episode of each category and age lasts another step.
+
+    Returns:
+        Probability of staying by category and age, probability of each next category, and the
+        shares after the step.
+    """
+    # Sums by cumsum, which adds in the same order on every machine.
+    staying = now * survival
     stayers = np.cumsum(staying, axis=1)[:, -1]
-    keep = np.minimum(1.0, wanted / np.where(stayers > 0, stayers, 1.0))
-    stay = goes_on * keep[:, None]
-    gaps = np.maximum(wanted - stayers * keep, 0.0)
+    retained = np.minimum(1.0, target / np.where(stayers > 0, stayers, 1.0))
+    stay = survival * retained[:, None]
+    gaps = np.maximum(target - stayers * retained, 0.0)
     total = np.cumsum(gaps)[-1]
     into = gaps / total if total > 0 else np.full(len(gaps), 1 / len(gaps))
-    left = np.cumsum(now * (1 - stay), axis=1)[:, -1]
-    everybody = np.cumsum(left)[-1]
+    leavers = np.cumsum(now * (1 - stay), axis=1)[:, -1]
+    all_leavers = np.cumsum(leavers)[-1]
     after = np.zeros_like(now)
     older = now * (stay + (1 - stay) * into[:, None])
     after[:, 1:] = older[:, :-1]
     after[:, -1] += older[:, -1]
-    after[:, 0] = (everybody - left) * into
+    after[:, 0] = (all_leavers - leavers) * into
     return stay, into, after
 
 
-def first_state(group: Group, draws: Draws, ordinal: int) -> State:
-    """Draw what somebody is in the middle of when a day begins."""
+def first_state(group: SurveyGroup, draws: Draws, ordinal: int) -> EpisodeState:
+    """Draw the episode that a person is in when a day begins."""
     people = group.people[date.fromordinal(ordinal).weekday()]
     sums = np.cumsum(people.ravel())
     at = int(np.searchsorted(sums, draws.uniform() * sums[-1], side="right"))
-    return State(*divmod(min(at, sums.size - 1), AGES))
+    return EpisodeState(*divmod(min(at, sums.size - 1), AGES))
 
 
-def live(group: Group, draws: Draws, ordinal: int, state: State) -> tuple[Sequence[Block], State]:
-    """Draw a day, from 04:00 to the next.
+def draw_episodes(
+    group: SurveyGroup, draws: Draws, ordinal: int, state: EpisodeState
+) -> tuple[Sequence[Episode], EpisodeState]:
+    """Draw a day, from 04:00 to the next 04:00.
 
     Args:
-        group: Whose habits.
+        group: The person's group.
         draws: The day's random draws.
-        ordinal: The day, by its date's ordinal.
-        state: What one is in the middle of when it begins.
+        ordinal: The ordinal of the day's date.
+        state: The episode that the person is in when the day begins.
 
     Returns:
-        What is done, without a gap, and the state in which it ends.
+        The day's episodes, without a gap, and the state in which the day ends.
     """
     first = date.fromordinal(ordinal).weekday() * DAY_STEPS
     now, age = state
@@ -202,9 +215,9 @@ def live(group: Group, draws: Draws, ordinal: int, state: State) -> tuple[Sequen
         if goal == now:
             continue
         end = DAWN_S + k * STEP_S + 1 + draws.below(STEP_S)
-        blocks.append(Block(CATEGORIES[now], begin, end))
+        blocks.append(Episode(CATEGORIES[now], begin, end))
         now, age, begin = goal, 0, end
-    blocks.append(Block(CATEGORIES[now], begin, DAWN_S + DAY_STEPS * STEP_S))
+    blocks.append(Episode(CATEGORIES[now], begin, DAWN_S + DAY_STEPS * STEP_S))
     if blocks[-1].begin == blocks[-1].end:
         blocks.pop()
-    return blocks, State(now, age)
+    return blocks, EpisodeState(now, age)

@@ -1,4 +1,4 @@
-"""From the templates of a persona to what the planner uses, and whether their days are possible."""
+"""Plans of the templates of a persona, in the form of the planner, and checks that they work."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ from fleet2d.routines.planner import (
     draw_chain,
     fits,
 )
-from fleet2d.routines.recorded import recording
+from fleet2d.routines.recorded import to_recording
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
     from fleet2d.routines.persona import DayTemplate, Pastime, Persona, Task, Timing
 
-# A window that isn't given reaches this many standard deviations to both sides.
+# Half the width of a window that isn't given, in standard deviations.
 REACH = 2.5
-# Orders tried before a template is called impossible.
+# The number of orders that are tried before a template is refused.
 TRIALS = 60
 
 
 def clock(time_s: int) -> str:
-    """Write a time since midnight, as 'HH:MM', and that of the next day as such.
+    """Format a time since midnight as 'HH:MM', with the number of days if it isn't the same day.
 
     >>> clock(27_000), clock(90_000)
     ('07:30', '01:00 on the next day')
@@ -45,7 +45,7 @@ def clock(time_s: int) -> str:
 
 
 def span(time_s: int) -> str:
-    """Write a length of time.
+    """Format a duration in hours and minutes.
 
     >>> span(5400), span(300)
     ('1 h 30 min', '5 min')
@@ -55,7 +55,7 @@ def span(time_s: int) -> str:
 
 
 def day_plans(persona: "Persona") -> dict[str, DayPlan]:
-    """Return what the planner uses of each template, by its name."""
+    """Return the plan of each template, by the template's name."""
     return {name: _day_plan(persona, name, day) for name, day in persona.days.items()}
 
 
@@ -79,11 +79,11 @@ def _recorded_plan(name: str, day: "DayTemplate") -> DayPlan:
     wakes = [recorded.begins[0] for recorded in day.recorded]
     beds = [recorded.begins[-1] for recorded in day.recorded]
     wake, sleep = uniform(min(wakes), max(wakes)), uniform(min(beds), max(beds))
-    return DayPlan(name, wake, sleep, 0, (), (), recording(day.recorded))
+    return DayPlan(name, wake, sleep, 0, (), (), to_recording(day.recorded))
 
 
 def _in_order(tasks: dict[str, "Task"]) -> list[str]:
-    """Return the tasks' names, each behind those that come before it."""
+    """Return the names of the tasks, each after those that come before it."""
     order: list[str] = []
     while len(order) < len(tasks):
         order += [n for n, t in tasks.items() if n not in order and set(t.after) <= set(order)]
@@ -123,7 +123,7 @@ def _fill(persona: "Persona", activity: str, pastime: "Pastime", dawn: int) -> F
 
 
 def starts(timing: "Timing", dawn: int) -> Law:
-    """Return the law of when something begins [s], in a day that begins at `dawn` the earliest."""
+    """Return the law of a begin [s], in a day that begins at `dawn` or later."""
     if timing.at is None:
         if timing.between is None:
             return uniform(dawn, dawn + DAY_S)
@@ -141,35 +141,34 @@ def starts(timing: "Timing", dawn: int) -> Law:
 
 
 def window(between: "tuple[timedelta, timedelta]", dawn: int) -> tuple[int, int]:
-    """Return a window of times of day in seconds; one that ends before it begins goes on."""
+    """Return a window of times of day [s]; one that ends before it begins lasts past midnight."""
     first = of_day(between[0], dawn)
     return first, first + seconds(between[1] - between[0]) % DAY_S
 
 
 def of_day(time: "timedelta", dawn: int) -> int:
-    """Return a time of day in seconds; before the day begins, it is that of the next date."""
+    """Return a time of day [s]; one before `dawn` is that of the next date."""
     at = seconds(time)
     return at + DAY_S if at < dawn else at
 
 
 def check(persona: "Persona") -> None:
-    """Check that whatever is drawn, the days of a persona are possible.
+    """Check that the days of a persona are possible, for all random draws.
 
-    The worst day wakes as late as it can and is followed by one that wakes as early as it can.
+    The worst day begins as late as possible, and the day after it as early as possible.
 
     Raises:
-        ValidationError: A template can't be kept; says which tasks are in each other's way.
+        ValidationError: A template is impossible; the message names the tasks in conflict.
     """
     plans = persona.plans
     for name, plan in plans.items():
-        if plan.recorded is not None:  # as it was lived, it is possible
+        if plan.recorded is not None:  # recorded days are possible
             continue
         _check_appointments(name, plan)
         next_wake = DAY_S + min(plans[n].wake.shortest for n in _days_after(persona, name))
-        where = ("days", name)
         if next_wake - plan.least_sleep < plan.sleep.shortest:
             raise problem_at(
-                (*where, "sleep"),
+                ("days", name, "sleep"),
                 f"sleep begins at {clock(plan.sleep.shortest)} at the earliest, lasts"
                 f" {span(plan.least_sleep)} at least, and the next day may begin at"
                 f" {clock(next_wake)}: that is too short a night",
@@ -178,7 +177,7 @@ def check(persona: "Persona") -> None:
 
 
 def _days_after(persona: "Persona", name: str) -> set[str]:
-    """Return the templates that may follow one: by weekday, and all if it has dates."""
+    """Return the templates of days that may follow one: by weekday; all if any has dates."""
     days = persona.days
     if any(day.dates for day in days.values()):
         return set(days)
@@ -204,7 +203,7 @@ def _check_appointments(name: str, plan: DayPlan) -> None:
 
 
 def _check_room(name: str, plan: DayPlan, next_wake: int) -> None:
-    """Refuse a template of which the needed tasks don't fit in the shortest day."""
+    """Refuse a template whose needed tasks don't fit in the shortest day."""
     needed = {i for i, job in enumerate(plan.jobs) if job.needed}
     wake = plan.wake.longest
     key = np.uint64(0)
@@ -220,13 +219,13 @@ def _check_room(name: str, plan: DayPlan, next_wake: int) -> None:
 
 
 def _conflict(chain: Chain, wake: int) -> tuple[tuple[str, ...], str]:
-    """Return the key of the first job of a chain that can't be kept, and why, in words."""
+    """Return the key of the first impossible job of a chain, and a message with the reason."""
     names = [*(job.task for job in chain.jobs), "sleep"]
     now = wake
     for i, job in enumerate(chain.jobs):
         now = now if job.starts is None else max(now, job.starts.shortest)
         if now > chain.latest[i]:
-            until, takes = i, 0  # the first one from here on that can't wait for its own sake
+            until, takes = i, 0  # the first job from here on whose own window limits its begin
             while chain.latest[until] == chain.latest[until + 1] - chain.jobs[until].takes.shortest:
                 takes += chain.jobs[until].takes.shortest
                 until += 1

@@ -239,9 +239,9 @@ class PersonasAxis(Axis):
 
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each persona."""
-        from fleet2d.routines.persona import bundled
+        from fleet2d.routines.persona import bundled_names
 
-        personas = bundled() if self.personas == ("all",) else self.personas
+        personas = bundled_names() if self.personas == ("all",) else self.personas
         user = ("users", self.user)
         return [
             Choice(

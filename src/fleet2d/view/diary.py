@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from fleet2d.routines.interruptions import uninterrupted
+from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Doing
@@ -75,7 +75,7 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
     figure = Figure(figsize=(13, 1.2 + 0.55 * len(days)), layout="constrained")
     axes = figure.subplots()
     for row, (_, doings) in enumerate(days):
-        for doing in uninterrupted(doings):
+        for doing in without_interruptions(doings):
             span = (doing.begin / HOUR_S, (doing.end - doing.begin) / HOUR_S)
             axes.broken_barh([span], (row, 0.62), facecolors=colors[doing.activity])
         marks = [
@@ -98,7 +98,7 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
 
 
 def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:
-    names = {doing.activity for _, doings in days for doing in uninterrupted(doings)}
+    names = {doing.activity for _, doings in days for doing in without_interruptions(doings)}
     every = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
     palette = [color for i, color in enumerate(every) if i not in GREYS]
     home = [n for n in sorted(names) if n != "sleep" and not persona.activity(n).away]

@@ -14,7 +14,7 @@ from tests.scenes import run, scenario, table
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.routines import survey
-from fleet2d.routines.interruptions import uninterrupted
+from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.streams import Draws, stream_key
 
 HOUR = 3600
@@ -24,10 +24,10 @@ def users(count: int, **fields: Any) -> dict[str, Any]:
     return {f"user_{i}": {"type": "population", **fields} for i in range(count)}
 
 
-def apart(counts: Counter[str], wanted: dict[str, float]) -> float:
+def apart(counts: Counter[str], target: dict[str, float]) -> float:
     """The total variation distance of counted shares from the survey's."""
     total = sum(counts.values())
-    return sum(abs(counts[c] / total - share) for c, share in wanted.items()) / 2
+    return sum(abs(counts[c] / total - share) for c, share in target.items()) / 2
 
 
 def test_shares_of_a_thousand_people_follow_the_survey_hour_by_hour() -> None:
@@ -36,7 +36,7 @@ def test_shares_of_a_thousand_people_follow_the_survey_hour_by_hour() -> None:
     for actor in simulation.actors.values():
         for ordinal in range(MONDAY, MONDAY + 7):
             kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
-            day = iter(uninterrupted(actor.behaviors[0].day(ordinal)))
+            day = iter(without_interruptions(actor.behaviors[0].day(ordinal)))
             doing = next(day)
             for hour in range(4, 28):
                 while doing.end <= hour * HOUR + HOUR // 2:
@@ -67,10 +67,10 @@ def test_an_hour_of_television_lasts_as_long_as_in_the_survey() -> None:
         key = stream_key(4, f"users.{person}", "day")
         state = survey.first_state(group, Draws(key, 0), MONDAY)
         for ordinal in range(MONDAY, MONDAY + 14):
-            blocks, state = survey.live(group, Draws(key, ordinal), ordinal, state)
+            blocks, state = survey.draw_episodes(group, Draws(key, ordinal), ordinal, state)
             lasted += [b.end - b.begin for b in blocks if b.category == "tv"]
-    wanted = group.facts["minutes"]["tv"] * 60
-    assert wanted == pytest.approx(statistics.mean(lasted), rel=0.35)
+    target = group.facts["minutes"]["tv"] * 60
+    assert target == pytest.approx(statistics.mean(lasted), rel=0.35)
     # A geometric law has a standard deviation as large as its mean.
     assert statistics.pstdev(lasted) < 0.9 * statistics.mean(lasted)
 

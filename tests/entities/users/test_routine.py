@@ -16,7 +16,7 @@ import fleet2d
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.routines.activity import catalogue
-from fleet2d.routines.persona import bundled
+from fleet2d.routines.persona import bundled_names
 
 HOME = {"floorplan": {"type": "bundled", "furnish": True}}
 FAMILY = {
@@ -63,7 +63,7 @@ def family(duration: str = "2 d", **household: Any) -> dict[str, Any]:
     return {**scenario(duration, users=users), **HOME}
 
 
-@pytest.mark.parametrize("name", bundled())
+@pytest.mark.parametrize("name", bundled_names())
 def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name: str) -> None:
     stored = run(lives(name, "7 d"))
     told = set(table(stored, "events", event="activity")["detail"])

@@ -11,7 +11,7 @@ from fleet2d.entities.kinds import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spots
 from fleet2d.problems import problem
-from fleet2d.routines.activity import AnyTakes, Takes
+from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -32,12 +32,12 @@ class Pet(Behavior):
     rooms: tuple[str, ...] = Field(
         default=(), description="rooms and kinds of rooms that it may enter; none: all"
     )
-    nap: AnyTakes = Field(
-        default=Takes(mean=timedelta(minutes=50), std=timedelta(minutes=40)),
+    nap: AnyDurationLaw = Field(
+        default=DurationLaw(mean=timedelta(minutes=50), std=timedelta(minutes=40)),
         description="how long it sleeps at a time",
     )
-    stop: AnyTakes = Field(
-        default=Takes(mean=timedelta(seconds=40), std=timedelta(seconds=40)),
+    stop: AnyDurationLaw = Field(
+        default=DurationLaw(mean=timedelta(seconds=40), std=timedelta(seconds=40)),
         description="how long it stops at a spot while it roams",
     )
     spots: tuple[int, int] = Field(

@@ -11,11 +11,11 @@ from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
-from fleet2d.routines.interruptions import body_of, interrupted
-from fleet2d.routines.laws import weighted
+from fleet2d.routines.interruptions import interrupt, interruption_rules
+from fleet2d.routines.laws import draw_weighted
 from fleet2d.routines.needs import activities_of, usual_errands, usual_needs
 from fleet2d.routines.planner import REST, Doing
-from fleet2d.routines.timeuse import activities, told_apart, works_at_home
+from fleet2d.routines.timeuse import activities, draw_works_at_home, to_doings
 from fleet2d.streams import Draws, stream_key
 
 if TYPE_CHECKING:
@@ -48,15 +48,15 @@ class Population(Inhabitant):
         self.details = actor.stream("details")
         draws = Draws(actor.stream("who"), 0)
         self.people = survey.group(_draw_group(draws) if self.group == "any" else self.group)
-        self.at_home = works_at_home(self.people, draws)
+        self.works_at_home = draw_works_at_home(self.people, draws)
         self.first = actor.clock.start.toordinal() - 1
         self.states = [survey.first_state(self.people, draws, self.first)]
-        self.known: dict[int, Sequence[Doing]] = {}
+        self.cache: dict[int, Sequence[Doing]] = {}
         known = catalogue()
         names = {*activities(self.people), REST}
-        self.body, self.interruptions = None, actor.stream("needs")
+        self.rules, self.interruptions = None, actor.stream("needs")
         if self.bodily_needs:
-            self.body = body_of(usual_needs(), usual_errands(), known)
+            self.rules = interruption_rules(usual_needs(), usual_errands(), known)
             names |= activities_of(usual_needs(), usual_errands())
         self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
 
@@ -66,31 +66,33 @@ class Population(Inhabitant):
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()
         state = survey.first_state(people, draws, ordinal)
-        blocks, _ = survey.live(people, draws, ordinal, state)
+        episodes, _ = survey.draw_episodes(people, draws, ordinal, state)
         time_s = (time - datetime.fromordinal(ordinal)) // timedelta(seconds=1)
-        return rooms_at(told_apart(people, blocks, False, draws), time_s, known)
+        return rooms_at(to_doings(people, episodes, False, draws), time_s, known)
 
     def day(self, ordinal: int) -> Sequence[Doing]:
         """Return what is done from 04:00 on the day of a date's ordinal to 04:00 on the next."""
-        if ordinal not in self.known:
+        if ordinal not in self.cache:
             while len(self.states) <= ordinal - self.first:
                 self._live(self.first + len(self.states) - 1)
-            self.known = {ordinal: self._live(ordinal)}
-        return self.known[ordinal]
+            self.cache = {ordinal: self._live(ordinal)}
+        return self.cache[ordinal]
 
     def _live(self, ordinal: int) -> Sequence[Doing]:
         state = self.states[ordinal - self.first]
-        blocks, after = survey.live(self.people, Draws(self.days, ordinal), ordinal, state)
+        episodes, after = survey.draw_episodes(
+            self.people, Draws(self.days, ordinal), ordinal, state
+        )
         if len(self.states) == ordinal - self.first + 1:
             self.states.append(after)
-        day = told_apart(self.people, blocks, self.at_home, Draws(self.details, ordinal))
-        if self.body is None:
+        day = to_doings(self.people, episodes, self.works_at_home, Draws(self.details, ordinal))
+        if self.rules is None:
             return day
-        return interrupted(self.body, Draws(self.interruptions, ordinal), day)
+        return interrupt(self.rules, Draws(self.interruptions, ordinal), day)
 
 
 def _draw_group(draws: Draws) -> str:
     """Draw a group by its share of the people."""
     names = survey.groups()
     shares = [survey.table()["groups"][name]["share"] for name in names]
-    return names[weighted(draws, shares)]
+    return names[draw_weighted(draws, shares)]

@@ -33,7 +33,7 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
     private = {
         room
         for name, persona in household.members.items()
-        for activity in persona.body.private & set(rooms[name])
+        for activity in persona.interruptions.private & set(rooms[name])
         for room in rooms[name][activity]
     }
     return {

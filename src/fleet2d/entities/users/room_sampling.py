@@ -16,8 +16,8 @@ from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.problems import problem
-from fleet2d.routines.activity import AnyTakes, Takes
-from fleet2d.routines.laws import weighted
+from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
+from fleet2d.routines.laws import draw_weighted
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -64,8 +64,8 @@ class RoomSampling(Behavior):
         " relative to each other",
         examples=[{"living_room": 0.4, "bedroom": 0.4, "kitchen": 0.2}],
     )
-    dwell: AnyTakes = Field(
-        default=Takes(law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)),
+    dwell: AnyDurationLaw = Field(
+        default=DurationLaw(law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)),
         description="how long a visit takes",
     )
 
@@ -113,7 +113,7 @@ class RoomSampling(Behavior):
         return plan
 
     def _visit(self, actor: "Actor", plan: Plan, draws: Draws) -> None:
-        stop = self.stops[weighted(draws, [stop.chance for stop in self.stops])]
+        stop = self.stops[draw_weighted(draws, [stop.chance for stop in self.stops])]
         dwell_us = self.law.draw(draws) * SECOND_US
         if stop.room is None:
             if not plan.away:

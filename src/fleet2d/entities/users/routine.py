@@ -15,7 +15,7 @@ from fleet2d.problems import did_you_mean, problem
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import WELCOME, AnyHousehold, Lives
 from fleet2d.routines.life import Life
-from fleet2d.routines.periods import AWAY, AnyPeriod, without
+from fleet2d.routines.periods import AWAY, AnyPeriod, with_absences
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import DAY_S, Doing
 
@@ -147,4 +147,4 @@ class Routine(Inhabitant):
     def _with_absences(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
         if not self.away and not self.visits:
             return day
-        return without(day, datetime.fromordinal(ordinal), self.away, self.visits)
+        return with_absences(day, datetime.fromordinal(ordinal), self.away, self.visits)

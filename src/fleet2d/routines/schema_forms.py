@@ -1,4 +1,4 @@
-"""Other ways to write a group of keys than as a mapping, for the JSON Schema."""
+"""Short forms of groups of keys, which the JSON Schema lists beside the mapping."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -15,8 +15,8 @@ FORMS: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True, init=False)
-class OrWritten:
-    """Says that a field takes other forms, too: ``Annotated[Takes, OrWritten("text", "pair")]``."""
+class SchemaForms:
+    """Lists the short forms of a field: ``Annotated[DurationLaw, SchemaForms("text", "pair")]``."""
 
     forms: tuple[str, ...]
 
@@ -26,5 +26,5 @@ class OrWritten:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Add the forms."""
+        """Add the forms to the schema."""
         return {"anyOf": [handler(schema), *(FORMS[form] for form in self.forms)]}
