@@ -333,15 +333,13 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
         return merge(below, {key: v for key, v in value.items() if key != "extends"})
     if not isinstance(value, str | Path) or not str(value):
         raise problem(
-            f"found {shown(value)}; a persona is wanted: one of {', '.join(bundled_names())}, a YAML"
-            " file, or a mapping like {extends: retired, pace: 0.8}"
+            f"found {shown(value)}; a persona is wanted: one of {', '.join(bundled_names())}, a"
+            " YAML file, or a mapping like {extends: retired, pace: 0.8}"
         )
-    bundled_file = BUNDLED / f"{value}.yaml"
-    path = (
-        bundled_file
-        if str(value) in bundled_names()
-        else folder_of(value) / Path(value).expanduser()
-    )
+    if str(value) in bundled_names():
+        path = BUNDLED / f"{value}.yaml"
+    else:
+        path = folder_of(value) / Path(value).expanduser()
     if not path.is_file():
         raise problem(
             f"there is no persona {str(value)!r}{did_you_mean(value, bundled_names())} There are:"

@@ -67,8 +67,8 @@ def test_an_hour_of_television_lasts_as_long_as_in_the_survey() -> None:
         key = stream_key(4, f"users.{person}", "day")
         state = survey.first_state(group, Draws(key, 0), MONDAY)
         for ordinal in range(MONDAY, MONDAY + 14):
-            blocks, state = survey.draw_episodes(group, Draws(key, ordinal), ordinal, state)
-            lasted += [b.end - b.begin for b in blocks if b.category == "tv"]
+            episodes, state = survey.draw_episodes(group, Draws(key, ordinal), ordinal, state)
+            lasted += [b.end - b.begin for b in episodes if b.category == "tv"]
     target = group.facts["minutes"]["tv"] * 60
     assert target == pytest.approx(statistics.mean(lasted), rel=0.35)
     # A geometric law has a standard deviation as large as its mean.
