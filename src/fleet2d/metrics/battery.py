@@ -1,4 +1,4 @@
-"""How robots get along with their batteries."""
+"""How robots use their batteries."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 @register("metric", "battery")
 class BatteryUse(Metric):
-    """Lowest charge, dockings a day, and share of time charging and empty, of each robot.
+    """Lowest charge, dockings a day, and shares of time charging and empty, of each robot.
 
-    From the events `battery`, `docks` and `charged`. `lowest` is the lowest charge that they told:
-    it is told at decisions, when it has changed by 5 %, when the robot docks, and when it is empty.
+    From the events `battery`, `docks` and `charged`. `lowest` is the lowest charge in these events:
+    they happen at decisions, after a change of 5 %, when the robot docks, and when it is empty.
     `dockings` counts `docks`. `charging` is the share of the run's steps from a `docks` to the
-    `charged` after it, or to the end of the run; a robot charges at its charger at other times,
-    too. `empty` is the share from when nothing was left: it stands still from then on.
+    `charged` after it, or to the end of the run; a robot at its charger charges at other times,
+    too. `empty` is the share of steps with an empty battery, from which on the robot stands still.
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -53,20 +53,20 @@ class BatteryUse(Metric):
                 self.dockings[name] = self.dockings.get(name, 0) + 1
                 self.docked_at[name] = event.step
             elif event.event == "charged" and name in self.docked_at:
-                took = event.step - self.docked_at.pop(name)
-                self.charging[name] = self.charging.get(name, 0) + took
+                steps = event.step - self.docked_at.pop(name)
+                self.charging[name] = self.charging.get(name, 0) + steps
         self.steps, self.step_s = history.end, history.step_s
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {lowest, dockings, charging}}, and empty of those that ran empty."""
-        found = {}
+        numbers = {}
         for name, lowest in self.lowest.items():
-            under_way = self.steps - self.docked_at[name] if name in self.docked_at else 0
-            found[name] = {
+            present = self.steps - self.docked_at[name] if name in self.docked_at else 0
+            numbers[name] = {
                 "lowest": lowest,
                 "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / 86400),
-                "charging": (self.charging.get(name, 0) + under_way) / self.steps,
+                "charging": (self.charging.get(name, 0) + present) / self.steps,
             }
             if name in self.empty_at:
-                found[name]["empty"] = (self.steps - self.empty_at[name]) / self.steps
-        return found
+                numbers[name]["empty"] = (self.steps - self.empty_at[name]) / self.steps
+        return numbers

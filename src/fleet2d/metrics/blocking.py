@@ -1,4 +1,4 @@
-"""How often robots are in people's way."""
+"""How often robots stand in the way of people."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -24,10 +24,10 @@ class Blocking(Metric):
 
     A step counts when the user moves in it, and the centres are nearer than `clearance` at its
     begin or at its end: two bodies of the usual radii (0.2 and 0.15 m) would touch at 0.35 m. A
-    block is an unbroken run of such steps; `blocks` counts these, and `seconds` is the time of
+    block is an unbroken run of such steps; `blocks` counts blocks, and `seconds` is the duration of
     their steps. People walk as if there were no robot, so this is how often they would have had to
-    change their way or stop. `asides`, of people who react to robots, is how often they stood and
-    stepped aside for it.
+    change their path or stop. `asides`, for people who react to robots, is how often they stepped
+    aside for it.
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -49,19 +49,21 @@ class Blocking(Metric):
         self.days = 0.0
 
     def update(self, history: History, state: "Present") -> Any:
-        """Count the steps in which somebody walks into a robot."""
+        """Count the steps in which a user walks into a robot."""
         for pair in pairs_of(history, state):
             key = (pair.robot, pair.user)
-            near, xy = pair.distance < self.clearance, pair.at_user.xy
-            # A step leads from one pose to the next: the first from the last of the time before.
-            at, was_near, blocked = self.last.get(key, (pair.at_user.at(0), bool(near[0]), False))
-            moves = (np.diff(xy, axis=0, prepend=[at]) != 0).any(axis=1) & pair.at_home
-            hit = moves & (near | np.append(was_near, near[:-1]))
-            begins = hit & ~np.append(blocked, hit[:-1])
+            is_near, xy = pair.distance < self.clearance, pair.user_poses.xy
+            # A step leads from one pose to the next: the first from the last of the last period.
+            start, was_near, was_blocked = self.last.get(
+                key, (pair.user_poses.at(0), bool(is_near[0]), False)
+            )
+            moves = (np.diff(xy, axis=0, prepend=[start]) != 0).any(axis=1) & pair.at_home
+            is_blocked = moves & (is_near | np.append(was_near, is_near[:-1]))
+            begins = is_blocked & ~np.append(was_blocked, is_blocked[:-1])
             self.blocks[key] = self.blocks.get(key, 0) + int(np.count_nonzero(begins))
-            spent = int(np.count_nonzero(hit)) * history.step_s
-            self.seconds[key] = self.seconds.get(key, 0.0) + spent
-            self.last[key] = pair.at_user.at(-1), bool(near[-1]), bool(hit[-1])
+            seconds = int(np.count_nonzero(is_blocked)) * history.step_s
+            self.seconds[key] = self.seconds.get(key, 0.0) + seconds
+            self.last[key] = pair.user_poses.at(-1), bool(is_near[-1]), bool(is_blocked[-1])
         steps_aside = {f"steps aside for {robot}": robot for robot in state.robots}
         for event in history.events:
             if event.event == "reacts" and event.detail in steps_aside:
@@ -69,11 +71,11 @@ class Blocking(Metric):
         self.days += len(history) * history.step_s / 86400
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {user: {blocks, seconds}}}, and asides where there were any, per day."""
-        found: dict[str, Any] = {}
+        """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
+        results: dict[str, Any] = {}
         for (robot, user), blocks in self.blocks.items():
             numbers = {"blocks": blocks, "seconds": self.seconds[robot, user]}
             if self.asides[robot, user]:
                 numbers["asides"] = self.asides[robot, user]
-            found.setdefault(robot, {})[user] = {k: v / self.days for k, v in numbers.items()}
-        return found
+            results.setdefault(robot, {})[user] = {k: v / self.days for k, v in numbers.items()}
+        return results

@@ -1,4 +1,4 @@
-"""How much of their time at home people have a robot in the room."""
+"""Share of users' time at home with a robot in the same room."""
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 class CoPresence(Metric):
     """Share of a user's steps at home in which a robot is in the same room.
 
-    For each robot and user: steps at which the user is at home and both are in the same room,
-    divided by the steps at which the user is at home. Where no room is, between two, nobody is
-    together.
+    For each robot and user: steps at which both are in the same room, divided by the steps at which
+    the user is at home. Between two rooms, where no room is, they don't count as together.
     """
 
     unit: ClassVar[str] = "share of time at home"
@@ -32,16 +31,16 @@ class CoPresence(Metric):
     def update(self, history: History, state: "Present") -> Any:
         """Count the steps together."""
         for pair in pairs_of(history, state):
-            room = pair.at_user.room
-            together = (room >= 0) & (room == pair.at_robot.room)
+            room = pair.user_poses.room
+            together = (room >= 0) & (room == pair.robot_poses.room)
             counts = self.steps.setdefault((pair.robot, pair.user), [0, 0])
             counts[0] += int(np.count_nonzero(together))
-            counts[1] += int(np.count_nonzero(~pair.at_user.away))
+            counts[1] += int(np.count_nonzero(~pair.user_poses.away))
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {user: share}}; a user who was never at home has none."""
-        found: dict[str, Any] = {}
+        """Return {robot: {user: share}}, without users who were never at home."""
+        results: dict[str, Any] = {}
         for (robot, user), (together, at_home) in self.steps.items():
             if at_home:
-                found.setdefault(robot, {})[user] = together / at_home
-        return found
+                results.setdefault(robot, {})[user] = together / at_home
+        return results

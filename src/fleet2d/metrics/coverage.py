@@ -18,11 +18,12 @@ SHARES = {"half": 0.5, "most": 0.9}
 
 @register("metric", "coverage")
 class Coverage(Metric):
-    """Share of the floor of all rooms that was in view of a robot, and when it was half, and 90 %.
+    """Share of the floor of all rooms that was in view of a robot, and times to half and 90 %.
 
-    `share`: cells of rooms that were in view at some step, as in the layer `first_seen` / all cells
-    of rooms, furniture or not. `half_h`, `most_h`: hours from the start of the run to the step at
-    which half, and 90 %, of these cells had been in view; left out where it never came to that.
+    `share`: the cells of rooms that were in view at some step, as in the layer `first_seen`,
+    divided by all cells of rooms, with furniture or without. `half_h`, `most_h`: hours from the
+    start of the run to the step at which half, and 90 %, of these cells had been in view; left out
+    if that never happened.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
@@ -33,13 +34,13 @@ class Coverage(Metric):
     }
 
     def start(self, home: "Home") -> None:
-        """Begin with nothing seen."""
+        """Begin without any cells seen."""
         self.first: dict[str, Any] = {}  # sorted first steps of the cells seen, by robot
         self.cells = int(np.count_nonzero(home.plan.room_of_cell >= 0))
         self.step_s = 0.0
 
     def update(self, history: History, state: "Present") -> Any:
-        """Take over what was seen; return a row for each robot."""
+        """Read the layers of first steps; return a row for each robot."""
         self.step_s, inside = history.step_s, state.home.plan.room_of_cell >= 0
         for robot in state.robots:
             layer = f"first_seen.{robot}"
@@ -52,12 +53,12 @@ class Coverage(Metric):
         return {"robot": np.array(list(self.first), dtype=object), "share": np.array(shares)}
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {share, half_h, most_h}}, hours only where it came to that."""
-        found: dict[str, Any] = {}
+        """Return {robot: {share, half_h, most_h}}, hours only where the share was reached."""
+        numbers: dict[str, Any] = {}
         for robot, first in self.first.items():
-            found[robot] = {"share": len(first) / self.cells}
+            numbers[robot] = {"share": len(first) / self.cells}
             for name, share in SHARES.items():
                 needed = int(np.ceil(share * self.cells))
                 if 0 < needed <= len(first):
-                    found[robot][f"{name}_h"] = int(first[needed - 1]) * self.step_s / 3600
-        return found
+                    numbers[robot][f"{name}_h"] = int(first[needed - 1]) * self.step_s / 3600
+        return numbers

@@ -1,4 +1,4 @@
-"""How good a robot's perception is: precision, recall, and who is taken for whom."""
+"""Quality of a robot's perception: precision, recall, and confusion of identities."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,27 +14,27 @@ if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present
     from fleet2d.floorplan.home.home import Home
 
-UNKNOWN = "unknown"  # the name in the confusion of somebody not recognized
-NO_ONE = "nobody"  # the name there of who isn't there at all: a false positive
+UNKNOWN = "unknown"  # name in the confusion of a person not recognized
+NO_ONE = "nobody"  # name in the confusion of false positives
 
 
 @register("metric", "detections")
 class Detections(Metric):
     """Precision, recall and identity confusion of each robot, over all its cameras.
 
-    A look is one camera at one step at which it takes an image; a user is in view if the camera's
-    geometry shows the user, whatever its perception makes of it.
+    A look is one image of one camera, at one step; a user is in view if the camera's geometry shows
+    the user, regardless of its perception.
 
-    - `recall`: looks in which a user in view was noticed / looks with that user in view, added up
+    - `recall`: looks in which a user in view was noticed / looks with that user in view, summed
       over users: TP / (TP + FN).
-    - `precision`: observations of somebody who is there, recognized right or not / all
+    - `precision`: observations of somebody who is there, recognized correctly or not / all
       observations: TP / (TP + FP).
-    - `recognized`: observations that name the user whom they are of / observations of users; one
-      that names nobody counts as not recognized.
-    - `confusion`: for each user, and for nobody (false positives), the shares of observations that
-      name each user, or nobody (`unknown`); each sums to one.
+    - `recognized`: observations with the correct user / observations of users; an observation of
+      nobody known counts as not recognized.
+    - `confusion`: for each user, and for nobody (false positives), the shares of observations
+      recognized as each user, or as nobody (`unknown`); each sums to one.
 
-    A number without anything to divide by is left out. Stored per period: looks, detections, false
+    A ratio whose denominator is 0 is left out. Stored per period: looks, detections, false
     positives and identities, by robot and user.
     """
 
@@ -43,7 +43,7 @@ class Detections(Metric):
     def start(self, home: "Home") -> None:
         """Begin counting."""
         self.looks: NDArray[np.int64] | None = None  # (robots, users, 2): in view, noticed
-        self.taken: NDArray[np.int64]  # (robots, users + 1, users + 1): true, perceived
+        self.confusion: NDArray[np.int64]  # (robots, users + 1, users + 1): true, perceived
         self.names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def update(self, history: History, state: "Present") -> Any:
@@ -51,76 +51,75 @@ class Detections(Metric):
         robots, users = len(state.robots), len(state.users)
         if self.looks is None:
             self.looks = np.zeros((robots, users, 2), np.int64)
-            self.taken = np.zeros((robots, users + 1, users + 1), np.int64)
+            self.confusion = np.zeros((robots, users + 1, users + 1), np.int64)
             self.names = state.robots, state.users
-        seen = history.looks
+        counts, observations = history.looks, history.observations
         looks = np.zeros((robots, users, 2), np.int64)
-        np.add.at(looks, seen.robot, np.stack([seen.in_view, seen.detected], axis=-1))
-        observed = history.observations
-        taken = np.zeros((robots, users + 1, users + 1), np.int64)
-        # Whoever is not there, or not recognized, is -1: the last.
-        np.add.at(taken, (observed.robot, history.truth.user, observed.user), 1)
+        np.add.at(looks, counts.robot, np.stack([counts.in_view, counts.detected], axis=-1))
+        confusion = np.zeros((robots, users + 1, users + 1), np.int64)
+        # A false positive, or a person not recognized, is -1: the last entry.
+        np.add.at(confusion, (observations.robot, history.truth.user, observations.user), 1)
         self.looks += looks
-        self.taken += taken
-        return self._rows(looks, taken)
+        self.confusion += confusion
+        return self._rows(looks, confusion)
 
-    def _rows(self, looks: NDArray[np.int64], taken: NDArray[np.int64]) -> Any:
-        """Return a row for each robot and user, last nobody: the false positives."""
+    def _rows(self, looks: NDArray[np.int64], confusion: NDArray[np.int64]) -> Any:
+        """Return a row for each robot and user, and last for nobody: the false positives."""
         robots, users = self.names
         if not (robots and users):
             return None
         names = np.array([*users, NO_ONE], dtype=object)
         count = len(names)
         padded = np.concatenate([looks, np.zeros((len(robots), 1, 2), np.int64)], axis=1)
-        right = np.diagonal(taken, axis1=1, axis2=2).copy()
-        right[:, -1] = 0
+        correct = np.diagonal(confusion, axis1=1, axis2=2).copy()
+        correct[:, -1] = 0
         return {
             "robot": np.repeat(np.array(robots, dtype=object), count),
             "user": np.tile(names, len(robots)),
             "in_view": padded[..., 0].ravel(),
             "detected": padded[..., 1].ravel(),
-            "observed": taken.sum(axis=2).ravel(),
-            "recognized": right.ravel(),
-            "unknown": taken[:, :, -1].ravel(),
+            "observed": confusion.sum(axis=2).ravel(),
+            "recognized": correct.ravel(),
+            "unknown": confusion[:, :, -1].ravel(),
         }
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {precision, recall, recognized, confusion}}, each where it can be told."""
+        """Return {robot: {precision, recall, recognized, confusion}}, without undefined ratios."""
         if self.looks is None:
             return {}
         robots, users = self.names
         return {
-            robot: self._summary(self.looks[r], self.taken[r], users)
+            robot: self._summary(self.looks[r], self.confusion[r], users)
             for r, robot in enumerate(robots)
         }
 
     def _summary(
-        self, looks: NDArray[np.int64], taken: NDArray[np.int64], users: tuple[str, ...]
+        self, looks: NDArray[np.int64], counts: NDArray[np.int64], users: tuple[str, ...]
     ) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        real, total = int(taken[:-1].sum()), int(taken.sum())
+        numbers: dict[str, Any] = {}
+        real, total = int(counts[:-1].sum()), int(counts.sum())
         if total:
-            found["precision"] = real / total
+            numbers["precision"] = real / total
         if looks[:, 0].sum():
-            found["recall"] = int(looks[:, 1].sum()) / int(looks[:, 0].sum())
+            numbers["recall"] = int(looks[:, 1].sum()) / int(looks[:, 0].sum())
         if real:
-            found["recognized"] = int(np.trace(taken[:-1, :-1])) / real
+            numbers["recognized"] = int(np.trace(counts[:-1, :-1])) / real
         confusion = {
             true: {
-                perceived: int(taken[t, p]) / int(taken[t].sum())
+                perceived: int(counts[t, p]) / int(counts[t].sum())
                 for p, perceived in enumerate((*users, UNKNOWN))
-                if taken[t, p]
+                if counts[t, p]
             }
             for t, true in enumerate((*users, NO_ONE))
-            if taken[t].sum()
+            if counts[t].sum()
         }
         if confusion:
-            found["confusion"] = confusion
-        return found
+            numbers["confusion"] = confusion
+        return numbers
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return all but who is taken for whom."""
+        """Return all numbers but the confusion of identities."""
         return {
             robot: {key: value for key, value in numbers.items() if key != "confusion"}
             for robot, numbers in result.items()

@@ -1,4 +1,4 @@
-"""How far everybody goes."""
+"""Distance that each body covers."""
 
 from math import dist
 from typing import TYPE_CHECKING, Any, ClassVar

@@ -1,4 +1,4 @@
-"""How much robots are in people's personal space."""
+"""Time that robots spend in people's personal space."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -24,8 +24,8 @@ class Intrusion(Metric):
     """Minutes a day that a robot is in each of Hall's zones of a user.
 
     Intimate: nearer than 0.45 m; personal: 0.45 to 1.2 m; social: 1.2 to 3.6 m, between the
-    centres. Only steps count at which both are at home and no wall is between them. A proxy: how
-    people feel about it depends on much else.
+    centres. Only steps count at which both are at home and no wall is between them. It is a proxy:
+    how people feel about a robot depends on much else.
     """
 
     unit: ClassVar[str] = "min a day"
@@ -57,16 +57,16 @@ class Intrusion(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {zone: minutes a day}}}."""
-        found: dict[str, Any] = {}
+        minutes_by_robot: dict[str, Any] = {}
         for (robot, user), minutes in self.minutes.items():
-            found.setdefault(robot, {})[user] = {
+            minutes_by_robot.setdefault(robot, {})[user] = {
                 zone: m / self.days for zone, m in zip(ZONES, minutes, strict=True)
             }
-        return found
+        return minutes_by_robot
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the zones in which a robot is an intruder: social distance is where it belongs."""
+        """Return the zones in which a robot intrudes, without social distance."""
         return {
             robot: {
                 user: {k: v for k, v in n.items() if k != "social"} for user, n in users.items()

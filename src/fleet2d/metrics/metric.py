@@ -1,4 +1,4 @@
-"""Metrics: algorithms that only record. They know the truth, and nobody acts on what they say."""
+"""Metrics: components that measure a run. They know the truth, and no component reads them."""
 
 from collections.abc import Mapping, Set
 from datetime import timedelta
@@ -16,17 +16,19 @@ if TYPE_CHECKING:
 
 
 class Metric(Component):
-    """Base of what measures a run; a subclass writes `update` and `result`.
+    """Base of metrics, which measure a run; a subclass writes `update` and `result`.
 
-    Like an algorithm it is updated after every full `period`, or `on` events, of users, too; what
-    `update` returns is stored. Unlike one it may ask for the poses of users.
+    Like an algorithm it is updated after every full `period`, or `on` events, also those of users;
+    the return value of `update` is stored. Unlike an algorithm it may read the poses of users.
     """
 
     kind: ClassVar[str] = "metric"
-    looks_back: ClassVar[timedelta] = timedelta(0)  # how far beyond its period; timedelta.max: all
-    needs: ClassVar[Set[str]] = frozenset()  # of exposure, explored, first_seen, last_seen …
-    unit: ClassVar[str] = ""  # of its result, for people to read
-    units: ClassVar[Mapping[str, str]] = {}  # of single numbers by name, where theirs is another
+    # How far before its period it reads the history; timedelta.max: all of it.
+    looks_back: ClassVar[timedelta] = timedelta(0)
+    # What has to be computed for it: exposure, explored, first_seen, last_seen …
+    needs: ClassVar[Set[str]] = frozenset()
+    unit: ClassVar[str] = ""  # unit of its result, for people to read
+    units: ClassVar[Mapping[str, str]] = {}  # units of single numbers, by name, where they differ
 
     period: PositiveDuration = Field(
         default=timedelta(days=1), description="how often it is updated"
@@ -39,21 +41,21 @@ class Metric(Component):
     )
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithms that it measures: a scenario without one of them is refused."""
+        """Return the names of the algorithms that it measures, which the scenario must have."""
         return ()
 
     def start(self, home: "Home") -> None:
         """Prepare for a run."""
 
     def update(self, history: History, state: "Present") -> Any:
-        """Take in the history since the last update; return rows to store, or None."""
+        """Process the history since the last update; return rows to store, or None."""
         raise NotImplementedError
 
     def result(self) -> dict[str, Any]:
-        """Return the few numbers that sum up the run, for the manifest and the closing table."""
+        """Return the numbers that summarize the run, for the manifest and the closing table."""
         return {}
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return what of a result the closing table shows: of many numbers, those that matter."""
+        """Return the part of a result that the closing table shows; all of it by default."""
         return result

@@ -1,4 +1,4 @@
-"""What metrics about robots and people share: every robot with every user, step by step."""
+"""Pairs of a robot and a user, which several metrics measure step by step."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,53 +19,55 @@ DAY_S = 86_400.0
 Bool = NDArray[np.bool_]
 
 
-class Pair(NamedTuple):
+class RobotUserPair(NamedTuple):
     """A robot and a user over some steps.
 
     Attributes:
         robot: The robot's name.
         user: The user's name.
-        at_robot: Poses of the robot.
-        at_user: Poses of the user.
+        robot_poses: Poses of the robot.
+        user_poses: Poses of the user.
     """
 
     robot: str
     user: str
-    at_robot: BodyPoses
-    at_user: BodyPoses
+    robot_poses: BodyPoses
+    user_poses: BodyPoses
 
     @property
     def at_home(self) -> Bool:
-        """At which steps both are at home: bool (steps,)."""
-        home: Bool = ~(self.at_robot.away | self.at_user.away)
+        """Whether both are at home at each step: bool (steps,)."""
+        home: Bool = ~(self.robot_poses.away | self.user_poses.away)
         return home
 
     @property
     def distance(self) -> NDArray[np.float64]:
-        """Distance between the centres at each step [m], infinite while one is away."""
-        gap = self.at_robot.xy - self.at_user.xy
+        """Distance between the centres at each step [m]: float64 (steps,), infinite while away."""
+        gap = self.robot_poses.xy - self.user_poses.xy
         return np.where(self.at_home, np.sqrt((gap * gap).sum(axis=1)), np.inf)
 
 
-def pairs_of(history: History, state: "Present") -> Iterator[Pair]:
+def pairs_of(history: History, state: "Present") -> Iterator[RobotUserPair]:
     """Yield every robot with every user."""
     for robot in state.robots:
         for user in state.users:
-            yield Pair(robot, user, history.poses(robot), history.poses(user))
+            yield RobotUserPair(robot, user, history.poses(robot), history.poses(user))
 
 
-def in_sight(plan: "FloorPlan", pair: Pair, steps: NDArray[np.int64]) -> Bool:
-    """Return at which of some steps no wall of the plan stands between the two: bool (n,).
+def in_sight(plan: "FloorPlan", pair: RobotUserPair, steps: NDArray[np.int64]) -> Bool:
+    """Return whether no wall of the plan is between the two at each of some steps: bool (n,).
 
-    Doors count as open, and furniture as low.
+    Doors count as open, and furniture as too low to block the view.
     """
-    one = plan.lattice.to_lattice(pair.at_robot.xy[steps])
-    other = plan.lattice.to_lattice(pair.at_user.xy[steps])
-    places = np.concatenate([one, other], axis=1)
-    seen = np.zeros(len(steps), np.bool_)
-    moved = np.append(True, (places[1:] != places[:-1]).any(axis=1)) if len(places) else seen
-    begins = np.flatnonzero(moved)
-    for begin, end in zip(begins.tolist(), [*begins.tolist()[1:], len(places)], strict=False):
-        x, y = one[begin].tolist()
-        seen[begin:end] = points_in_sight(plan.mesh, x, y, other[[begin]])[0]
-    return seen
+    robot_xy = plan.lattice.to_lattice(pair.robot_poses.xy[steps])
+    user_xy = plan.lattice.to_lattice(pair.user_poses.xy[steps])
+    places = np.concatenate([robot_xy, user_xy], axis=1)
+    is_visible = np.zeros(len(steps), np.bool_)
+    if not len(places):
+        return is_visible
+    has_moved = (places[1:] != places[:-1]).any(axis=1)
+    begins = [0, *(np.flatnonzero(has_moved) + 1).tolist()]
+    for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
+        x, y = robot_xy[begin].tolist()
+        is_visible[begin:end] = points_in_sight(plan.mesh, x, y, user_xy[[begin]])[0]
+    return is_visible

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 class ReachTime(Metric):
     """Seconds that a robot would drive to a user who called it, at evenly spaced times.
 
-    Each user at home calls every robot every `every`, from the start of the run on. The time is the
-    length of the shortest way of a body of `radius` to the free place nearest to the user, divided
-    by `speed`; turns and people apart, and with doors and furniture as they are when the metric is
-    updated. Calls without a way count as unreached, and in no mean.
+    Each user at home calls every robot at intervals of `every`, from the start of the run on. The
+    time is the length of the shortest route of a body of `radius` to the free place nearest to the
+    user, divided by `speed`, without turns and without people in the way; doors and furniture are
+    as they are when the metric is updated. Calls without a route count as unreached only.
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -47,7 +47,7 @@ class ReachTime(Metric):
         self.unreached: dict[tuple[str, str], int] = {}
 
     def update(self, history: History, state: "Present") -> Any:
-        """Let everybody at home call."""
+        """Add the calls of each user at home."""
         step_us = round(history.step_s * 1e6)
         every = max(1, -(-micros(self.every) // step_us))
         calls = np.arange(-history.first % every, len(history), every)
@@ -57,13 +57,15 @@ class ReachTime(Metric):
             seconds = self.seconds.setdefault(key, [])
             self.unreached.setdefault(key, 0)
             for i in calls[pair.at_home[calls]].tolist():
-                start = lattice.point_at(pair.at_robot.at(i))
-                there = lattice.point_at(pair.at_user.at(i))
+                start = lattice.point_at(pair.robot_poses.at(i))
+                target = lattice.point_at(pair.user_poses.at(i))
                 part = (
                     space.part_near(*start) if space.part_at(*start) < 0 else space.part_at(*start)
                 )
                 goal = (
-                    tuple(there) if space.part_at(*there) == part else space.nearest(*there, part)
+                    tuple(target)
+                    if space.part_at(*target) == part
+                    else space.nearest(*target, part)
                 )
                 route = None if goal is None else space.route(tuple(start), goal)
                 if route is None:
@@ -75,7 +77,7 @@ class ReachTime(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {mean, p90, calls, unreached}}}; p90 as numpy's linear quantile."""
-        found: dict[str, Any] = {}
+        results: dict[str, Any] = {}
         for (robot, user), seconds in self.seconds.items():
             numbers: dict[str, Any] = {"calls": len(seconds) + self.unreached[robot, user]}
             if seconds:
@@ -83,12 +85,12 @@ class ReachTime(Metric):
                 numbers["p90"] = float(np.quantile(seconds, 0.9))
             if self.unreached[robot, user]:
                 numbers["unreached"] = self.unreached[robot, user]
-            found.setdefault(robot, {})[user] = numbers
-        return found
+            results.setdefault(robot, {})[user] = numbers
+        return results
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return how long it takes, and how often there was no way."""
+        """Return how long it takes, and how often there is no route."""
         shown = ("mean", "p90", "unreached")
         return {
             robot: {user: {k: v for k, v in n.items() if k in shown} for user, n in users.items()}

@@ -1,4 +1,4 @@
-"""Where users really are: the share of time per room."""
+"""True share of time that users spend in each room."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home.home import Home
 
 AWAY = "away"
-MOST = 4  # places that the closing table shows of each user
+MOST_PLACES = 4  # places per user in the closing table
 
 
 @register("metric", "room_share")
@@ -48,7 +48,7 @@ class RoomShare(Metric):
         }
 
     def result(self) -> dict[str, Any]:
-        """Return {user: {room: share}} of the rooms that the user was in."""
+        """Return {user: {room: share}} for the rooms that the user was in."""
         return {
             user: {n: float(s / steps.sum()) for n, s in zip(self.names, steps, strict=True) if s}
             for user, steps in self.seconds.items()
@@ -56,8 +56,8 @@ class RoomShare(Metric):
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return where each user is most of the time, the longest first."""
+        """Return the places where each user is most of the time, the longest first."""
         return {
-            user: dict(sorted(shares.items(), key=lambda item: -item[1])[:MOST])
+            user: dict(sorted(shares.items(), key=lambda item: -item[1])[:MOST_PLACES])
             for user, shares in result.items()
         }

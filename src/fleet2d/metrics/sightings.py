@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @register("metric", "sightings")
 class Sightings(Metric):
-    """Share of a user's steps at home in which at least one robot detects the user."""
+    """Share of a user's steps at home at which at least one robot perceives the user."""
 
     unit: ClassVar[str] = "share of time at home"
 
@@ -35,7 +35,7 @@ class Sightings(Metric):
             self.at_home[user] = self.at_home.get(user, 0) + at_home
 
     def result(self) -> dict[str, Any]:
-        """Return {user: share}; a user who was never at home has none."""
+        """Return {user: share}, without users who were never at home."""
         return {
             user: seen / self.at_home[user]
             for user, seen in self.seen.items()

@@ -1,4 +1,4 @@
-"""Times that may be cut short: the estimator of Kaplan and Meier."""
+"""Survival curves from censored times: the estimator of Kaplan and Meier."""
 
 from collections.abc import Sequence
 
@@ -6,17 +6,17 @@ import numpy as np
 
 
 def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple[float, float]]:
-    """Return the share that is left after each time at which something happened.
+    """Return the survival curve: the share without an event by each time of an event.
 
-    Kaplan and Meier, Journal of the American Statistical Association 53, 1958. Whoever is cut short
-    at a time counts as at risk up to it, and including it.
+    Kaplan and Meier, Journal of the American Statistical Association 53, 1958. A time censored at t
+    counts as at risk up to and including t.
 
     Args:
-        times: How long each was watched.
-        happened: Whether it happened then; else it was cut short.
+        times: The duration of each observation.
+        happened: Whether the event happened at its end; else the time is censored.
 
     Returns:
-        Times, rising, and the share for which it hasn't happened by then, included.
+        (time, share) pairs, ascending: the share without an event up to and including the time.
 
     Example:
         >>> kaplan_meier([1.0, 2.0, 2.0, 5.0], [True, False, True, False])
@@ -32,20 +32,20 @@ def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple
 
 
 def quantile(curve: Sequence[tuple[float, float]], share: float) -> float | None:
-    """Return the first time by which it has happened for a share; None if it never has.
+    """Return the first time by which the event has happened for a share; None if it never has.
 
     >>> quantile([(1.0, 0.75), (2.0, 0.5)], 0.5)
     2.0
     """
-    return next((time for time, left in curve if left <= 1 - share + 1e-12), None)
+    return next((time for time, rest in curve if rest <= 1 - share + 1e-12), None)
 
 
 def restricted_mean(curve: Sequence[tuple[float, float]], until: float) -> float:
-    """Return the area under the curve up to a time: the mean of times cut at it.
+    """Return the area under the curve up to a time: the mean of min(time, until).
 
     >>> restricted_mean([(1.0, 0.75), (2.0, 0.5)], 4.0)
     2.75
     """
     times = [0.0, *(min(time, until) for time, _ in curve), until]
-    shares = [1.0, *(left for _, left in curve)]
+    shares = [1.0, *(share for _, share in curve)]
     return float(sum(np.diff(times) * np.array(shares)))

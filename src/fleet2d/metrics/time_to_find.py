@@ -1,4 +1,4 @@
-"""How long robots look for people, and what comes of it."""
+"""Durations and outcomes of robots' searches for people."""
 
 from collections.abc import Mapping
 from datetime import timedelta
@@ -23,15 +23,19 @@ if TYPE_CHECKING:
 ENDS = ("found", "not_at_home", "gave_up")
 
 
-class Search(NamedTuple):
-    """A search.
+class SearchRecord(NamedTuple):
+    """A search for a user.
 
     Attributes:
-        step: When it began. user: Who was looked for. at_home: Whether the user was, when it began.
-        ideal: Metres of the way on which who knows where the user is has the user in sight. metres:
-        Metres that the robot had driven in all when it began; then, during the search. seconds: How
-        long it took. end: What came of it: one of ENDS, `false` where the robot took somebody else
-        for the user, or `open` where the run ended first.
+        step: Step at which it began.
+        user: Name of the user.
+        at_home: Whether the user was at home when it began.
+        ideal: Length of the shortest route to a place from which the user is visible [m].
+        metres: During the search, the robot's total distance driven when it began; after it, the
+            distance driven during the search [m].
+        seconds: Duration [s].
+        end: Outcome: one of ENDS, `false` where the robot mistook another person for the user, or
+            `open` where the run ended first.
     """
 
     step: int
@@ -45,28 +49,28 @@ class Search(NamedTuple):
 
 @register("metric", "time_to_find")
 class TimeToFind(Metric):
-    """Times and outcomes of the searches of behavior `find` for a user, for each robot.
+    """Durations and outcomes of the searches of behavior `find` for a user, for each robot.
 
-    A search takes from its event `find_begins` to `found`, `not_at_home` or `gave_up`. It succeeds
+    A search lasts from its event `find_begins` to `found`, `not_at_home` or `gave_up`. It succeeds
     after that time T if it ends by `found`, and the user then is at home and no farther than
     `sight` from the robot, from centre to centre; else the find is false. A search that doesn't
-    succeed is censored where it ends, or where the run does: all that is known is that T is later.
+    succeed is censored where it ends, or where the run ends: T is later than that.
 
     Of searches for users who were at home when they began:
 
-    - `success`: those that succeed with T <= `deadline` / all.
-    - `median`, `p90`: the least t with S(t) <= 0.5, or 0.1 [s], where S(t) = P(T > t) is estimated
-      as Kaplan and Meier do; left out where S stays above.
+    - `success`: searches that succeed with T <= `deadline` / all.
+    - `median`, `p90`: the least t with S(t) <= 0.5, or 0.1 [s], where S(t) = P(T > t) is the
+      estimate of Kaplan and Meier; left out where S stays above.
     - `mean`: restricted mean: the integral of S from 0 to `deadline`, which is E min(T, deadline)
-      [s]. After the last end S stays as it is.
-    - `spl`: the mean of l / max(l, d), of those that don't succeed 0. Here d is how far the robot
-      drove, and l the clairvoyant's way: along the shortest path to where the user was when the
-      search began, until within `sight` and with no wall between [m].
-    - `ratio`: sum of max(l, d) / sum of l, over those that succeed: 1 is as good as clairvoyant.
-    - `false`, `false_out`: how many ended by a false find, and by `not_at_home`, if any.
+      [s]. After the last end S stays constant.
+    - `spl`: the mean of l / max(l, d), 0 for searches that don't succeed. Here d is the distance
+      that the robot drove, and l the ideal distance: along the shortest path to the place of the
+      user when the search began, until the user is within `sight` with no wall between [m].
+    - `ratio`: sum of max(l, d) / sum of l, over searches that succeed: 1 is ideal.
+    - `false`, `false_out`: number of searches that ended by a false find, and by `not_at_home`.
 
-    Of searches for users who were out: `out_told`: those that ended by `not_at_home` / all, and
-    `out_mean`: how long these took [s]. A robot that looks for anyone isn't counted.
+    Of searches for users who were out: `out_told`: searches that ended by `not_at_home` / all, and
+    `out_mean`: their mean duration [s]. Searches for anyone aren't counted.
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -78,22 +82,22 @@ class TimeToFind(Metric):
     }
 
     deadline: PositiveDuration = Field(
-        default=timedelta(minutes=10), description="until then a find is a success"
+        default=timedelta(minutes=10), description="longest search that counts as a success"
     )
     sight: Length = Field(default=4.5, gt=0, description="how far a robot recognizes somebody [m]")
     radius: Length = Field(default=0.15, gt=0, le=2, description="the robot's radius [m]")
 
     def start(self, home: "Home") -> None:
-        """Begin with no search."""
-        self.open: dict[str, Search] = {}
-        self.done: dict[str, list[Search]] = {}
-        self.driven: dict[str, float] = {}  # metres of each robot before the period
+        """Begin without searches."""
+        self.open: dict[str, SearchRecord] = {}
+        self.done: dict[str, list[SearchRecord]] = {}
+        self.driven: dict[str, float] = {}  # distance of each robot before the period [m]
         self.last: dict[str, tuple[float, float]] = {}
         self.end, self.step_s = 0, 1.0
 
     def update(self, history: History, state: "Present") -> Any:
-        """Take in the searches; return a row for each that ended."""
-        ended: list[tuple[str, Search]] = []
+        """Update the searches; return a row for each that ended."""
+        ended: list[tuple[str, SearchRecord]] = []
         for robot in state.robots:
             driven = self._driven(history, robot)
             for event in history.events:
@@ -101,9 +105,9 @@ class TimeToFind(Metric):
                     continue
                 metres = float(driven[event.step - history.first])
                 if event.event == "find_begins" and event.detail in state.users:
-                    self.open[robot] = self._begun(history, state, event, metres)
+                    self.open[robot] = self._begin(history, state, event, metres)
                 elif event.event in ENDS and robot in self.open:
-                    ended.append((robot, self._ended(history, event, robot, metres)))
+                    ended.append((robot, self._end(history, event, robot, metres)))
             self.driven[robot] = float(driven[-1])
         for robot, search in ended:
             self.done.setdefault(robot, []).append(search)
@@ -111,23 +115,25 @@ class TimeToFind(Metric):
         return _rows(ended)
 
     def _driven(self, history: History, robot: str) -> NDArray[np.float64]:
-        """Return how far a robot has driven by each step of the period [m]."""
+        """Return the distance driven by a robot up to each step of the period [m]."""
         xy = history.poses(robot).xy
         moves = np.diff(xy, axis=0, prepend=[self.last.get(robot, tuple(xy[0].tolist()))])
         self.last[robot] = history.poses(robot).at(-1)
         lengths = np.sqrt((moves * moves).sum(axis=1))
-        driven: NDArray[np.float64] = self.driven.get(robot, 0.0) + np.cumsum(lengths)
-        return driven
+        metres: NDArray[np.float64] = self.driven.get(robot, 0.0) + np.cumsum(lengths)
+        return metres
 
-    def _begun(self, history: History, state: "Present", event: Event, metres: float) -> Search:
+    def _begin(
+        self, history: History, state: "Present", event: Event, metres: float
+    ) -> SearchRecord:
         i, user = event.step - history.first, history.poses(event.detail)
         at_home = not bool(user.away[i])
         ideal = 0.0
         if at_home:
             ideal = self._ideal(state.home, history.poses(event.entity).at(i), user.at(i))
-        return Search(event.step, event.detail, at_home, ideal, metres)
+        return SearchRecord(event.step, event.detail, at_home, ideal, metres)
 
-    def _ended(self, history: History, event: Event, robot: str, metres: float) -> Search:
+    def _end(self, history: History, event: Event, robot: str, metres: float) -> SearchRecord:
         search, end = self.open.pop(robot), event.event
         i, user = event.step - history.first, history.poses(search.user)
         gap = np.array(history.poses(robot).at(i)) - user.at(i)
@@ -140,12 +146,12 @@ class TimeToFind(Metric):
         )
 
     def _ideal(self, home: "Home", robot: tuple[float, float], user: tuple[float, float]) -> float:
-        """Return how far a robot drives straight to a user until it could see the user [m]."""
+        """Return the shortest distance to drive until a robot could see a user [m]."""
         plan, space = home.plan, home.space(self.radius)
         lattice = plan.lattice
-        start, there = lattice.point_at(robot), lattice.point_at(user)
+        start, target = lattice.point_at(robot), lattice.point_at(user)
         part = space.part_at(*start)
-        goal = tuple(there) if space.part_at(*there) == part else space.nearest(*there, part)
+        goal = tuple(target) if space.part_at(*target) == part else space.nearest(*target, part)
         route = None if goal is None or part < 0 else space.route(tuple(start), goal)
         if route is None:
             return 0.0
@@ -154,62 +160,62 @@ class TimeToFind(Metric):
         at = np.append(np.arange(0.0, total, lattice.units_per_m / 10), total)
         points = np.stack([np.interp(at, along, route[:, k]) for k in (0, 1)], axis=1)
         points = np.rint(points).astype(np.int64)
-        near = ((points - there) ** 2).sum(axis=1) <= (self.sight * lattice.units_per_m) ** 2
-        seen = near & points_in_sight(plan.mesh, there[0], there[1], points)
-        first = int(np.argmax(seen)) if seen.any() else len(at) - 1
+        is_near = ((points - target) ** 2).sum(axis=1) <= (self.sight * lattice.units_per_m) ** 2
+        is_visible = is_near & points_in_sight(plan.mesh, target[0], target[1], points)
+        first = int(np.argmax(is_visible)) if is_visible.any() else len(at) - 1
         return float(at[first]) / lattice.units_per_m
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: numbers}, each where it can be told."""
+        """Return {robot: numbers}, without undefined ones."""
         searches = {robot: list(done) for robot, done in self.done.items()}
         for robot, search in self.open.items():
             seconds = (self.end - search.step) * self.step_s
             cut = search._replace(seconds=seconds, end="open")
             searches.setdefault(robot, []).append(cut)
-        return {robot: self._numbers(found) for robot, found in searches.items()}
+        return {robot: self._numbers(records) for robot, records in searches.items()}
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return whether and how soon people are found, and by how long ways."""
+        """Return whether and how soon people are found, and the length of the paths."""
         hidden = ("p90", "spl", "out_mean")
         return {
             robot: {key: value for key, value in numbers.items() if key not in hidden}
             for robot, numbers in result.items()
         }
 
-    def _numbers(self, searches: list[Search]) -> dict[str, Any]:
+    def _numbers(self, searches: list[SearchRecord]) -> dict[str, Any]:
         until = self.deadline.total_seconds()
-        home = [s for s in searches if s.at_home]
-        out = [s for s in searches if not s.at_home]
+        at_home = [s for s in searches if s.at_home]
+        away = [s for s in searches if not s.at_home]
         numbers: dict[str, Any] = {"searches": len(searches)}
-        wrong = {
+        mistakes = {
             "false": sum(s.end == "false" for s in searches),
-            "false_out": sum(s.end == "not_at_home" for s in home),
+            "false_out": sum(s.end == "not_at_home" for s in at_home),
         }
-        numbers |= {name: count for name, count in wrong.items() if count}
-        if home:
-            found = [s for s in home if s.end == "found"]
-            curve = kaplan_meier([s.seconds for s in home], [s.end == "found" for s in home])
-            in_time = [s for s in found if s.seconds <= until]
-            numbers["success"] = len(in_time) / len(home)
+        numbers |= {name: count for name, count in mistakes.items() if count}
+        if at_home:
+            finds = [s for s in at_home if s.end == "found"]
+            curve = kaplan_meier([s.seconds for s in at_home], [s.end == "found" for s in at_home])
+            in_time = [s for s in finds if s.seconds <= until]
+            numbers["success"] = len(in_time) / len(at_home)
             numbers["mean"] = restricted_mean([c for c in curve if c[0] <= until], until)
             for name, share in (("median", 0.5), ("p90", 0.9)):
                 if (time := quantile(curve, share)) is not None:
                     numbers[name] = time
-            quality = [s.ideal / max(s.ideal, s.metres) if s.metres > 0 else 1.0 for s in found]
-            numbers["spl"] = sum(quality) / len(home)
-            if sum(s.ideal for s in found) > 0:
-                most = sum(max(s.ideal, s.metres) for s in found)
-                numbers["ratio"] = most / sum(s.ideal for s in found)
-        if out:
-            told = [s for s in out if s.end == "not_at_home"]
-            numbers["out_told"] = len(told) / len(out)
-            if told:
-                numbers["out_mean"] = sum(s.seconds for s in told) / len(told)
+            quality = [s.ideal / max(s.ideal, s.metres) if s.metres > 0 else 1.0 for s in finds]
+            numbers["spl"] = sum(quality) / len(at_home)
+            if sum(s.ideal for s in finds) > 0:
+                most = sum(max(s.ideal, s.metres) for s in finds)
+                numbers["ratio"] = most / sum(s.ideal for s in finds)
+        if away:
+            correct = [s for s in away if s.end == "not_at_home"]
+            numbers["out_told"] = len(correct) / len(away)
+            if correct:
+                numbers["out_mean"] = sum(s.seconds for s in correct) / len(correct)
         return numbers
 
 
-def _rows(ended: list[tuple[str, Search]]) -> dict[str, Any] | None:
+def _rows(ended: list[tuple[str, SearchRecord]]) -> dict[str, Any] | None:
     if not ended:
         return None
     return {

@@ -1,4 +1,4 @@
-"""How much robots move about."""
+"""How much robots move."""
 
 from collections.abc import Mapping
 from datetime import timedelta
@@ -24,53 +24,53 @@ Place = tuple[float, float]
 class Travel(Metric):
     """Relocations and metres a day, of each robot.
 
-    A robot rests where it stays on the spot for `rest` or longer, turning or not. A relocation is a
-    rest at a place more than `apart` from that of the rest before. Metres are the sum of the moves
-    from step to step.
+    A robot rests where its position doesn't change for `rest` or longer, turning or not. A
+    relocation is a rest more than `apart` away from the previous rest. Metres are the sum of the
+    moves from step to step.
     """
 
     units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
 
     rest: PositiveDuration = Field(
-        default=timedelta(minutes=1), description="standing for so long is a rest"
+        default=timedelta(minutes=1), description="shortest time at one place that is a rest"
     )
-    apart: Length = Field(default=0.5, ge=0, description="two rests are at two places from then on")
+    apart: Length = Field(default=0.5, ge=0, description="distance between two places of rest [m]")
 
     def start(self, home: "Home") -> None:
         """Begin counting."""
         self.metres: dict[str, float] = {}
         self.relocations: dict[str, int] = {}
-        self.rested: dict[str, Place] = {}  # where the last rest was
-        self.still: dict[str, tuple[Place, int]] = {}  # where it stands, and for how many steps
+        self.last_rest: dict[str, Place] = {}  # place of the last rest
+        self.standing: dict[str, tuple[Place, int]] = {}  # place, and for how many steps
         self.days = 0.0
 
     def update(self, history: History, state: "Present") -> Any:
         """Add up moves and rests."""
-        long = self.rest.total_seconds() / history.step_s
+        rest_steps = self.rest.total_seconds() / history.step_s
         for robot in state.robots:
             poses = history.poses(robot)
-            last = self.still.get(robot)
-            between = 0.0 if last is None else dist(last[0], poses.at(0))
+            standing = self.standing.get(robot)
+            between = 0.0 if standing is None else dist(standing[0], poses.at(0))
             self.metres[robot] = self.metres.get(robot, 0.0) + between + poses.distance
             self.relocations.setdefault(robot, 0)
             changes = np.flatnonzero((np.diff(poses.xy, axis=0) != 0).any(axis=1)) + 1
             begins = [0, *changes.tolist()]
             for begin, end in zip(begins, [*begins[1:], len(history)], strict=True):
                 place, steps = poses.at(begin), end - begin
-                if last is not None and last[0] == place:
-                    steps += last[1]
-                last = place, steps
-                if steps >= long:
+                if standing is not None and standing[0] == place:
+                    steps += standing[1]
+                standing = place, steps
+                if steps >= rest_steps:
                     self._rest(robot, place)
-            assert last is not None
-            self.still[robot] = last
+            assert standing is not None
+            self.standing[robot] = standing
         self.days += len(history) * history.step_s / 86400
 
     def _rest(self, robot: str, place: Place) -> None:
-        if robot in self.rested and dist(self.rested[robot], place) > self.apart:
+        if robot in self.last_rest and dist(self.last_rest[robot], place) > self.apart:
             self.relocations[robot] += 1
-            self.rested[robot] = place
-        self.rested.setdefault(robot, place)
+            self.last_rest[robot] = place
+        self.last_rest.setdefault(robot, place)
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {relocations, metres}}, both per day."""

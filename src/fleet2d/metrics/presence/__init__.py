@@ -1,1 +1,1 @@
-"""How right what is believed about presence is: distances, scores, and the metrics made of them."""
+"""Metrics of presence: errors of long-term presence, and scores of real-time presence."""

@@ -1,7 +1,7 @@
 """Distances between an estimated distribution over rooms and the true one.
 
-They use IEEE arithmetic only, no logarithm of the system's library: a stored table is the same on
-every machine.
+They use IEEE arithmetic only, no logarithms of the system's math library, so that stored tables are
+the same on every machine.
 """
 
 from collections.abc import Iterable
@@ -13,20 +13,20 @@ from fleet2d.algorithms.presence.logarithm import LN_2, natural_log
 
 F64 = NDArray[np.float64]
 
-NOTHING = 1e-12  # mass and metres below which nothing is moved
+NOTHING = 1e-12  # probability mass below which nothing is moved
 
 
 def total_variation(truth: F64, estimate: F64) -> F64:
-    """Return 1/2 sum |p - q|: the largest gap of probability over any set of rooms, 0 to 1.
+    """Return 1/2 sum |p - q|: the largest difference in probability of any set of rooms, 0 to 1.
 
-    This and what follows sums over the last axis.
+    Like the other distances, it sums over the last axis.
 
     Example:
         >>> float(total_variation(np.array([0.5, 0.5]), np.array([0.75, 0.25])))
         0.25
     """
-    found: F64 = np.abs(truth - estimate).sum(axis=-1) / 2
-    return found
+    distance: F64 = np.abs(truth - estimate).sum(axis=-1) / 2
+    return distance
 
 
 def kl_divergence(truth: F64, estimate: F64, alpha: float = 1e-3) -> F64:
@@ -57,123 +57,129 @@ def jensen_shannon(truth: F64, estimate: F64) -> F64:
 
 
 def _relative_entropy(p: F64, q: F64) -> F64:
-    some = p > 0
-    found: F64 = (p * natural_log(np.where(some, p, 1) / np.where(some, q, 1))).sum(axis=-1)
-    return found
+    is_positive = p > 0
+    ratio = np.where(is_positive, p, 1) / np.where(is_positive, q, 1)
+    entropy: F64 = (p * natural_log(ratio)).sum(axis=-1)
+    return entropy
 
 
 def room_gaps(truth: F64, estimate: F64) -> F64:
     """Return |p - q| of each room."""
-    found: F64 = np.abs(truth - estimate)
-    return found
+    gaps: F64 = np.abs(truth - estimate)
+    return gaps
 
 
 def earth_mover(truth: F64, estimate: F64, cost: F64) -> float:
-    """Return the least mean way by which one distribution is moved onto the other.
+    """Return the least mean distance by which one distribution is moved onto the other.
 
-    The minimum over flows f >= 0 from room to room that turn q into p, of sum f_ij cost_ij. Solved
-    exactly, by successive shortest ways; mass that both have in a room stays.
+    The minimum of sum f_ij cost_ij over flows f >= 0 from room to room that turn q into p. Solved
+    exactly, by successive shortest paths; mass that both have in a room stays.
 
     Args:
         truth: float64 (rooms,), sums to one.
         estimate: float64 (rooms,), sums to one.
-        cost: float64 (rooms, rooms), finite, of metres on foot; 0 to a room itself, and no way
-            round by a third room is shorter.
+        cost: float64 (rooms, rooms), finite, distances on foot [m]; 0 on the diagonal, and the
+            triangle inequality holds.
 
     Example:
         >>> metres = np.array([[0.0, 4, 9], [4, 0, 5], [9, 5, 0]])
         >>> earth_mover(np.array([0.5, 0.5, 0]), np.array([0.5, 0, 0.5]), metres)
         2.5
     """
-    spare, metres = (estimate - truth).tolist(), cost.tolist()
-    giving = [i for i, mass in enumerate(spare) if mass > NOTHING]
-    taking = [j for j, mass in enumerate(spare) if mass < -NOTHING]
-    flow = _Flow([[metres[i][j] for j in taking] for i in giving], [-spare[j] for j in taking])
-    for row, i in enumerate(giving):
-        left = spare[i]
-        while left > NOTHING and max(flow.need, default=0.0) > NOTHING:
-            left -= flow.push(row, left)
+    surplus, metres = (estimate - truth).tolist(), cost.tolist()
+    sources = [i for i, mass in enumerate(surplus) if mass > NOTHING]
+    sinks = [j for j, mass in enumerate(surplus) if mass < -NOTHING]
+    flow = _Flow([[metres[i][j] for j in sinks] for i in sources], [-surplus[j] for j in sinks])
+    for row, i in enumerate(sources):
+        rest = surplus[i]
+        while rest > NOTHING and max(flow.demand, default=0.0) > NOTHING:
+            rest -= flow.push(row, rest)
     return flow.cost
 
 
 class _Flow:
-    """A cheapest flow from those who give to those who take, which grows by shortest ways.
+    """A minimum cost flow from sources to sinks, which grows by shortest paths.
 
-    Ways are measured by what they cost beyond what their ends are worth, never below zero, so that
-    Dijkstra's algorithm finds the shortest; ways in use cost nothing.
+    Dijkstra's algorithm finds these paths by reduced costs, the costs less the difference of the
+    potentials of both ends, which are never below zero, and zero for edges in use.
 
     Attributes:
-        metres: What a way costs.
-        need: What each who takes still lacks.
-        mass: What goes each of the ways.
+        metres: The cost of each edge, by source and sink.
+        demand: The mass that each sink still lacks.
+        mass: The flow along each edge, by source and sink.
     """
 
-    def __init__(self, metres: list[list[float]], need: list[float]) -> None:
-        self.metres, self.need = metres, need
-        self.mass = [[0.0] * len(need) for _ in metres]
-        self._give, self._take = [0.0] * len(metres), [0.0] * len(need)  # what they are worth
+    def __init__(self, metres: list[list[float]], demand: list[float]) -> None:
+        self.metres, self.demand = metres, demand
+        self.mass = [[0.0] * len(demand) for _ in metres]
+        self._source_potential, self._sink_potential = [0.0] * len(metres), [0.0] * len(demand)
 
     @property
     def cost(self) -> float:
         """The sum of mass times metres."""
         pairs = zip(self.mass, self.metres, strict=True)
-        return sum(a * b for row, ways in pairs for a, b in zip(row, ways, strict=True))
+        return sum(a * b for row, costs in pairs for a, b in zip(row, costs, strict=True))
 
     def push(self, source: int, most: float) -> float:
-        """Send mass from one who gives, shifting what others send; return how much."""
-        far, came = [float("inf")] * len(self.need), [source] * len(self.need)
-        reached, back = {source: 0.0}, dict[int, int]()
-        left = dict.fromkeys(range(len(self.need)))  # takers whose shortest way isn't known yet
-        self._reach(source, 0.0, far, came, left)
+        """Send at most `most` mass from a source along a shortest path; return how much."""
+        distance, parent = [float("inf")] * len(self.demand), [source] * len(self.demand)
+        visited, back = {source: 0.0}, dict[int, int]()
+        open_sinks = dict.fromkeys(range(len(self.demand)))  # whose distance isn't final yet
+        self._relax(source, 0.0, distance, parent, open_sinks)
         while True:
-            end = min(left, key=far.__getitem__)
-            if self.need[end] > NOTHING:
+            end = min(open_sinks, key=distance.__getitem__)
+            if self.demand[end] > NOTHING:
                 break
-            del left[end]
+            del open_sinks[end]
             for i, row in enumerate(self.mass):
-                if row[end] > NOTHING and i not in reached:
-                    reached[i], back[i] = far[end], end
-                    self._reach(i, far[end], far, came, left)
-        for i, way in reached.items():
-            self._give[i] += far[end] - way
-        for j in range(len(self.need)):
-            if j not in left:
-                self._take[j] -= far[end] - far[j]
-        return self._shift(source, end, came, back, most)
+                if row[end] > NOTHING and i not in visited:
+                    visited[i], back[i] = distance[end], end
+                    self._relax(i, distance[end], distance, parent, open_sinks)
+        for i, length in visited.items():
+            self._source_potential[i] += distance[end] - length
+        for j in range(len(self.demand)):
+            if j not in open_sinks:
+                self._sink_potential[j] -= distance[end] - distance[j]
+        return self._augment(source, end, parent, back, most)
 
-    def _reach(
-        self, i: int, way: float, far: list[float], came: list[int], left: Iterable[int]
+    def _relax(
+        self,
+        i: int,
+        length: float,
+        distance: list[float],
+        parent: list[int],
+        open_sinks: Iterable[int],
     ) -> None:
-        """Take in the ways on from one who gives."""
-        begin, ways = way - self._give[i], self.metres[i]
-        for j in left:
-            reduced = begin + ways[j] - self._take[j]
-            if reduced < far[j]:
-                far[j], came[j] = reduced, i
+        """Shorten the distances of sinks by the edges of source `i`, `length` from the start."""
+        begin, costs = length - self._source_potential[i], self.metres[i]
+        for j in open_sinks:
+            reduced = begin + costs[j] - self._sink_potential[j]
+            if reduced < distance[j]:
+                distance[j], parent[j] = reduced, i
 
-    def _shift(
-        self, source: int, end: int, came: list[int], back: dict[int, int], most: float
+    def _augment(
+        self, source: int, end: int, parent: list[int], back: dict[int, int], most: float
     ) -> float:
-        """Send mass to `end` by the way that it came; return how much."""
-        there, again = [(came[end], end)], list[tuple[int, int]]()
-        while (i := there[-1][0]) != source:
-            again.append((i, back[i]))
-            there.append((came[back[i]], back[i]))
-        amount = min(most, self.need[end], *(self.mass[i][j] for i, j in again))
-        for i, j in there:
+        """Send mass to the sink `end` along the path found; return how much."""
+        forward, backward = [(parent[end], end)], list[tuple[int, int]]()
+        while (i := forward[-1][0]) != source:
+            backward.append((i, back[i]))
+            forward.append((parent[back[i]], back[i]))
+        amount = min(most, self.demand[end], *(self.mass[i][j] for i, j in backward))
+        for i, j in forward:
             self.mass[i][j] += amount
-        for i, j in again:
+        for i, j in backward:
             self.mass[i][j] -= amount
-        self.need[end] -= amount
+        self.demand[end] -= amount
         return amount
 
 
 def rank_correlation(truth: F64, estimate: F64) -> F64:
-    """Return how far the order of rooms is right: Kendall's tau, -1 to 1.
+    """Return the rank correlation of the rooms: Kendall's tau, -1 to 1.
 
-    (concordant - discordant) / pairs, of the pairs of rooms that differ in truth; those tied in the
-    estimate are neither (Somers' D of the estimate given the truth: with no ties at all Kendall's
-    tau). So rooms that are never used don't keep it from 1. 1 if no rooms differ in truth.
+    (concordant - discordant) / pairs, over the pairs of rooms that differ in truth; pairs tied in
+    the estimate are neither (Somers' D of the estimate given the truth: without ties Kendall's
+    tau). So it can be 1 with rooms that are never used. It is 1 if no rooms differ in truth.
 
     Example:
         >>> float(rank_correlation(np.array([0.6, 0.4, 0, 0]), np.array([0.5, 0.3, 0.2, 0])))
@@ -183,6 +189,6 @@ def rank_correlation(truth: F64, estimate: F64) -> F64:
     """
     true = np.sign(truth[..., :, None] - truth[..., None, :])
     signs = true * np.sign(estimate[..., :, None] - estimate[..., None, :])
-    pairs, right = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
-    found: F64 = np.where(pairs > 0, right / np.maximum(pairs, 1), 1.0)
-    return found
+    pairs, balance = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
+    correlation: F64 = np.where(pairs > 0, balance / np.maximum(pairs, 1), 1.0)
+    return correlation

@@ -1,4 +1,4 @@
-"""How far long-term presence is from where users really were."""
+"""Errors of long-term presence against the true occupancy of rooms."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
 from fleet2d.component import register
 from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.presence.believed import presence_of
+from fleet2d.metrics.presence.belief_reader import presence_of
 from fleet2d.metrics.presence.distances import (
     earth_mover,
     jensen_shannon,
@@ -42,21 +42,21 @@ SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
 COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
 
 
-class Realised(Metric):
-    """Base of what compares long-term presence with the realised occupancy of a window.
+class LongTermMetric(Metric):
+    """Base of metrics that compare long-term presence with the true occupancy of a window.
 
-    The truth is how long each user really was in each room, from the beginning of the run, or in
-    the last `window`, up to now: not what the user was set up to do.
+    The truth is the time that each user really was in each room, from the beginning of the run, or
+    in the last `window`, up to now: not what the user's routine plans.
     """
 
     of: str = Field(description="the algorithm whose presence is measured")
     window: PositiveDuration | None = Field(
         default=None,
-        description="the truth is that of the last such time, in whole periods; null: of all time",
+        description="time over which the truth is counted, in whole periods; null: the whole run",
     )
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithm that it measures."""
+        """Return the name of the algorithm that it measures."""
         return (self.of,)
 
     def start(self, home: "Home") -> None:
@@ -81,8 +81,8 @@ class Realised(Metric):
 
 
 @register("metric", "ltp_error")
-class LtpError(Realised):
-    """Distance of long-term presence from the realised occupancy, over time.
+class LtpError(LongTermMetric):
+    """Distance of long-term presence from the true occupancy, over time.
 
     Per period and user (and anyone), with p the true and q the estimated shares of rooms:
 
@@ -90,20 +90,19 @@ class LtpError(Realised):
     - js: Jensen-Shannon divergence to base 2, 0 to 1;
     - kl: sum p ln(p / q'), q' being q smoothed by `alpha` [nats];
     - max_gap, mean_gap: greatest and mean |p - q| of a room;
-    - tau: how far the order of rooms is right, Kendall's tau of the pairs that differ in truth, -1
-      to 1 (`distances.rank_correlation`): what a robot that goes to the likeliest rooms feels;
-    - earth_mover_m: least mean way on foot by which q is moved onto p [m], from middle to middle
-      of rooms; only `given: home`;
+    - tau: rank correlation of the rooms, Kendall's tau of the pairs that differ in truth, -1 to 1
+      (`distances.rank_correlation`): it matters to a robot that goes to the likeliest rooms;
+    - earth_mover_m: least mean distance on foot by which q is moved onto p [m], between the middles
+      of rooms; only with `given: home`;
     - inside: share of rooms whose p lies in the stated interval, if there is one and `given: home`.
 
     The shares are `given: home`; or of all time with away as one more room (`away`); or given at
-    home at each hour of the week (`hour_of_week`), where distances are means over the hours, each
-    with the weight of the time that the user was at home then.
+    home at each hour of the week (`hour_of_week`), where distances are means over the hours,
+    weighted by the time that the user was at home.
 
-    The result has the values at the end; `flips`, at how many updates the likeliest room at home
-    was another than at the one before; and `burn_in_day`: the first day n, from 1, at whose end tv
-    was at most `burn_in` and stayed so. It is missing if that never came. Users who were never at
-    home are left out.
+    The result has the values at the end; `flips`, the number of updates that changed the likeliest
+    room at home; and `burn_in_day`: the first day n, from 1, from whose end on tv was at most
+    `burn_in`, left out if there is none. Users who were never at home are left out.
     """
 
     unit: ClassVar[str] = "at the end"
@@ -126,21 +125,20 @@ class LtpError(Realised):
         self.metres = walking_distances(home)
         self.last: dict[str, dict[str, float]] = {}
         self.within: dict[str, float | None] = {}
-        self.best: dict[str, tuple[int, int]] = {}  # the likeliest room, and how often it changed
+        self.best: dict[str, tuple[int, int]] = {}  # the likeliest room, and its changes so far
 
     def update(self, history: History, state: "Present") -> Any:
-        """Compare what is believed with what was so far; return a row per user."""
-        weekly = self.given == "hour_of_week"
-        found = (steps_by_hour if weekly else steps_in_places)(history, state)
-        counts, steps = self.count(found, history)
+        """Compare the presence with the truth so far; return a row for each user."""
+        count_steps = steps_by_hour if self.given == "hour_of_week" else steps_in_places
+        counts, steps = self.count(count_steps(history, state), history)
         presence = presence_of(self.of, state)
         if presence is None:
             return None
         rows: dict[str, dict[str, float]] = {}
         for row, user in enumerate((*state.users, ANYONE)):
-            mine = counts[..., row, :]
-            if mine[..., :-1].any():
-                rows[user] = self._compare(presence, user, mine, steps)
+            user_counts = counts[..., row, :]
+            if user_counts[..., :-1].any():
+                rows[user] = self._compare(presence, user, user_counts, steps)
                 self._note(user, rows[user], presence)
         if not rows:
             return None
@@ -167,13 +165,13 @@ class LtpError(Realised):
 
     def _by_hour(self, estimate: F64, counts: I64) -> dict[str, float]:
         home, _ = shares(counts, 1)
-        weight = counts[:, :-1].sum(axis=1).astype(np.float64)
-        some = weight > 0
-        return self._distances(home[some], estimate[some], weight[some] / weight.sum())
+        steps = counts[:, :-1].sum(axis=1).astype(np.float64)
+        hours = np.flatnonzero(steps)
+        return self._distances(home[hours], estimate[hours], steps[hours] / steps.sum())
 
     def _distances(self, truth: F64, estimate: F64, weight: F64 | None = None) -> dict[str, float]:
         gaps = room_gaps(truth, estimate)
-        found = (
+        values = (
             total_variation(truth, estimate),
             jensen_shannon(truth, estimate),
             kl_divergence(truth, estimate, self.alpha),
@@ -183,16 +181,16 @@ class LtpError(Realised):
         )
         return {
             name: float(value if weight is None else (value * weight).sum())
-            for name, value in zip(COLUMNS, found, strict=True)
+            for name, value in zip(COLUMNS, values, strict=True)
         }
 
     def _note(self, user: str, row: dict[str, float], presence: Presence) -> None:
-        """Keep the newest row, since when it has been good, and how often the best room changed."""
+        """Store the newest row, the day since which tv is small, and changes of the best room."""
         self.last[user] = row
         best, flips = int(presence.share(user).argmax()), 0
         if user in self.best:
-            before, flips = self.best[user]
-            flips += best != before
+            last_best, flips = self.best[user]
+            flips += best != last_best
         self.best[user] = best, flips
         if row["tv"] > self.burn_in:
             self.within[user] = None
@@ -201,31 +199,31 @@ class LtpError(Realised):
 
     def result(self) -> dict[str, Any]:
         """Return {user: {tv, js, …, flips, burn_in_day}} at the end."""
-        found = {user: {**row, "flips": self.best[user][1]} for user, row in self.last.items()}
+        results = {user: {**row, "flips": self.best[user][1]} for user, row in self.last.items()}
         for user, day in self.within.items():
             if day is not None:
-                found[user]["burn_in_day"] = day
-        return found
+                results[user]["burn_in_day"] = day
+        return results
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return each user's total variation, metres and day of burn-in."""
-        only = len(result) == 2  # a user, who is anyone, too
+        has_one_user = len(result) == 2  # whose row is equal to that of anyone
         return {
             user: {name: row[name] for name in SHOWN if name in row}
             for user, row in result.items()
-            if not (only and user == ANYONE)
+            if not (has_one_user and user == ANYONE)
         }
 
 
 @register("metric", "ltp_gap")
-class LtpGap(Realised):
+class LtpGap(LongTermMetric):
     """Gap of long-term presence per room, over time: |p - q|, given at home.
 
-    p is the user's realised share of time at home in the room so far, or in the last `window`, q
-    the estimate. Stored per period, user (and anyone) and room: both, the gap, and the ends of the
-    interval, if there is one. The result has the gaps at the end, and per user `mean`. Users who
-    were never at home are left out.
+    p is the user's true share of time at home in the room so far, or in the last `window`, q the
+    estimate. Stored per period, user (and anyone) and room: both, the gap, and the ends of the
+    interval, if there is one. The result has the gaps at the end, and their mean for each user.
+    Users who were never at home are left out.
     """
 
     unit: ClassVar[str] = "share of time, gap at the end"
@@ -237,7 +235,7 @@ class LtpGap(Realised):
         self.last: dict[str, F64] = {}
 
     def update(self, history: History, state: "Present") -> Any:
-        """Compare what is believed with what was so far; return a row per user and room."""
+        """Compare the presence with the truth so far; return a row for each user and room."""
         counts, steps = self.count(steps_in_places(history, state), history)
         presence = presence_of(self.of, state)
         users = [
@@ -273,12 +271,12 @@ class LtpGap(Realised):
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return each user's mean gap, and the greatest with its room."""
-        found = {}
+        """Return each user's mean gap, and the largest gap with its room."""
+        summary = {}
         for user, gaps in result.items():
             if len(result) == 2 and user == ANYONE:
                 continue  # the same as the only user
             rooms = {room: gap for room, gap in gaps.items() if room != MEAN}
             worst = max(rooms, key=lambda room: rooms[room])
-            found[user] = {MEAN: gaps[MEAN], worst: rooms[worst]}
-        return found
+            summary[user] = {MEAN: gaps[MEAN], worst: rooms[worst]}
+        return summary

@@ -1,4 +1,4 @@
-"""Where users really were: the truth that presence is measured by."""
+"""True occupancy of rooms, which presence is measured by."""
 
 from datetime import timedelta
 from typing import TYPE_CHECKING
@@ -21,14 +21,15 @@ I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
 
 HOUR_US = 3_600_000_000
-# What a person needs beside walls, to walk from room to room [m].
+# Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
 
 
 def steps_in_places(history: History, state: "Present") -> I64:
-    """Return how many steps everybody was in each place: int64 (users + 1, rooms + 1).
+    """Return the number of steps that each user was in each place: int64 (users + 1, rooms + 1).
 
-    The last row is of anyone: steps with somebody in the room, and last with nobody at home.
+    The last column is away. The last row is for anyone: steps with somebody in the room, and last
+    with nobody at home.
     """
     rooms, users = len(state.home.rooms), state.users
     counts = np.zeros((len(users) + 1, rooms + 1), np.int64)
@@ -49,11 +50,11 @@ def steps_by_hour(history: History, state: "Present") -> I64:
     for row, user in enumerate(users):
         room = history.poses(user).room.astype(np.int64)
         place = np.where(room == NOWHERE, rooms, room)
-        found = np.bincount(hour * (rooms + 1) + place, minlength=HOURS * (rooms + 1))
-        counts[:, row] = found.reshape(HOURS, rooms + 1)
+        steps = np.bincount(hour * (rooms + 1) + place, minlength=HOURS * (rooms + 1))
+        counts[:, row] = steps.reshape(HOURS, rooms + 1)
     first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
-    found = np.add.reduceat(_anybody(history, state), first, axis=0, dtype=np.int64)
-    np.add.at(counts[:, -1], hour[first], found)
+    steps = np.add.reduceat(_anybody(history, state), first, axis=0, dtype=np.int64)
+    np.add.at(counts[:, -1], hour[first], steps)
     return counts
 
 
@@ -61,25 +62,25 @@ def hours_of_week(history: History, state: "Present") -> I64:
     """Return the hour of the week, from Monday 00:00, of each step of a history."""
     monday = state.start.replace(hour=0, minute=0, second=0, microsecond=0)
     monday -= timedelta(days=monday.weekday())
-    since = (state.start - monday) // timedelta(microseconds=1)
+    start_us = (state.start - monday) // timedelta(microseconds=1)
     steps = np.arange(history.first, history.end, dtype=np.int64)
-    return (since + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
+    return (start_us + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
 
 
 def _anybody(history: History, state: "Present") -> NDArray[np.bool_]:
-    """Return where somebody was at each step, last nobody at home: bool (steps, rooms + 1)."""
+    """Return whether each room had somebody in it, last nobody at home: bool (steps, rooms + 1)."""
     change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
     for user in state.users:
         begin, end, room = history.poses(user).visits
-        np.add.at(change, (begin, room), 1)  # -1, who is away, is the last
+        np.add.at(change, (begin, room), 1)  # NOWHERE is -1: the last column
         np.add.at(change, (end, room), -1)
-    somewhere: NDArray[np.bool_] = np.cumsum(change[:-1], axis=0) > 0
-    somewhere[:, -1] = ~somewhere[:, :-1].any(axis=1)
-    return somewhere
+    is_occupied: NDArray[np.bool_] = np.cumsum(change[:-1], axis=0) > 0
+    is_occupied[:, -1] = ~is_occupied[:, :-1].any(axis=1)
+    return is_occupied
 
 
 def shares(counts: I64, steps: float) -> tuple[F64, F64]:
-    """Return counts as shares of rooms given at home, NaN who never was, and of away."""
+    """Return counts as shares of rooms given at home, NaN without any time there, and of away."""
     rooms = counts[..., :-1].astype(np.float64)
     total = rooms.sum(axis=-1, keepdims=True)
     home = np.where(total > 0, rooms / np.where(total > 0, total, 1), np.nan)
@@ -87,9 +88,9 @@ def shares(counts: I64, steps: float) -> tuple[F64, F64]:
 
 
 def walking_distances(home: "Home") -> F64:
-    """Return how far it is on foot from the middle of each room to that of each other [m].
+    """Return the distance on foot between the middles of each two rooms [m].
 
-    Where no way leads it is twice the longest way there is.
+    Without a route between them it is twice the longest distance.
 
     Returns:
         float64 (rooms, rooms), symmetric, read-only.
@@ -107,8 +108,8 @@ def _distances(home: "Home", space: "Space") -> F64:
     columns, rows = np.array(places, np.int64).reshape(-1, 2).T // SUB
     metres = np.array([space.distance_field(np.array([place]))[rows, columns] for place in places])
     metres = np.minimum(metres, metres.T)
-    reached = np.isfinite(metres)
-    longest = float(metres[reached].max(initial=0.0)) or 1.0
-    metres = np.where(reached, metres, 2 * longest)
+    is_reachable = np.isfinite(metres)
+    longest = float(metres[is_reachable].max(initial=0.0)) or 1.0
+    metres = np.where(is_reachable, metres, 2 * longest)
     np.fill_diagonal(metres, 0)
     return metres

@@ -1,4 +1,4 @@
-"""What algorithms put out, read as presence by the metrics that measure it."""
+"""Outputs of algorithms as presence, for the metrics that measure it."""
 
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
@@ -21,10 +21,10 @@ I64 = NDArray[np.int64]
 def presence_of(name: str, state: "Present") -> Presence | None:
     """Return an algorithm's newest output as presence; None before the first.
 
-    A RoomDistribution is taken as that of every user and of anyone, who are never away.
+    A RoomDistribution counts for every user and for anyone, who are never away.
 
     Raises:
-        ComponentError: It is neither.
+        ComponentError: The output is neither a Presence nor a RoomDistribution.
     """
     output: Any = state.outputs.get(name)
     if output is None or isinstance(output, Presence):
@@ -39,19 +39,19 @@ def presence_of(name: str, state: "Present") -> Presence | None:
     )
 
 
-class Belief:
-    """What an algorithm believed at the end of each bin of a period.
+class BeliefReader:
+    """Reads what an algorithm believed at the end of each bin of a period.
 
-    That is its track of the bins; of an algorithm without one it is the forecast of its newest
-    output before the period.
+    That is the output's track of the bins; without a track, it is the forecast of the newest output
+    before the period.
 
     Attributes:
-        name: The algorithm.
+        name: Name of the algorithm.
     """
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._before: Presence | None = None
+        self._previous: Presence | None = None
 
     def at(self, history: History, state: "Present", ends: I64) -> tuple[F64, F64] | None:
         """Return shares of rooms (bins, users + 1, rooms) and of away (bins, users + 1).
@@ -62,32 +62,32 @@ class Belief:
             ends: The last step of each whole bin of the period.
 
         Returns:
-            None if it has told nothing of these bins.
+            None if the algorithm has no output for these bins.
 
         Raises:
-            ComponentError: It has another period.
+            ComponentError: The algorithm has another period than the metric.
         """
-        before, presence = self._before, presence_of(self.name, state)
-        self._before = presence if presence is not None else before
+        previous, presence = self._previous, presence_of(self.name, state)
+        self._previous = presence if presence is not None else previous
         if not len(ends):
             return None
         if presence is not None and presence.track is not None:
             return self._tracked(presence.track, history, ends)
-        if before is None:
+        if previous is None:
             return None
         times = [state.start + timedelta(seconds=(int(e) + 1) * history.step_s) for e in ends]
-        arrays = [before.at(time).arrays for time in times]
+        arrays = [previous.at(time).arrays for time in times]
         return np.array([home for home, _ in arrays]), np.array([away for _, away in arrays])
 
     def _tracked(self, track: Track, history: History, ends: I64) -> tuple[F64, F64] | None:
         last = track.begin + len(track.away) * track.bin_steps - 1
         begin = int(ends[0]) + 1 - track.bin_steps
-        if last < history.first:  # an old one: it had no whole bin in this period
+        if last < history.first:  # an output of an earlier period: this one had no whole bin
             return None
         if track.begin != begin or last != ends[-1]:
             raise ComponentError(
-                f"algorithms.{self.name} tells of the steps {track.begin} to {last}, but this"
-                f" metric's period has the whole bins {begin} to {int(ends[-1])}: give both the"
-                " same period"
+                f"the output of algorithms.{self.name} is about the steps {track.begin} to {last},"
+                f" but this metric's period has the whole bins {begin} to {int(ends[-1])}: give"
+                " both the same period"
             )
         return track.home, track.away
