@@ -21,10 +21,21 @@ inline Array<i16> rooms_at(View<const i16, 2> room_of_place, View<const i64> x, 
     return rooms;
 }
 
-// Add the number of poses in each room to `counts`, (rooms + 1,); the last entry is away, or in no room.
-inline void count_rooms(View<const i16> rooms, View<const u8> away, View<i64> counts) {
-    const i64 last = counts.size() - 1;
-    for (i64 j = 0; j < rooms.size(); ++j) ++counts[away[j] != 0 || rooms[j] < 0 ? last : i64{rooms[j]}];
+// At how many of `steps` steps two bodies are in the same room. Each has the steps at which its visits begin, the first
+// of them 0, ascending, and the room of each visit, below 0 for none.
+inline i64 count_together(View<const i64> begin, View<const i16> room, View<const i64> other_begin,
+                          View<const i16> other_room, i64 steps) {
+    i64 count = 0, now = 0;
+    for (i64 i = 0, j = 0; now < steps;) {
+        const i64 end = i + 1 < begin.size() ? begin[i + 1] : steps;
+        const i64 other_end = j + 1 < other_begin.size() ? other_begin[j + 1] : steps;
+        const i64 until = std::min(end, other_end);
+        if (room[i] >= 0 && room[i] == other_room[j]) count += until - now;
+        if (end == until) ++i;
+        if (other_end == until) ++j;
+        now = until;
+    }
+    return count;
 }
 
 // The summed length of the moves from pose to pose [lattice units].

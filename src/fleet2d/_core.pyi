@@ -653,14 +653,16 @@ def rooms_at(room_of_place: numpy.typing.NDArray[numpy.int16], x: numpy.typing.N
         int16 (n,).
     """
 
-def count_rooms(poses: tuple[Any, ...], room_of_place: numpy.typing.NDArray[numpy.int16], counts: numpy.typing.NDArray[numpy.int64]) -> None:
+def count_together(begin: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int16], other_begin: numpy.typing.NDArray[numpy.int64], other_room: numpy.typing.NDArray[numpy.int16], steps: int) -> int:
     """
-    Add the number of poses in each room to `counts`.
+    Return at how many steps two bodies are in the same room.
 
     Args:
-        poses: Poses.
-        room_of_place: int16 (rows, columns), the room of each cell, -1 for none.
-        counts: int64 (rooms + 1,), to be added to; the last entry is away, or in no room.
+        begin: int64 (n,), the step at which each visit of a body begins; rising from 0.
+        room: int16 (n,), the room of each visit, below 0 for none.
+        other_begin: int64 (m,), the same of the other body.
+        other_room: int16 (m,), the same of the other body.
+        steps: How many steps there are.
     """
 
 def sum_moves(poses: tuple[Any, ...]) -> float:

@@ -1,12 +1,13 @@
-"""Rooms of places, time in rooms and lengths of ways, against NumPy and plain loops."""
+"""Rooms of places, time together and lengths of ways, against NumPy and plain loops."""
 
 from math import hypot
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet2d.kernels.measure import count_rooms, rooms_at, sum_moves
+from fleet2d.kernels.measure import count_together, rooms_at, sum_moves
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses
 
@@ -22,16 +23,36 @@ def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at: list)
     assert np.array_equal(ROOMS[row, column], rooms_at(ROOMS, x, y))
 
 
-@given(st.lists(st.tuples(*[st.integers(0, 4 * SUB - 1)] * 2, st.booleans()), max_size=30))
-def test_time_in_rooms_and_the_way_are_those_of_plain_loops(steps: list) -> None:
-    rows = np.array(steps, np.int64).reshape(-1, 3)
-    x, y, away = rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].astype(np.uint8)
-    poses, counts = Poses(x, y, np.zeros_like(x), away), np.zeros(7, np.int64)
-    inside = np.abs(ROOMS)
-    count_rooms(poses, inside, counts)
-    expected = [0] * 7
-    for px, py, out in zip(x.tolist(), y.tolist(), away.tolist(), strict=True):
-        expected[6 if out else int(inside[py // SUB, px // SUB])] += 1
-    assert expected == counts.tolist()
+@given(places)
+def test_the_length_of_a_way_is_that_of_a_plain_loop(at: list) -> None:
+    x, y = np.array(at, np.int64).reshape(-1, 2).T.copy()
+    poses = Poses(x, y, np.zeros_like(x), np.zeros(len(x), np.uint8))
     way = sum(hypot(x[i] - x[i - 1], y[i] - y[i - 1]) for i in range(1, len(x)))
     assert abs(way - sum_moves(poses)) <= 1e-9 * max(way, 1)
+
+
+rooms_by_step = st.integers(1, 40).flatmap(
+    lambda n: st.tuples(*[st.lists(st.integers(-1, 2), min_size=n, max_size=n)] * 2)
+)
+
+
+def visits(rooms: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Where the room changes, and the room from there on."""
+    begin = [i for i, room in enumerate(rooms) if i == 0 or room != rooms[i - 1]]
+    return np.array(begin, np.int64), np.array([rooms[i] for i in begin], np.int16)
+
+
+@given(rooms_by_step)
+def test_steps_together_are_those_of_a_loop_over_all_steps(rooms: tuple) -> None:
+    one, other = rooms
+    expected = sum(a == b >= 0 for a, b in zip(one, other, strict=True))
+    assert expected == count_together(*visits(one), *visits(other), len(one))
+
+
+@pytest.mark.parametrize("begin", [[], [1], [0, 2, 2], [0, 3, 1], [0, 9]])
+def test_visits_that_do_not_make_up_all_steps_are_refused(begin: list[int]) -> None:
+    good = np.array([0], np.int64), np.array([1], np.int16)
+    wrong = np.array(begin, np.int64), np.ones(len(begin), np.int16)
+    for pair in ((wrong, good), (good, wrong)):
+        with pytest.raises(ValueError, match="must ascend from 0"):
+            count_together(*pair[0], *pair[1], 9)

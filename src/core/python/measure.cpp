@@ -12,6 +12,13 @@ Array<i16> checked_rooms_at(View<const i16, 2> room_of_place, View<const i64> x,
     return rooms_at(room_of_place, x, y);
 }
 
+// Whether visits that begin at these steps make up all steps.
+bool is_division(View<const i64> begin, i64 steps) {
+    bool rises = steps >= 0 && (steps == 0 || (begin.size() > 0 && begin[0] == 0));
+    for (i64 i = 1; i < begin.size(); ++i) rises &= begin[i - 1] < begin[i];
+    return rises && (begin.size() == 0 || begin[begin.size() - 1] < steps || steps == 0);
+}
+
 }  // namespace
 
 void bind_measure(nb::module_& m) {
@@ -26,21 +33,24 @@ Args:
 Returns:
     int16 (n,).)");
     m.def(
-        "count_rooms",
-        [](const Poses& poses, View<const i16, 2> room_of_place, View<i64> counts) {
-            check_poses(poses);
-            const Array<i16> rooms = checked_rooms_at(room_of_place, poses.x, poses.y);
-            require(counts.size() > 0 && all_in_range(rooms.view(), -1, counts.size() - 1),
-                    "counts must have an entry for each room, and one more");
-            count_rooms(rooms, poses.away, counts);
+        "count_together",
+        [](View<const i64> begin, View<const i16> room, View<const i64> other_begin, View<const i16> other_room,
+           i64 steps) {
+            require(begin.size() == room.size() && other_begin.size() == other_room.size(),
+                    "begin and room of a body must have one length");
+            require(is_division(begin, steps) && is_division(other_begin, steps),
+                    "begin must ascend from 0, and stay below the number of steps");
+            return count_together(begin, room, other_begin, other_room, steps);
         },
-        "poses"_a, "room_of_place"_a, "counts"_a, Unlocked(),
-        R"(Add the number of poses in each room to `counts`.
+        "begin"_a, "room"_a, "other_begin"_a, "other_room"_a, "steps"_a, Unlocked(),
+        R"(Return at how many steps two bodies are in the same room.
 
 Args:
-    poses: Poses.
-    room_of_place: int16 (rows, columns), the room of each cell, -1 for none.
-    counts: int64 (rooms + 1,), to be added to; the last entry is away, or in no room.)");
+    begin: int64 (n,), the step at which each visit of a body begins; rising from 0.
+    room: int16 (n,), the room of each visit, below 0 for none.
+    other_begin: int64 (m,), the same of the other body.
+    other_room: int16 (m,), the same of the other body.
+    steps: How many steps there are.)");
     m.def(
         "sum_moves",
         [](const Poses& poses) {

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.frozen import frozen
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.measure import rooms_at, sum_moves
+from fleet2d.kernels.measure import count_together, rooms_at, sum_moves
 from fleet2d.kernels.motion import Poses
 
 if TYPE_CHECKING:
@@ -116,19 +116,32 @@ class BodyPoses:
 
     @cached_property
     def visits(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int16]]:
-        """Stretches of steps at one place: begin, end and room of each, each (stretches,).
+        """Stretches of steps in one room: begin, end and room of each, each (stretches,).
 
         Steps are counted from `first`; the room is NOWHERE while the body is away.
         """
-        begin = self._runs.step - self._runs.first
-        return frozen((begin, begin + self._lengths, self._rooms))
+        rooms = self._rooms
+        first = np.flatnonzero(np.append(True, rooms[1:] != rooms[:-1])[: len(rooms)])
+        begin = self._runs.step[first] - self._runs.first
+        return frozen((begin, np.append(begin, len(self))[1:], rooms[first]))
 
     @cached_property
     def time_in_rooms(self) -> NDArray[np.int64]:
         """Number of steps in each room, and last away: int64 (rooms + 1,)."""
+        begin, end, room = self.visits
         counts = np.zeros(len(self._home.rooms) + 1, np.int64)
-        np.add.at(counts, self._rooms, self._lengths)  # NOWHERE is the last
+        np.add.at(counts, room, end - begin)  # NOWHERE is the last
         return _shared(counts)
+
+    @cached_property
+    def steps_at_home(self) -> int:
+        """Number of steps at which the body isn't away."""
+        return int(self._lengths[self._runs.away == 0].sum())
+
+    def steps_together(self, other: "BodyPoses") -> int:
+        """Return the number of steps at which two bodies are in the same room."""
+        (begin, _, room), (other_begin, _, other_room) = self.visits, other.visits
+        return count_together(begin, room, other_begin, other_room, len(self))
 
     @cached_property
     def distance(self) -> float:

@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
 from fleet2d.metrics.metric import Metric
@@ -31,11 +29,9 @@ class CoPresence(Metric):
     def update(self, history: History, state: "Present") -> Any:
         """Count the steps together."""
         for pair in pairs_of(history, state):
-            room = pair.user_poses.room
-            together = (room >= 0) & (room == pair.robot_poses.room)
             counts = self.steps.setdefault((pair.robot, pair.user), [0, 0])
-            counts[0] += int(np.count_nonzero(together))
-            counts[1] += int(np.count_nonzero(~pair.user_poses.away))
+            counts[0] += pair.user_poses.steps_together(pair.robot_poses)
+            counts[1] += pair.user_poses.steps_at_home
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: share}}, without users who were never at home."""

@@ -27,9 +27,12 @@ class Sightings(Metric):
     def update(self, history: History, state: "Present") -> Any:
         """Count detections by step."""
         observations = history.observations
-        for index, user in enumerate(state.users):
-            steps = observations.step[observations.user == index]  # in order
-            seen = int(np.count_nonzero(np.diff(steps))) + (len(steps) > 0)
+        order = np.argsort(observations.user, kind="stable")  # of one user still in order of step
+        index, step = observations.user[order], observations.step[order]
+        first = np.append(True, (index[1:] != index[:-1]) | (step[1:] != step[:-1]))[: len(step)]
+        known = index[first & (index >= 0)]
+        steps_seen = np.bincount(known, minlength=len(state.users)).tolist()
+        for user, seen in zip(state.users, steps_seen, strict=True):
             self.seen[user] = self.seen.get(user, 0) + seen
             at_home = int(history.poses(user).time_in_rooms[:-1].sum())
             self.at_home[user] = self.at_home.get(user, 0) + at_home

@@ -256,9 +256,9 @@ def test_burn_in_ends_where_the_error_stays_small() -> None:
     presence = Presence(("ana",), home, np.zeros(2), datetime(2026, 1, 5))
     for tv in (0.3, 0.05, 0.2, 0.1, 0.09):
         metric.days += 1
-        metric._note("ana", {"tv": tv}, presence)
+        metric._note(["ana"], {"tv": np.array([tv])}, presence)
     assert 4 == metric.result()["ana"]["burn_in_day"]
-    metric._note("ana", {"tv": 0.11}, presence)
+    metric._note(["ana"], {"tv": np.array([0.11])}, presence)
     assert "burn_in_day" not in metric.result()["ana"]
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -101,6 +101,11 @@ class Presence:
                 f" {self._away[row]:g}"
             )
 
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        """The row of each name; of equal names, the first."""
+        return {name: row for row, name in reversed([*enumerate(self.names)])}
+
     @property
     def arrays(self) -> tuple[F64, F64]:
         """Shares of everybody, float64 (users + 1, rooms), and of away, float64 (users + 1,)."""
@@ -112,12 +117,13 @@ class Presence:
         Raises:
             ComponentError: There is no such user.
         """
-        if user not in self.names:
+        row = self._rows.get(user)
+        if row is None:
             raise ComponentError(
                 f"there is no presence of {user!r}{did_you_mean(user, self.names)} There are:"
                 f" {', '.join(self.names)}"
             )
-        return self.names.index(user)
+        return row
 
     def share(self, user: str = ANYONE) -> F64:
         """Return the probability of each room, given at home: float64 (rooms,), sums to one."""

@@ -1,7 +1,7 @@
 """Errors of long-term presence against the true occupancy of rooms."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -134,44 +134,48 @@ class LtpError(LongTermMetric):
         presence = presence_of(self.of, state)
         if presence is None:
             return None
-        rows: dict[str, dict[str, float]] = {}
-        for row, user in enumerate((*state.users, ANYONE)):
-            user_counts = counts[..., row, :]
-            if user_counts[..., :-1].any():
-                rows[user] = self._compare(presence, user, user_counts, steps)
-                self._note(user, rows[user], presence)
-        if not rows:
+        everybody = (*state.users, ANYONE)
+        rows = np.flatnonzero(counts[..., :-1].any(axis=-1).reshape(-1, len(everybody)).any(axis=0))
+        users = [everybody[row] for row in rows.tolist()]
+        if not users:
             return None
-        names = next(iter(rows.values()))
-        return {
-            "user": np.array(list(rows), dtype=object),
-            **{name: np.array([row[name] for row in rows.values()]) for name in names},
-        }
+        columns = self._compare(presence, users, counts[..., rows, :], steps)
+        self._note(users, columns, presence)
+        return {"user": np.array(users, dtype=object), **columns}
 
-    def _compare(self, presence: Presence, user: str, counts: I64, steps: int) -> dict[str, float]:
+    def _compare(
+        self, presence: Presence, users: Sequence[str], counts: I64, steps: int
+    ) -> dict[str, F64]:
+        """Return a number per user, by name."""
         if self.given == "hour_of_week":
-            return self._by_hour(presence.by_hour_of_week(user), counts)
+            each = [self._by_hour(presence, u, counts[:, row]) for row, u in enumerate(users)]
+            return {name: np.array([one[name] for one in each]) for name in COLUMNS}
         home, away = shares(counts, steps)
         if self.given == "away":
-            share = float(away) if user != ANYONE else counts[-1] / steps
-            truth = np.append(home * (1 - share), share)
-            return self._distances(truth, presence.with_away(user))
-        row = self._distances(home, presence.share(user))
-        row["earth_mover_m"] = earth_mover(home, presence.share(user), self.metres)
-        low, high = presence.low(user), presence.high(user)
-        if low is not None and high is not None:
-            row["inside"] = float(((low <= home) & (home <= high)).mean())
-        return row
+            truth = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
+            return self._distances(truth, np.array([presence.with_away(user) for user in users]))
+        estimate = np.array([presence.share(user) for user in users])
+        columns = self._distances(home, estimate)
+        moved = [earth_mover(*both, self.metres) for both in zip(home, estimate, strict=True)]
+        columns["earth_mover_m"] = np.array(moved)
+        if presence.low() is not None and presence.high() is not None:
+            low = np.array([presence.low(user) for user in users])
+            high = np.array([presence.high(user) for user in users])
+            columns["inside"] = ((low <= home) & (home <= high)).mean(axis=1)
+        return columns
 
-    def _by_hour(self, estimate: F64, counts: I64) -> dict[str, float]:
+    def _by_hour(self, presence: Presence, user: str, counts: I64) -> dict[str, float]:
         home, _ = shares(counts, 1)
-        steps = counts[:, :-1].sum(axis=1).astype(np.float64)
-        hours = np.flatnonzero(steps)
-        return self._distances(home[hours], estimate[hours], steps[hours] / steps.sum())
+        weight = counts[:, :-1].sum(axis=1).astype(np.float64)
+        some = weight > 0
+        weight, estimate = weight[some] / weight.sum(), presence.by_hour_of_week(user)[some]
+        columns = self._distances(home[some], estimate)
+        return {name: float((values * weight).sum()) for name, values in columns.items()}
 
-    def _distances(self, truth: F64, estimate: F64, weight: F64 | None = None) -> dict[str, float]:
+    def _distances(self, truth: F64, estimate: F64) -> dict[str, F64]:
+        """Return distances of shares (n, rooms), float64 (n,) each."""
         gaps = room_gaps(truth, estimate)
-        values = (
+        distances = (
             total_variation(truth, estimate),
             jensen_shannon(truth, estimate),
             kl_divergence(truth, estimate, self.alpha),
@@ -179,23 +183,24 @@ class LtpError(LongTermMetric):
             gaps.mean(axis=-1),
             rank_correlation(truth, estimate),
         )
-        return {
-            name: float(value if weight is None else (value * weight).sum())
-            for name, value in zip(COLUMNS, values, strict=True)
-        }
+        return dict(zip(COLUMNS, distances, strict=True))
 
-    def _note(self, user: str, row: dict[str, float], presence: Presence) -> None:
-        """Store the newest row, the day since which tv is small, and changes of the best room."""
-        self.last[user] = row
-        best, flips = int(presence.share(user).argmax()), 0
-        if user in self.best:
-            last_best, flips = self.best[user]
-            flips += best != last_best
-        self.best[user] = best, flips
-        if row["tv"] > self.burn_in:
-            self.within[user] = None
-        elif self.within.get(user) is None:
-            self.within[user] = max(1, math.ceil(round(self.days, 9)))
+    def _note(self, users: Sequence[str], columns: Mapping[str, F64], presence: Presence) -> None:
+        """Store the newest rows, days since which tv is small, and changes of the best room."""
+        today = max(1, math.ceil(round(self.days, 9)))
+        for user, *row in zip(
+            users, *(values.tolist() for values in columns.values()), strict=True
+        ):
+            self.last[user] = dict(zip(columns, row, strict=True))
+            best, flips = int(presence.share(user).argmax()), 0
+            if user in self.best:
+                last_best, flips = self.best[user]
+                flips += best != last_best
+            self.best[user] = best, flips
+            if self.last[user]["tv"] > self.burn_in:
+                self.within[user] = None
+            elif self.within.get(user) is None:
+                self.within[user] = today
 
     def result(self) -> dict[str, Any]:
         """Return {user: {tv, js, …, flips, burn_in_day}} at the end."""
