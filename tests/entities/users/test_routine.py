@@ -247,10 +247,10 @@ def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
         ({"household": {**FAMILY, "members": {"ben": "retired"}, "couples": []}}, ["no member", "ben"]),
         ({"household": {**FAMILY, "couples": [["ana", "zoe"]]}}, ["zoe", "no member"]),
         ({"household": {**FAMILY, "together": {"dinner": {"at": "18:00"}}}}, ["dinner", "'on' or 'dates'"]),
-        ({"visits": [["2026-01-06", "2026-01-05"]]}, ["no time"]),
+        ({"visits": [["2026-01-06", "2026-01-05"]]}, ["not before its end"]),
     ],
 )  # fmt: skip
-def test_what_makes_no_life_is_refused_in_plain_words(
+def test_settings_without_a_possible_day_are_refused(
     user: dict[str, Any], words: list[str]
 ) -> None:
     content = scenario(users={"ana": {"type": "routine", **user}})
