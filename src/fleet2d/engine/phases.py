@@ -57,8 +57,8 @@ def change_home(state: State, span: Span) -> None:
 
 def decide(state: State, span: Span) -> None:
     """Ask everybody whose plan is over, or who would drive at somebody: users, then robots."""
-    step, clearance = span.first, state.clearance
-    rows = set(state.bodies.due(step)) | clearance.robots.keys()
+    step, clearance, blocking = span.first, state.clearance, state.blocking
+    rows = {*state.bodies.due(step), *clearance.robots, *blocking.rows}
     for row in sorted(rows):
         actor = state.actors[row]
         if clearance.looks(row, step):
@@ -79,9 +79,36 @@ def decide(state: State, span: Span) -> None:
             situation = Situation(actor, step, (), state.learners.readable)
             actor.give_way(situation, in_way.name, clearance.crowd(actor))
             state.bodies.follow(row, actor.plan)
-        if due or in_way is not None:
+        begins = due or in_way is not None
+        if row in blocking.rows:
+            begins |= _mind_bodies(state, row, step, begins=begins)
+        if begins:
             state.changes.expect(row, actor)
             state.begin_plan(row, step)
+
+
+def _mind_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
+    """Let a body wait for another one in its way, or go round it; tell whether it does.
+
+    Args:
+        state: The state.
+        row: Of the body.
+        step: The present step.
+        begins: Whether it begins with a plan just now.
+    """
+    actor, blocking = state.actors[row], state.blocking
+    other = blocking.in_way(state.bodies, row)
+    if other is None:
+        return False
+    situation = Situation(actor, step, (), state.learners.readable)
+    plan = blocking.plan(situation, other)
+    if plan is None:
+        return False
+    if not begins:
+        state.end_plan(row, step)
+    actor.follow_instead(plan, situation)
+    state.bodies.follow(row, actor.plan)
+    return True
 
 
 def move(state: State, span: Span) -> None:

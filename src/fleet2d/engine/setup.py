@@ -7,6 +7,7 @@ from typing import Any
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
+from fleet2d.engine.blocking import Blocking
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
@@ -53,6 +54,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         if any(causes_errors(entry.act, those.owner.name) for entry in scenario.script):
             those.prepare_to_err()
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
+    blocking = Blocking(users, robots, scenario.simulation.people_block)
     changes = Changes(scenario.objects, home, clock)
     for index, change in enumerate(scenario.changes):
         with _placing(scenario, f"changes.{index}"):
@@ -84,6 +86,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         home=home,
         changes=changes,
         clearance=clearance,
+        blocking=blocking,
         encounters=encounters,
         sensors=sensors,
         gazes=gazes,

@@ -12,6 +12,7 @@ from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.observations import OBSERVATION
 from fleet2d.artifacts.store import RunStore
+from fleet2d.engine.blocking import Blocking
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
@@ -49,7 +50,7 @@ class State:
         home: The home as it is at present: doors, furniture, rooms, layers.
         changes: What changes in the home, and when.
         watchers: What follows the bodies, in the order in which it is asked.
-        clearance, encounters, sensors: Those of them by name.
+        clearance, blocking, encounters, sensors: Those of them by name.
         gazes, cameras: The cameras of users, and those of robots.
         layers: What robots have seen of the home, and when it is stored.
         learners: Algorithms and metrics, what they have learned and put out.
@@ -73,6 +74,7 @@ class State:
     home: Home
     changes: Changes
     clearance: Clearance
+    blocking: Blocking
     encounters: Encounters
     sensors: Sensors
     gazes: list[Cameras]
@@ -98,6 +100,7 @@ class State:
         """List the watchers."""
         self.watchers = [
             self.clearance,
+            self.blocking,
             *self.gazes,
             *self.cameras,
             self.encounters,

@@ -164,9 +164,15 @@ class DecidingActor(Actor):
                     self.arbiter.give_up(now)
         if plan is None:
             plan, self._waiting = waits.wait(now, person, gives_way), waits
+        self.follow_instead(plan, now)
+
+    def follow_instead(self, plan: Plan, now: Situation) -> None:
+        """Follow a plan from now on in place of the present one, which may have begun just now."""
+        step, now_us = now.step, now.step * self.clock.step_us
+        if self.charge is not None:
+            self.charge.follow(self.motion, now_us)
         if self.plan.began[0] == step:  # its first rows happened, though it ends at once
-            first = [n for n in self.plan.notes if n.time_us <= step * self.clock.step_us]
-            plan.notes[:0] = first
+            plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]
         self.plan, self.motion, self.planned_at = plan, plan.finish(), step
         self._set_next_decision(now, fresh=True)
 

@@ -141,7 +141,7 @@ class Waiting:
         actor, lattice = now.actor, now.actor.home.plan.lattice
         for gap in (max(distance, PASSING) + lattice.cell, PASSING):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
-            plan, detour = self._stand_for_a_step(now), _Detour(actor, around)
+            plan, detour = self._stand_for_a_step(now), RoutesAround(actor, around)
             rest = resumed(actor, plan, self.broken, self.step, detour)
             if rest is not None:
                 return self._with_interrupts(rest)
@@ -166,22 +166,25 @@ class Waiting:
         return plan
 
 
-class _Detour:
-    """Routes that keep clear of people who stand in the way.
+class RoutesAround:
+    """Routes that keep clear of people, or of other bodies, that stand in the way.
+
+    Attributes:
+        cost: int32 (rows, columns), CLOSED near them.
 
     Args:
-        body: The robot.
-        people: x and y of each person, and the distance to keep [lattice], int64 (n, 3).
+        body: The body that goes there.
+        people: x and y of each of them, and the distance to keep [lattice], int64 (n, 3).
     """
 
     def __init__(self, body: "Body", people: I64) -> None:
         self._space = body.space
         xs, ys = body.home.plan.lattice.centre_axes()
-        self._cost = np.zeros(body.space.part_of_cell.shape, np.int32)
+        self.cost = np.zeros(body.space.part_of_cell.shape, np.int32)
         for x, y, reach in people.tolist():
             near = (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach
-            self._cost[near] = CLOSED
+            self.cost[near] = CLOSED
 
     def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
-        return route_by_cost(self._space, self._cost, start, goal)
+        return route_by_cost(self._space, self.cost, start, goal)

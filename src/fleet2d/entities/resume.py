@@ -49,7 +49,7 @@ def without_next_stop(body: "Body", plan: Plan, broken: Plan, step: int) -> Plan
     if not isinstance(motion, Track):
         return None
     x, y, time = motion.breakpoints.x, motion.breakpoints.y, motion.breakpoints.time
-    stop = _next_stop(body, motion.breakpoints, step * body.clock.step_us)
+    stop = next_stop(body, motion.breakpoints, step * body.clock.step_us)
     if stop is None:
         return None
     leaves = np.flatnonzero((x[stop:] != x[stop]) | (y[stop:] != y[stop]))
@@ -69,7 +69,7 @@ def _rest(
     if not isinstance(motion, Track) or broken.postures or plan.away:
         return None
     track = motion.breakpoints
-    stop = _next_stop(body, track, broken_us)
+    stop = next_stop(body, track, broken_us)
     if stop is None or track.away[stop:].any():
         return None
     goes_on_us = max(int(track.time[stop]), broken_us)
@@ -81,7 +81,7 @@ def _rest(
         plan.go_to_point(*goal, route=route)
     except NoWayError:
         return None
-    plan.turn_by(turn_between(plan.heading, _heading_at(track, stop, goes_on_us)) / TURN)
+    plan.turn_by(turn_between(plan.heading, heading_at(track, stop, goes_on_us)) / TURN)
     later = plan.time_us - goes_on_us
     # Rows that were planned for the way there are written on arrival.
     plan.notes += [
@@ -96,7 +96,7 @@ def _rest(
     return plan
 
 
-def _next_stop(body: "Body", track: Breakpoints, broken_us: int) -> int | None:
+def next_stop(body: "Body", track: Breakpoints, broken_us: int) -> int | None:
     """Return the index of the breakpoint at which the body next stands still; None: no such."""
     x, y, time = track.x, track.y, track.time
     at = max(int(np.searchsorted(time, broken_us, side="right")) - 1, 0)
@@ -108,7 +108,7 @@ def _next_stop(body: "Body", track: Breakpoints, broken_us: int) -> int | None:
     return None
 
 
-def _heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
+def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
     """Return the heading at a moment between a breakpoint and the next."""
     times, headings = track.time, track.heading
     begin, end = int(times[stop]), int(times[stop + 1])

@@ -106,6 +106,12 @@ class SimulationSettings(Settings):
         ge=1,
         description="The most steps that are computed at once. It changes no result.",
     )
+    people_block: PositiveDuration | None = Field(
+        default=None,
+        description="How long somebody, or a robot, waits for another body in the way before going"
+        " round it; null: bodies are air to each other.",
+        examples=["3 s"],
+    )
     speedup: float | None = Field(
         default=None,
         ge=0.001,

@@ -1,0 +1,142 @@
+"""Bodies in each other's way: one waits for the other, then goes round it, or squeezes past."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.entities.giving_way import RoutesAround
+from fleet2d.entities.motion import Track
+from fleet2d.entities.plan import Note, Plan
+from fleet2d.entities.resume import heading_at, next_stop
+from fleet2d.floorplan.home.costmap import CLOSED
+from fleet2d.kernels.headings import TURN, turn_between
+from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.motion import Breakpoints
+
+if TYPE_CHECKING:
+    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Situation
+
+I64 = NDArray[np.int64]
+
+
+def held_up(now: "Situation", broken: Plan, notes: Sequence[Note] = ()) -> Plan:
+    """Return a plan that stands for a step, and then goes on with the one that is being followed.
+
+    A random walk isn't gone on with: the behavior is asked anew.
+
+    Args:
+        now: The situation.
+        broken: What is being followed.
+        notes: What happens as it stops.
+    """
+    begin_us, step_us = now.step * broken.step_us, broken.step_us
+    plan, motion = now.plan().stay_until(begin_us + step_us), broken.finish()
+    plan.notes += notes
+    if isinstance(motion, Track):
+        first = int(np.searchsorted(motion.breakpoints.time, begin_us, side="right"))
+        _go_on(plan, broken, begin_us, begin_us, _rows(motion.breakpoints)[first:])
+    return plan
+
+
+def went_round(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
+    """Return the rest of the plan that is being followed, by a way round bodies to its next stop.
+
+    Where somebody stands at that stop, and it is the last one, it stops beside it in the room. A
+    body on a random walk turns round, and its behavior is asked anew.
+
+    Args:
+        now: The situation.
+        broken: The plan.
+        bodies: Where other bodies are, and how far to keep from each [lattice], int64 (n, 3).
+
+    Returns:
+        The plan; None if there is no way round.
+    """
+    motion, actor, begin_us = broken.finish(), now.actor, now.step * broken.step_us
+    if not isinstance(motion, Track):
+        return now.plan().turn_by(0.5)
+    stop = next_stop(actor, motion.breakpoints, begin_us)
+    if stop is None:
+        return None
+    rows, detour = _rows(motion.breakpoints), RoutesAround(actor, bodies)
+    goal, rest = (int(rows[stop, 1]), int(rows[stop, 2])), rows[stop + 1 :]
+    if detour.cost[goal[1] // SUB, goal[0] // SUB] < 0:
+        if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or broken.postures:
+            return None
+        beside = _beside(actor, goal, detour)
+        if beside is None:
+            return None
+        goal = beside
+        rest = rest.copy()
+        rest[:, 1:3] = goal
+    plan = now.plan()
+    route = detour((plan.x, plan.y), goal)
+    if route is None:
+        return None
+    since_us = max(int(rows[stop, 0]), begin_us)
+    plan.go_to_point(*goal, route=route)
+    heading = heading_at(motion.breakpoints, stop, since_us)
+    plan.turn_by(turn_between(plan.heading, heading) / TURN)
+    _go_on(plan.stay_until(since_us), broken, begin_us, since_us, rest)
+    return plan
+
+
+def _go_on(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64) -> None:
+    """Let a plan go on as another one would have from a moment on, later.
+
+    The first time that the body would have rested for long enough, it rests so much less, and is in
+    time again.
+
+    Args:
+        plan: It is where the other one would have been at that moment, and as late as its end says.
+        broken: The other plan.
+        begin_us: Up to when that was followed: what it notes later is still to happen.
+        since_us: The moment.
+        rest: Breakpoints after it, int64 (n, 5).
+    """
+    later = plan.time_us - since_us
+    here = np.array([[since_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
+    rows = np.concatenate([here, rest])
+    rests = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1) & (np.diff(rows[:, 0]) >= later)
+    edge = int(rows[np.argmax(rests), 0]) if rests.any() else int(rows[-1, 0])
+
+    def moved(time_us: int) -> int:
+        return time_us + later if time_us <= edge else max(time_us, edge + later)
+
+    shifted = rest.copy()
+    shifted[:, 0] = [moved(time_us) for time_us in rest[:, 0].tolist()]
+    plan.notes += [
+        Note(moved(max(note.time_us, since_us)), note.event, note.detail)
+        for note in broken.notes
+        if note.time_us > begin_us
+    ]
+    plan.postures += [
+        (moved(max(time_us, since_us)), code)
+        for time_us, code in broken.postures
+        if time_us > begin_us
+    ]
+    plan.posture = broken.posture
+    plan.follow(shifted).endless = broken.endless
+    plan.asks_us, plan.root = broken.asks_us, broken.root
+
+
+def _rows(track: Breakpoints) -> I64:
+    """Return breakpoints as rows of time, x, y, heading and away, int64 (n, 5)."""
+    return np.stack([column.astype(np.int64) for column in track], axis=-1)
+
+
+def _beside(actor: "Actor", goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
+    """Return the free place nearest to a taken one, in its room; None if there is none."""
+    plan, space = actor.home.plan, actor.space
+    room = plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
+    free = (space.part_of_cell == actor.part) & (detour.cost != CLOSED)
+    cells = np.argwhere(free & (plan.room_of_cell == room))
+    if not len(cells):
+        return None
+    xs, ys = plan.lattice.centre_axes()
+    away = (xs[cells[:, 1]] - goal[0]) ** 2 + (ys[cells[:, 0]] - goal[1]) ** 2
+    row, column = cells[int(np.argmin(away))].tolist()
+    return plan.lattice.cell_centre(row, column)

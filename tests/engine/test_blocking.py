@@ -1,0 +1,173 @@
+"""Bodies in each other's way: they wait, go round, squeeze past; the same for every span."""
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import assert_same_for_every_max_span
+from tests.scenes import digests, everything, path, run, scenario
+
+BLOCK = {"people_block": "3 s"}
+WALK = {"type": "tests.own_components:Scripted", "speed": 1.0}
+
+
+def walker(start: list[float], *script: Any, **more: Any) -> dict[str, Any]:
+    """Somebody who follows a script."""
+    return {**WALK, "start": start, "start_heading_deg": 0, "script": list(script), **more}
+
+
+def home(duration: str = "1 min", block: Any = BLOCK, **sections: Any) -> dict[str, Any]:
+    """The flat, in which bodies block each other's way."""
+    return scenario(duration, simulation={**block}, **sections)
+
+
+def gap(stored: Any, one: str = "ana", other: str = "ben") -> Any:
+    a, b = path(stored, one), path(stored, other)
+    return np.hypot(a.x - b.x, a.y - b.y)
+
+
+def gives_way(stored: Any) -> list[tuple[int, str, str]]:
+    rows = stored.pandas("events")
+    rows = rows[rows["event"] == "gives_way"]
+    return list(zip(rows["step"], rows["entity"], rows["detail"], strict=True))
+
+
+def test_somebody_waits_before_a_body_and_then_goes_round_it() -> None:
+    users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [2.5, 3]}}
+    stored = assert_same_for_every_max_span(home(users=users), 61, 7, 1)
+    ana = path(stored, "ana")
+
+    assert [("ana", "ben")] == [row[1:] for row in gives_way(stored)]
+    assert gap(stored).min() >= 0.4
+    assert (4, 3) == pytest.approx((ana.x[-1], ana.y[-1]), abs=1e-3)
+    stands = np.flatnonzero(np.diff(ana.x) == 0)
+    assert 3 == len(stands[ana.x[stands] < 2.5])
+
+
+def test_without_it_bodies_are_air() -> None:
+    users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [3, 3]}}
+    stored = run(home(block={}, users=users))
+
+    assert [] == gives_way(stored)
+    assert gap(stored).min() == 0
+
+
+def test_somebody_who_is_gone_in_time_is_only_waited_for() -> None:
+    """Ben crosses the way: ana stands for a moment, goes on, and is as late."""
+    users = {
+        "ana": walker([1, 3], [4, 3], 60.0),
+        "ben": walker([2.8, 2.2], [2.8, 3.7], 60.0, start_heading_deg=90, speed=0.4),
+    }
+    stored = assert_same_for_every_max_span(home(users=users), 7, 1)
+    alone = run(home(users={"ana": users["ana"]}))
+
+    assert len(gives_way(stored)) == 1
+    assert gap(stored).min() >= 0.39
+    late = np.argmax(path(stored, "ana").x > 3.99) - np.argmax(path(alone, "ana").x > 3.99)
+    assert 1 <= late <= 3
+
+
+def test_of_two_who_meet_the_first_one_goes_round() -> None:
+    users = {
+        "ana": walker([0.5, 3], [4.5, 3], 60.0),
+        "ben": walker([4.5, 3], [0.5, 3], 60.0, start_heading_deg=180),
+    }
+    stored = assert_same_for_every_max_span(home(users=users), 61, 1)
+    ana, ben = path(stored, "ana"), path(stored, "ben")
+
+    assert {("ana", "ben"), ("ben", "ana")} == {row[1:] for row in gives_way(stored)}
+    assert gap(stored).min() >= 0.35
+    assert np.abs(ana.y - 3).max() > 0.3 > np.abs(ben.y - 3).max()
+    assert (4.5, 0.5) == pytest.approx((ana.x[-1], ben.x[-1]), abs=1e-3)
+
+
+def test_where_there_is_no_way_round_one_squeezes_past() -> None:
+    """Ben stands in the doorway, too wide to be passed."""
+    users = {"ana": walker([3.05, 3.1], [7.05, 3.1], 60.0)}
+    users["ben"] = {"start": [5.05, 3.1], "radius": 0.3}
+    stored = assert_same_for_every_max_span(home(users=users), 61, 1)
+
+    assert gap(stored).min() < 0.1
+    assert (gap(stored) < 0.5).sum() <= 2, "overlapping for no longer than it takes to walk past"
+    assert path(stored, "ana").x[-1] == pytest.approx(7.05, abs=1e-3)
+
+
+def test_where_somebody_stands_already_one_stops_beside() -> None:
+    users = {"ana": walker([1, 3], [3, 3], 60.0), "ben": {"start": [3, 3]}}
+    stored = assert_same_for_every_max_span(home(users=users), 7, 1)
+
+    assert 0.4 <= gap(stored)[-1] <= 0.6
+    assert gap(stored).min() >= 0.4
+
+
+def test_what_was_to_come_later_comes_in_time_after_a_rest() -> None:
+    """The wait shortens the next stay, so that the plan is in time again."""
+    users = {
+        "ana": walker([1, 3], [4, 3], 20.0, [4, 1], 60.0),
+        "ben": walker([2.5, 3], 5.0, [2.5, 3.7], 60.0),
+    }
+    alone = path(run(home(users={"ana": users["ana"]})), "ana")
+    stored = run(home(users=users))
+
+    assert 1 == [row[1] for row in gives_way(stored)].count("ana")
+    assert (path(stored, "ana").y[-30:] == alone.y[-30:]).all()
+
+
+def test_robots_wait_for_each_other_and_for_people() -> None:
+    robots = {
+        "astro": walker([1, 3], [4, 3], 60.0, radius=0.15),
+        "bolt": {"start": [2.5, 3], "start_heading_deg": 0},
+    }
+    stored = assert_same_for_every_max_span(
+        home(robots=robots, users={"ana": {"start": [3.2, 3]}}), 7
+    )
+
+    assert {"astro"} == {row[1] for row in gives_way(stored)}
+    assert gap(stored, "astro", "bolt").min() >= 0.3
+    assert gap(stored, "astro", "ana").min() >= 0.35
+
+
+@pytest.mark.parametrize("span", [1, 61])
+def test_spans_do_not_show_where_bodies_block_each_other(span: int) -> None:
+    content = everything("40 min")
+    content["simulation"] |= BLOCK
+
+    assert digests(run(content)) == digests(run(content, max_span=span))
+
+
+def test_in_a_crowd_bodies_overlap_less_often() -> None:
+    users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo", "dora")}
+    blocked, free = (run(home("40 min", block, users=users)) for block in (BLOCK, {}))
+    seconds = [
+        sum(int((gap(stored, *pair) < 0.4).sum()) for pair in combinations(users, 2))
+        for stored in (blocked, free)
+    ]
+
+    assert seconds[0] * 5 < seconds[1]
+
+
+def test_a_family_lives_its_day() -> None:
+    """Seats, beds, doors and needs: nobody gets stuck, and days go on as they were planned."""
+    member = {
+        "type": "routine",
+        "household": {"members": {"ana": "works_from_home", "ben": "retired", "cleo": "student"}},
+    }
+    content = {
+        "simulation": {"start": "2026-01-05", "duration": "1 d", "seed": 4, **BLOCK},
+        "floorplan": {"type": "bundled", "furnish": True},
+        "users": dict.fromkeys(("ana", "ben", "cleo"), member),
+        "robots": {"astro": {"type": "patrol", "dwell": "1 min"}},
+    }
+    stored = assert_same_for_every_max_span(content, 997)
+    content["simulation"].pop("people_block")
+    free = run(content)
+
+    assert 10 < len(gives_way(stored)) < 2000
+    for name in ("ana", "ben", "cleo"):
+        activities = [
+            rows[(rows["event"] == "activity") & (rows["entity"] == name)]["detail"].tolist()
+            for rows in (stored.pandas("events"), free.pandas("events"))
+        ]
+        same = len(set(activities[0]) & set(activities[1])) / len(set(activities[1]))
+        assert same > 0.8
