@@ -20,7 +20,7 @@ from fleet2d.sight.camera import Camera
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import Bool, FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
-from fleet2d.sight.tables import Scene, stack_lenses
+from fleet2d.sight.tables import TableContext, stack_lenses
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
 HERE = f"{TESTS.as_posix()}/engine/test_verdicts"
@@ -210,7 +210,7 @@ def test_points_seen_are_those_of_asking_about_everybody_each_time(
 ) -> None:
     home = Home(fleet2d.load_floorplan(flat_path()))
     cameras = [Camera.model_validate(c) for c in (ODD, {"period": "3 s"}, {"angle_deg": 330})]
-    scene = Scene(["a", "b", "c"], [256.0] * 3, home.plan.lattice, SECOND, "robots.r")
+    scene = TableContext(["a", "b", "c"], [256.0] * 3, home.plan.lattice, SECOND, "robots.r")
     lenses = [c.lens(home.plan.lattice.units_per_m, SECOND) for c in cameras]
     stacked = stack_lenses(lenses, [False] * 3, scene)
     rng = np.random.default_rng(first)

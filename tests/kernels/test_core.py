@@ -29,7 +29,7 @@ from fleet2d.kernels.stays import Moments, Stretches, Ways
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import Scene, error_tables, stack_lenses
+from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 
 PACKAGE = Path(fleet2d.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -158,8 +158,10 @@ COSTS = np.array([[0, 100, -1, 5], [1000, 0, -1, 0], [0, 0, 0, 20]], np.int32)
 KEY = 2**64 - 3
 
 
-def scene() -> Scene:
-    return Scene([f"u{i}" for i in range(USERS)], [100.0] * USERS, LATTICE, SECOND, "robots.r")
+def scene() -> TableContext:
+    return TableContext(
+        [f"u{i}" for i in range(USERS)], [100.0] * USERS, LATTICE, SECOND, "robots.r"
+    )
 
 
 def lenses() -> Lenses:

@@ -23,8 +23,7 @@ from fleet2d.kernels.perception import MOST_GHOSTS, About, ErrorTables, UserDraw
 from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera import Camera, Lens
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import Scene as LensScene
-from fleet2d.sight.tables import error_tables, stack_lenses
+from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 
 Int64 = npt.NDArray[np.int64]
 
@@ -156,7 +155,7 @@ def tables_of(eyes: Sequence[slow.Eye], scene: Scene) -> ErrorTables:
     """Return how cameras err, with a stream for each draw."""
     given = list(scene.perceptions) or [None] * len(eyes)
     count = len(scene.users)
-    about = LensScene([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
+    about = TableContext([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
     errors = error_tables([Lens(**eye._asdict()) for eye in eyes], given, about)
     for c in range(len(eyes)):
         for draw in UserDraw:
@@ -169,7 +168,7 @@ def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTa
     """Return cameras as the kernel wants them."""
     lenses = [Lens(**eye._asdict()) for eye in eyes]
     count = len(scene.users)
-    about = LensScene([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
+    about = TableContext([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
     errs = [p is not None for p in scene.perceptions] or [False] * len(eyes)
     patience = max(eye.patience for eye in eyes)
     errors = tables_of(eyes, scene)

@@ -19,7 +19,7 @@ from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.timelines import Window
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
 from fleet2d.sight.camera import Camera
-from fleet2d.sight.tables import Scene, stack_lenses
+from fleet2d.sight.tables import TableContext, stack_lenses
 
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
 SECOND = 1_000_000
@@ -48,7 +48,9 @@ def lenses_of(*cameras: Camera) -> Lenses:
     """Return cameras as the kernel has them, with 64 lattice units to 5 cm."""
     lenses = [camera.lens(1280, SECOND) for camera in cameras]
     lattice = Lattice(0.05, (0.0, 0.0), FLAT.columns, FLAT.rows)
-    return stack_lenses(lenses, [False] * len(lenses), Scene([], [], lattice, SECOND, "robots.a"))
+    return stack_lenses(
+        lenses, [False] * len(lenses), TableContext([], [], lattice, SECOND, "robots.a")
+    )
 
 
 def rooms_of(home: Home) -> npt.NDArray[np.int16]:

@@ -99,8 +99,8 @@ def test_flashlight_keeps_no_more_than_its_memory_and_answers_the_same(home: Hom
     reach = some_reaches()[0]
     for pose in (*poses, *poses[:5]):
         assert np.array_equal(small.cells(home, *pose, reach), large.cells(home, *pose, reach))
-        assert small.kept[1] <= 10_000
-    assert 1 <= small.kept[0] < large.kept[0] <= len(set(poses))
+        assert small.cache_size[1] <= 10_000
+    assert 1 <= small.cache_size[0] < large.cache_size[0] <= len(set(poses))
 
 
 def test_every_method_follows_a_door() -> None:
@@ -201,4 +201,4 @@ def test_flashlight_takes_the_memory_that_it_says(home: Home) -> None:
     taken, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
 
-    assert taken == pytest.approx(flashlight.kept[1], rel=0.15)
+    assert taken == pytest.approx(flashlight.cache_size[1], rel=0.15)

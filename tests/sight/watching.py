@@ -17,7 +17,7 @@ from fleet2d.kernels.perception import MOST_GHOSTS
 from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import Scene, error_tables, stack_lenses
+from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 from fleet2d.streams import stream_key
 
 Int64 = npt.NDArray[np.int64]
@@ -38,9 +38,9 @@ def hall(*pillars: shapely.Polygon) -> Mesh:
 HALL = hall()
 
 
-def scene(users: Sequence[str] = ("ana", "ben", "cleo"), step_us: int = 10**6) -> Scene:
+def scene(users: Sequence[str] = ("ana", "ben", "cleo"), step_us: int = 10**6) -> TableContext:
     """Return the scene of users of 20 cm."""
-    return Scene(users, [0.2 * UNITS_PER_M] * len(users), LATTICE, step_us, "robots.r")
+    return TableContext(users, [0.2 * UNITS_PER_M] * len(users), LATTICE, step_us, "robots.r")
 
 
 @dataclass
@@ -72,7 +72,7 @@ class Watch:
         )
         step_us = round(self.step_s * 1e6)
         lens = camera.lens(UNITS_PER_M, step_us)
-        scene = Scene(
+        scene = TableContext(
             self.names[:count], [self.radius * UNITS_PER_M] * count, LATTICE, step_us, "robots.r"
         )
         errors = error_tables([lens], [camera.perception or Perception()], scene)

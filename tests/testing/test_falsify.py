@@ -15,7 +15,7 @@ import fleet2d
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.studies.execution import SerialExecutor
 from fleet2d.testing import command
-from fleet2d.testing.search import Search
+from fleet2d.testing.search import FailureSearch
 from fleet2d.testing.space import parse_over, read_space
 
 pytest.importorskip("optuna")
@@ -81,7 +81,7 @@ def test_where_nothing_fails_it_says_how_narrowly(folder: Path) -> None:
     slow = "robots.astro.speed={low: 0.5, high: 0.6}"
     done = falsify("flat.yaml", "--over", slow, "--budget", "5")
     assert 0 == done.exit_code
-    assert "nothing fails in 5 lives" in done.output
+    assert "nothing fails in 5 runs" in done.output
     assert "narrowest: margin" in done.output
 
 
@@ -92,7 +92,7 @@ def test_where_nothing_fails_it_says_how_narrowly(folder: Path) -> None:
         (["flat.yaml", "--over", "home={synthetik: 5}"], "synthetic"),
         (["flat.yaml", "--over", "axis.yaml"], "no such file"),
         (["flat.yaml", "--over", "robots.astro.speed={low: 2, high: 1}"], "low below high"),
-        (["bundled:base", "--over", OVER], "expects nothing"),
+        (["bundled:base", "--over", OVER], "has no expectations"),
         (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget soon"),
         (["test_flat.py::test_come", "--over", OVER], "did you mean 'test_comes'"),
         (["test_flat.py::test_more", "--over", OVER], "takes tmp_path"),
@@ -112,10 +112,10 @@ def test_a_planted_fault_is_found_that_random_search_misses(
     import falsify as benchmark
 
     job = benchmark.job("load and slope")
-    guided, blind = (Search(job, 110, seed=1, is_guided=guided) for guided in (True, False))
+    guided, blind = (FailureSearch(job, 110, seed=1, is_guided=guided) for guided in (True, False))
     failure = guided.run(SerialExecutor())
     assert failure is not None
-    assert job.life(failure.point, failure.seed).margin < 0
+    assert job.run(failure.point, failure.seed).margin < 0
     assert blind.run(SerialExecutor()) is None
     assert 110 == blind.tries
     sys.modules.pop("falsify")
@@ -137,5 +137,5 @@ def test_axes_come_from_files_and_texts(folder: Path) -> None:
 
 @pytest.mark.parametrize("text", ["0", "-1", "1.5", "12345678", ""])
 def test_a_budget_is_a_number_or_a_time(text: str) -> None:
-    with pytest.raises(InputError, match="a number of lives is wanted"):
+    with pytest.raises(InputError, match="a number of runs is wanted"):
         command.parse_budget(text)

@@ -164,26 +164,26 @@ def test_seed(trial):
     assert {"passed": 1} == result.outcomes
 
 
-def test_lives_go_round_homes_households_and_axes(suite: Suite) -> None:
+def test_trials_go_round_homes_households_and_axes(suite: Suite) -> None:
     result = suite("""
-lives = []
+trials = []
 @trial("flat.yaml", seeds=8, homes=["flat.json"], households={"one": {"ana": "meander"},
        "other": {"vera": {"type": "meander", "speed": 0.5}}}, axes={"robots.astro.speed": [0.3, 0.6]})
 def test_axes(trial):
-    lives.append((*trial.scenario.users, trial.scenario.robots["astro"].speed, trial.seed))
-def test_lives():
-    assert lives[:4] == [("ana", .3, 0), ("vera", .3, 1), ("ana", .6, 2), ("vera", .6, 3)]
-    assert lives[4:] == [("ana", .3, 4), ("vera", .3, 5), ("ana", .6, 6), ("vera", .6, 7)]
+    trials.append((*trial.scenario.users, trial.scenario.robots["astro"].speed, trial.seed))
+def test_trials():
+    assert trials[:4] == [("ana", .3, 0), ("vera", .3, 1), ("ana", .6, 2), ("vera", .6, 3)]
+    assert trials[4:] == [("ana", .3, 4), ("vera", .3, 5), ("ana", .6, 6), ("vera", .6, 7)]
 """.replace("flat.json", scenario()["floorplan"]["path"]))  # fmt: skip
     assert {"passed": 2} == result.outcomes
-    assert "held in 8 of 8 lives" in result.text
+    assert "held in 8 of 8 runs" in result.text
 
 
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        ("def test_x(trial): pass", "wants @fleet2d.testing.trial"),
-        ("@trial('flat.yaml')\ndef test_x(): pass", "wants a test with an argument `trial`"),
+        ("def test_x(trial): pass", "needs @fleet2d.testing.trial"),
+        ("@trial('flat.yaml')\ndef test_x(): pass", "needs a test with an argument `trial`"),
         ("@trial('flat.yml')\ndef test_x(trial): pass", "flat.yml"),
         (
             "@trial('flat.yaml', 'users.ana.start=atttic')\ndef test_x(trial): pass",

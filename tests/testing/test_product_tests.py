@@ -39,7 +39,7 @@ def test_it_holds_for_the_product_and_fails_for_a_worse_robot(week: ModuleType, 
     claim = getattr(function, ATTRIBUTE)
 
     good = run_claim(claim, function)
-    assert good.holds, [failure.words for life in good.failed for failure in life.failures]
+    assert good.holds, [failure.text for trial in good.failed for failure in trial.failures]
 
     worse = replace(claim, overrides=(*claim.overrides, *WORSE[name]))
     bad = run_claim(worse, function)

@@ -46,7 +46,7 @@ from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.settings import SightSettings
-from fleet2d.sight.tables import Scene, error_tables, is_perfect, stack_lenses
+from fleet2d.sight.tables import TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.streams import stream_key
 
 # The name of the random stream of each draw.
@@ -161,21 +161,21 @@ class Cameras:
         wrong = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
         self.errs = self.may_err or any(wrong) or self.drift is not None
-        scene = Scene(
+        context = TableContext(
             [other.name for other in self.others],
             [other.entity.radius * lattice.units_per_m for other in self.others],
             lattice,
             clock.step_us,
             owner.path,
         )
-        self.lenses = stack_lenses(lenses, wrong, scene)
+        self.lenses = stack_lenses(lenses, wrong, context)
         self.errors = error_tables(
-            lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], scene
+            lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], context
         )
         self._dark = dark_cameras(self.disturbances, self.names)
         worsen(self.lenses, self.disturbances, self.names)
         self.errors.haunted[self._dark] = 0
-        injected = injected_by(self.disturbances, self.names, scene)
+        injected = injected_by(self.disturbances, self.names, context)
         self.errors = self.errors._replace(injected=injected)
         self._draw_streams()
         if not self.activity_senses:  # the tables of the run go by the first ones

@@ -11,7 +11,7 @@ from fleet2d.kernels.look import SIGHTING, Memory
 from fleet2d.kernels.perception import FORCED_IDENTITY, FORCED_MISS, About
 from fleet2d.sight.disturbance import Disturbance, of_camera
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import Scene
+from fleet2d.sight.tables import TableContext
 
 I64 = NDArray[np.int64]
 # Squared distance beyond which a dark camera sees nobody.
@@ -58,12 +58,14 @@ def forced_of(
     return forced
 
 
-def injected_by(disturbances: Sequence[Disturbance], cameras: Sequence[str], scene: Scene) -> I64:
+def injected_by(
+    disturbances: Sequence[Disturbance], cameras: Sequence[str], context: TableContext
+) -> I64:
     """Return the false sightings of cameras that aren't dark, (n, 5): see ErrorTables."""
     dark = dark_cameras(disturbances, cameras)
-    index = {name: u for u, name in enumerate(scene.users)} | {"": -1}
+    index = {name: u for u, name in enumerate(context.users)} | {"": -1}
     rows = [
-        (c, index[false.user], *scene.lattice.to_lattice((false.x, false.y)), false.heading)
+        (c, index[false.user], *context.lattice.to_lattice((false.x, false.y)), false.heading)
         for c, camera in enumerate(cameras)
         for each in of_camera(disturbances, camera)
         if (false := each.injected) is not None and c not in dark

@@ -13,7 +13,7 @@ from fleet2d.entities.entity import Robot
 from fleet2d.events import Event
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
-from fleet2d.sight.tables import Scene, stack_lenses
+from fleet2d.sight.tables import TableContext, stack_lenses
 
 # Poses kept: half as many as slots. Rounds through a large home take a few thousand.
 SLOTS = 1 << 14
@@ -63,9 +63,9 @@ class SeenArea:
         plan = robot.home.plan
         lattice, step_us = plan.lattice, robot.clock.step_us
         lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
-        scene = Scene([], [], lattice, step_us, robot.path)
+        context = TableContext([], [], lattice, step_us, robot.path)
         self._names = tuple(robot.entity.eyes)
-        self._lenses = stack_lenses(lenses, [False] * len(lenses), scene)
+        self._lenses = stack_lenses(lenses, [False] * len(lenses), context)
         self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
         bins = (LONGEST // bin_steps + 2 if bin_steps else 0, len(patches.room))

@@ -1,4 +1,4 @@
-"""The camera of a robot: what it could see (its field of view), and how surely it notices."""
+"""The camera of a robot: its field of view, and the probability that it notices a user."""
 
 from collections.abc import Sequence
 from datetime import timedelta
@@ -27,12 +27,12 @@ MOST_POINTS = 32
 
 
 class Pan(Settings):
-    """A camera that turns to and fro: it looks in each direction for a while, then in the next."""
+    """Pan of a camera: it looks in each direction for some time, then in the next."""
 
     headings_deg: tuple[AngleDeg, ...] = Field(
         min_length=1,
         max_length=64,
-        description="directions, one after the other, from where it is mounted to look",
+        description="directions, one after the other, relative to its heading on the body",
         examples=[[-45, 0, 45, 0]],
     )
     dwell: PositiveDuration = Field(
@@ -58,7 +58,7 @@ class Lens(NamedTuple):
     points: int
 
     def body(self, radius: float) -> list[tuple[int, int]]:
-        """Return the points of a body of `radius` [lattice units] that count: its centre first."""
+        """Return the points of a body of `radius` [lattice units] to look at: its centre first."""
         steps = [round(i * TURN / self.points) for i in range(self.points)]
         along, half = round(radius), UNIT // 2
         circle = [
@@ -72,17 +72,17 @@ USUAL_PATIENCE = timedelta(seconds=5)
 
 
 class Camera(Settings):
-    """A camera on the body. Left as it is, it sits at the centre and looks where the body heads.
+    """A camera on a body. By default it is at the centre and looks along the body's heading.
 
     A user is in view when the user's centre is between the two ranges, within the angle, and no
-    wall touches the line between the camera and it. Ranges and offset are rounded to the lattice,
-    the half angle to 1/8192 of a turn (0.044 degrees), headings to 1/4096. A camera that its offset
-    puts into a wall sees nothing.
+    wall touches the line between the camera and the centre. Ranges and offset are rounded to the
+    lattice, the half angle to 1/8192 of a turn (0.044 degrees), headings to 1/4096. A camera that
+    its offset puts into a wall sees nothing.
     """
 
     range: tuple[Length, Length] = Field(
         default=(0.0, 4.5),
-        description="nearest and farthest distance it sees at [m]",
+        description="nearest and farthest distance at which it sees [m]",
         examples=[[0.3, 4.5]],
     )
     angle_deg: AngleDeg = Field(
@@ -107,14 +107,14 @@ class Camera(Settings):
         examples=[[0.1, 0]],
     )
     heading_deg: AngleDeg = Field(
-        default=0.0, description="where it looks, counter-clockwise from where the body heads"
+        default=0.0, description="where it looks, counter-clockwise from the body's heading"
     )
     pan: Pan | None = Field(default=None, description="how it turns to and fro; null: it doesn't")
     period: PositiveDuration | None = Field(
         default=None, description="time from look to look; null: one in every step"
     )
     latency: Duration = Field(
-        default=timedelta(0), description="how long after a look its detections are known"
+        default=timedelta(0), description="time from a look until its detections are known"
     )
     body_points: int = Field(
         default=0,
@@ -124,7 +124,7 @@ class Camera(Settings):
         " one in view is enough; 0: only the centre counts",
     )
     perception: Perception | None = Field(
-        default=None, description="how it errs; null: as the robot's `perception` says"
+        default=None, description="its errors; null: the robot's `perception`"
     )
 
     @model_validator(mode="after")

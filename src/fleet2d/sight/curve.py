@@ -1,4 +1,4 @@
-"""Curves: how a probability depends on a distance, an angle or the time of day."""
+"""Curves: probabilities that depend on a distance, an angle or the time of day."""
 
 from collections.abc import Mapping, Sequence
 from decimal import Decimal, localcontext
@@ -15,19 +15,19 @@ from fleet2d.kernels.perception import ONE
 from fleet2d.problems import problem, problem_at
 from fleet2d.units import Share
 
-EXACT = 20  # digits: far more than a probability of 2**-31 needs
+EXACT = 20  # digits: far more than a probability in units of 2**-31 needs
 LIMIT = 200  # beyond exp(-200) or exp(200) a probability is 0 or 1
-# The natural logarithm of 2, so short that whole multiples of it are exact; and what that lacks.
+# The natural logarithm of 2, with few bits so that its multiples are exact; and the remainder.
 LN_2 = int(Decimal(2).ln() * 2**32) / 2**32
 LN_2_REST = float(Decimal(2).ln() - Decimal(LN_2))
-TERMS = 15  # of the series of exp, up to half of LN_2: more than a double can tell
+TERMS = 15  # of the series of exp, up to half of LN_2: more than the precision of a double needs
 
 
 class Curve(Settings):
-    """A probability along a quantity: a table with straight lines between its rows, or a logistic.
+    """A probability as a function: a table with linear interpolation, or a logistic function.
 
-    In a scenario: ``0.9`` (the same everywhere), ``[[0, 1], [3, 0.9], [5, 0.2]]`` (before the first
-    row and behind the last it goes on level), or ``{midpoint: 4, width: 0.5}``:
+    In a scenario: ``0.9`` (constant), ``[[0, 1], [3, 0.9], [5, 0.2]]`` (constant before the first
+    row and after the last), or ``{midpoint: 4, width: 0.5}``:
     top / (1 + exp((x - midpoint) / width)).
 
     Example:
@@ -40,14 +40,14 @@ class Curve(Settings):
 
     points: tuple[tuple[float, Share], ...] = Field(
         default=(),
-        description="rows [where, probability], ascending",
+        description="rows [x, probability], ascending",
         examples=[[[0, 1], [4, 0.6]]],
     )
     midpoint: float | None = Field(
-        default=None, description="logistic: where it is at half its top"
+        default=None, description="logistic: x at which it is half its top"
     )
     width: float | None = Field(
-        default=None, gt=0, description="logistic: how slowly it falls, e.g. to 27 % in one width"
+        default=None, gt=0, description="logistic: scale of its decrease, to 27 % in one width"
     )
     top: Share = Field(default=1.0, description="logistic: the probability far before the midpoint")
 
@@ -67,14 +67,14 @@ class Curve(Settings):
             raise problem(
                 "a curve is a number, rows like [[0, 1], [4, 0.6]], or {midpoint: …, width: …}"
             )
-        for (one, _), (other, _) in pairwise(self.points):
-            if not one < other:
-                raise problem_at(("points",), f"{other:g} stands behind {one:g}: rows must ascend")
+        for (before, _), (after, _) in pairwise(self.points):
+            if not before < after:
+                raise problem_at(("points",), f"{after:g} follows {before:g}: rows must ascend")
         return self
 
     @model_serializer(mode="plain")
     def _shortest(self) -> Any:
-        """Write it as it is read: rows, or a logistic; so that one merges onto the other."""
+        """Return the form of a scenario: rows, or a logistic function with all its keys."""
         if self.points:
             return [list(row) for row in self.points]
         return {"midpoint": self.midpoint, "width": self.width, "top": self.top}
@@ -83,45 +83,45 @@ class Curve(Settings):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Tell editors of the short forms, too."""
+        """Add the short forms to the schema."""
         row = {"type": "array", "minItems": 2, "maxItems": 2}
         short = [{"type": "number"}, {"type": "string"}, {"type": "array", "items": row}]
         return {"anyOf": [*short, handler(schema)]}
 
     @property
     def reaches_below_zero(self) -> bool:
-        """Whether it tells of negative values."""
+        """Whether its rows begin at a negative x."""
         return bool(self.points) and self.points[0][0] < 0
 
     def at(self, x: float) -> float:
-        """Return the probability at one place."""
+        """Return the probability at x."""
         return float(self._shares(np.array([x], np.float64))[0])
 
-    def chances(self, places: Sequence[float]) -> NDArray[np.int64]:
-        """Return the probabilities at many places [2**-31]."""
-        return np.rint(self._shares(np.array(places, np.float64)) * ONE).astype(np.int64)
+    def chances(self, x: Sequence[float]) -> NDArray[np.int64]:
+        """Return the probabilities at many x [2**-31]: int64 (n,)."""
+        return np.rint(self._shares(np.array(x, np.float64)) * ONE).astype(np.int64)
 
-    def _shares(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the probabilities at many places, the same on every machine."""
+    def _shares(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the probabilities at many x, the same on every machine: float64 (n,)."""
         if self.midpoint is not None and self.width is not None:
-            fallen: NDArray[np.float64] = self.top / (
-                1 + exponential((places - self.midpoint) / self.width)
+            logistic: NDArray[np.float64] = self.top / (
+                1 + exponential((at - self.midpoint) / self.width)
             )
-            return fallen
+            return logistic
         x, y = np.array(self.points).T
-        behind = np.minimum(np.searchsorted(x, places, side="right"), len(x) - 1)
-        before = np.maximum(behind - 1, 0)
-        run = np.where(behind > before, x[behind] - x[before], 1.0)
-        along = np.clip(places - x[before], 0.0, run) / run
-        shares: NDArray[np.float64] = y[before] + (y[behind] - y[before]) * along
+        after = np.minimum(np.searchsorted(x, at, side="right"), len(x) - 1)
+        before = np.maximum(after - 1, 0)
+        width = np.where(after > before, x[after] - x[before], 1.0)
+        fraction = np.clip(at - x[before], 0.0, width) / width
+        shares: NDArray[np.float64] = y[before] + (y[after] - y[before]) * fraction
         return shares
 
     def around_the_clock(self) -> "Curve":
-        """Return the same over hours from -24 to 48, so that the day's end meets its beginning."""
+        """Return the curve repeated over hours -24 to 48, so that midnight is interpolated, too."""
         if len(self.points) < 2:
             return self
         days = tuple((hour + day, p) for day in (-24, 0, 24) for hour, p in self.points)
-        # Unchecked: rows at 0 and at 24 meet, and it jumps there.
+        # Unchecked: rows at 0 and at 24 may coincide; the curve jumps there.
         return Curve.model_construct(points=days, midpoint=None, width=None)
 
 
@@ -145,7 +145,7 @@ def decay(steps: Decimal) -> float:
 
 
 def exponential(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return exp(x), cut where a probability would be 0 or 1, the same on every machine.
+    """Return exp(x), with x clipped to -LIMIT … LIMIT, the same on every machine.
 
     np.exp differs between machines in the last bit; sums and products don't.
 
@@ -163,13 +163,13 @@ def exponential(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _exp(x: Decimal) -> Decimal:
-    """Return exp(x), cut where a probability would be 0 or 1."""
+    """Return exp(x), with x clipped to -LIMIT … LIMIT."""
     limit = Decimal(LIMIT)
     return (limit if x > limit else -limit if x < -limit else x).exp()
 
 
 def cumulative(weights: Mapping[Any, float], order: Sequence[Any]) -> list[int]:
-    """Return the cumulative probabilities [2**-31] of outcomes, in an order; unnamed ones have 0.
+    """Return the cumulative probabilities [2**-31] of outcomes in an order; missing ones have 0.
 
     >>> [x / 2**31 for x in cumulative({"a": 0.25, "c": 0.5}, "abc")]
     [0.25, 0.25, 0.75]

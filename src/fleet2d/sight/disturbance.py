@@ -1,4 +1,4 @@
-"""Disturbances: what somebody outside does for a while to what a robot's cameras see."""
+"""Disturbances: temporary interventions on what a robot's cameras see."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,12 +8,13 @@ from fleet2d.sight.perception import Perception
 
 
 class FalseSighting(NamedTuple):
-    """Somebody who is perceived in every look, and isn't there.
+    """A false positive in every look of a camera.
 
     Attributes:
-        user: For whom it is taken; empty for somebody unknown.
-        x, y: Where [m].
-        heading: Where it seems to face [1/4096 turn].
+        user: Name of the user it is recognized as; empty for an unknown person.
+        x: Position [m].
+        y: Position [m].
+        heading: Heading [1/4096 turn].
     """
 
     user: str
@@ -27,13 +28,13 @@ class Disturbance:
     """One disturbance of a robot's cameras.
 
     Attributes:
-        camera: The camera; None: all.
-        dark: Whether it sees nothing at all.
+        camera: Name of the camera; None: all.
+        dark: Whether the camera sees nothing at all.
         detection: Factor of the probability that a user in view is noticed.
-        errs: How it errs instead; None: as before.
-        missed: A user who isn't noticed; None: nobody.
-        mistaken: A user, and for whom it is taken; empty for somebody unknown.
-        injected: Somebody who isn't there.
+        errs: The errors that replace the camera's own; None: no change.
+        missed: Name of a user who isn't noticed; None: no change.
+        mistaken: Name of a user, and the name it is recognized as, empty for an unknown person.
+        injected: A false positive in every look.
     """
 
     camera: str | None = None
@@ -45,10 +46,10 @@ class Disturbance:
     injected: FalseSighting | None = None
 
     def is_of(self, camera: str) -> bool:
-        """Tell whether it disturbs a camera."""
+        """Return whether it disturbs a camera."""
         return self.camera in (None, camera)
 
 
 def of_camera(disturbances: Sequence[Disturbance], camera: str) -> list[Disturbance]:
-    """Return those of a camera, in the order in which they began."""
-    return [each for each in disturbances if each.is_of(camera)]
+    """Return the disturbances of a camera, in the order in which they began."""
+    return [disturbance for disturbance in disturbances if disturbance.is_of(camera)]

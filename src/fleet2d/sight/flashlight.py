@@ -1,4 +1,4 @@
-"""Flashlight: the cells in view of a pose, kept by the poses that somebody takes."""
+"""Flashlight: a cache of the cells in view, by pose of the camera."""
 
 from collections import OrderedDict
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,11 +16,11 @@ from fleet2d.sight.visibility_polygon import filled_cells
 if TYPE_CHECKING:
     from fleet2d.floorplan.home.home import Home
 
-# What an entry takes besides its bits: keys, tuple and array.
+# Memory of an entry besides its bits: keys, tuple and array.
 ENTRY_BYTES = 450
 
 
-class Spot(NamedTuple):
+class CellBits(NamedTuple):
     """The cells in view of a pose, as bits of the smallest box round them."""
 
     row: int
@@ -32,19 +32,19 @@ class Spot(NamedTuple):
 
 @register("sight", "flashlight")
 class Flashlight(FieldOfView):
-    """Keep the set of cells in view of each pose, and look points up by the cell that holds them.
+    """Cache the set of cells in view of each pose, and look points up by their cell.
 
     A point is in view if the centre of its cell is, so it is exact for the centres of cells, and
-    elsewhere up to half a cell. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
+    up to half a cell elsewhere. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
     """
 
     memory_mb: float = Field(
-        default=64.0, gt=0, description="memory for poses; those not used for longest go first"
+        default=64.0, gt=0, description="memory for poses; the least recently used go first"
     )
 
     def start(self, home: "Home") -> None:
-        """Begin with nothing."""
-        self._face(home)
+        """Begin with an empty cache."""
+        self._reset(home)
 
     def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
         """Return which points lie in cells whose centre is visible from (x, y)."""
@@ -53,52 +53,53 @@ class Flashlight(FieldOfView):
 
     def sees(self, home: "Home", x: int, y: int, heading: int, reach: Reach, points: I64) -> Bool:
         """Return which points lie in cells whose centre is in view."""
-        spot = self._spot(home, x, y, heading, reach)
-        row, column = points[:, 1] // SUB - spot.row, points[:, 0] // SUB - spot.column
-        found = (row >= 0) & (row < spot.rows) & (column >= 0) & (column < spot.columns)
-        at = row[found] * spot.columns + column[found]
-        found[found] = spot.bits[at >> 3] >> (7 - (at & 7)).astype(np.uint8) & 1 == 1
-        return found
+        cells = self._lookup(home, x, y, heading, reach)
+        row, column = points[:, 1] // SUB - cells.row, points[:, 0] // SUB - cells.column
+        in_view = (row >= 0) & (row < cells.rows) & (column >= 0) & (column < cells.columns)
+        bit = row[in_view] * cells.columns + column[in_view]
+        in_view[in_view] = cells.bits[bit >> 3] >> (7 - (bit & 7)).astype(np.uint8) & 1 == 1
+        return in_view
 
     def cells(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells are in view: bool (rows, columns)."""
-        spot, lattice = self._spot(home, x, y, heading, reach), home.plan.lattice
+        cells, lattice = self._lookup(home, x, y, heading, reach), home.plan.lattice
         mask = np.zeros((lattice.rows, lattice.columns), np.bool_)
-        box = np.unpackbits(spot.bits, count=spot.rows * spot.columns)
-        here = slice(spot.row, spot.row + spot.rows), slice(spot.column, spot.column + spot.columns)
-        mask[here] = box.reshape(spot.rows, spot.columns)
+        box = np.unpackbits(cells.bits, count=cells.rows * cells.columns)
+        part = mask[cells.row : cells.row + cells.rows, cells.column : cells.column + cells.columns]
+        part[:] = box.reshape(cells.rows, cells.columns)
         return mask
 
     @property
-    def kept(self) -> tuple[int, int]:
-        """The number of poses kept, and the memory that they take [bytes]."""
-        return len(self._spots), self._taken
+    def cache_size(self) -> tuple[int, int]:
+        """The number of cached poses, and their memory [bytes]."""
+        return len(self._cache), self._bytes
 
-    def _spot(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Spot:
+    def _lookup(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> CellBits:
         if getattr(self, "_walls", None) is not home.walls:
-            self._face(home)
+            self._reset(home)
         key = (x, y, heading, *reach)
-        spot = self._spots.pop(key, None)
-        if spot is None:
-            spot = _spot_of(filled_cells(home, x, y, heading, reach))
-            self._taken += ENTRY_BYTES + spot.bits.nbytes
-        self._spots[key] = spot
-        while self._taken > self.memory_mb * 1e6 and len(self._spots) > 1:
-            _, oldest = self._spots.popitem(last=False)
-            self._taken -= ENTRY_BYTES + oldest.bits.nbytes
-        return spot
+        cells = self._cache.pop(key, None)
+        if cells is None:
+            cells = _pack(filled_cells(home, x, y, heading, reach))
+            self._bytes += ENTRY_BYTES + cells.bits.nbytes
+        self._cache[key] = cells
+        while self._bytes > self.memory_mb * 1e6 and len(self._cache) > 1:
+            _, oldest = self._cache.popitem(last=False)
+            self._bytes -= ENTRY_BYTES + oldest.bits.nbytes
+        return cells
 
-    def _face(self, home: "Home") -> None:
-        """Begin anew, with the walls that the home has now."""
+    def _reset(self, home: "Home") -> None:
+        """Empty the cache, for the present walls of the home."""
         self._walls: Mesh = home.walls
-        self._spots: OrderedDict[tuple[int, ...], Spot] = OrderedDict()
-        self._taken = 0
+        self._cache: OrderedDict[tuple[int, ...], CellBits] = OrderedDict()
+        self._bytes = 0
 
 
-def _spot_of(mask: Bool) -> Spot:
+def _pack(mask: Bool) -> CellBits:
+    """Return the cells of a mask (rows, columns) as bits."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if len(rows) == 0:
-        return Spot(0, 0, 0, 0, np.zeros(0, np.uint8))
+        return CellBits(0, 0, 0, 0, np.zeros(0, np.uint8))
     box = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     height, width = box.shape
-    return Spot(int(rows[0]), int(columns[0]), height, width, np.packbits(box))
+    return CellBits(int(rows[0]), int(columns[0]), height, width, np.packbits(box))

@@ -1,4 +1,4 @@
-"""Fields of view: the interface of the methods that a scenario chooses from by `sight.method`."""
+"""Fields of view: the base of the methods that a scenario can choose by `sight.method`."""
 
 from abc import abstractmethod
 from typing import TYPE_CHECKING, ClassVar
@@ -21,11 +21,11 @@ __all__ = ["Bool", "FieldOfView", "Reach"]
 
 
 class FieldOfView(Component):
-    """Base of the ways to tell what is in view; a subclass writes `visible`.
+    """Base of the methods that decide what is in view; a subclass writes `visible`.
 
     Positions are lattice points, headings 1/4096 of a turn counter-clockwise from +x (see
-    ``home.plan.lattice``), so that answers can be exact. A method may keep what it has worked out,
-    but an answer depends only on its arguments and on the walls, ``home.walls``, as they are.
+    ``home.plan.lattice``), so that results can be exact. A method may cache results, but a result
+    must depend only on its arguments and on the present walls, ``home.walls``.
 
     Example:
         >>> import fleet2d
@@ -44,12 +44,12 @@ class FieldOfView(Component):
 
     @abstractmethod
     def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
-        """Return which points no wall hides, whatever their range and bearing.
+        """Return which points are not hidden by walls, regardless of range and bearing.
 
         Args:
-            home: The home, with its walls as they are.
-            x: Where the eye is.
-            y: Where the eye is.
+            home: The home, with its present walls.
+            x: Position of the eye [lattice units].
+            y: Position of the eye [lattice units].
             points: int64 (n, 2).
 
         Returns:
@@ -61,22 +61,22 @@ class FieldOfView(Component):
 
         Args:
             home: The home.
-            x: Where the camera is.
-            y: Where the camera is.
-            heading: Where it looks.
-            reach: How far and wide it sees.
+            x: Position of the camera [lattice units].
+            y: Position of the camera [lattice units].
+            heading: Where it looks [1/4096 turn].
+            reach: Its range and angle.
             points: int64 (n, 2).
 
         Returns:
             bool (n,).
         """
-        found = points_in_reach(x, y, heading, reach, points)
-        if found.any():
-            found[found] = self.visible(home, x, y, points[found])
-        return found
+        in_view = points_in_reach(x, y, heading, reach, points)
+        if in_view.any():
+            in_view[in_view] = self.visible(home, x, y, points[in_view])
+        return in_view
 
     def cells(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
-        """Return which cells are in view, each by its centre: bool (rows, columns)."""
+        """Return which cells have their centre in view: bool (rows, columns)."""
         lattice = home.plan.lattice
         rows, columns = np.indices((lattice.rows, lattice.columns))
         centres = np.stack([columns.ravel(), rows.ravel()], axis=1) * SUB + CELL_CENTRE

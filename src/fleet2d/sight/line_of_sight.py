@@ -1,4 +1,4 @@
-"""Lines of sight: every point is looked at by itself, and nothing is kept."""
+"""Lines of sight: every point is tested by itself, without a cache."""
 
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 @register("sight", "line_of_sight")
 class LineOfSight(FieldOfView):
-    """Follow the line to each point through the home; no cache.
+    """Follow the line to each point through the home, without a cache.
 
-    The default: robots look at a few people at a time from ever new places, and a line costs a
-    twentieth of a microsecond, less than looking up what a cache would have to say.
+    This is the default: robots look at a few people at a time from ever new places, and a line
+    costs a twentieth of a microsecond, less than a lookup in a cache.
     """
 
     def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
-        """Return which points a line of sight leads to."""
+        """Return which points have a line of sight to (x, y)."""
         return points_in_sight(home.walls, x, y, points)

@@ -1,6 +1,6 @@
-"""Perception: how what a robot makes of its camera's pictures differs from what is there.
+"""Perception: the errors of what a robot perceives in the images of its cameras.
 
-Every part is perfect unless the scenario says otherwise.
+Every part is perfect unless the scenario configures an error.
 """
 
 from collections.abc import Mapping
@@ -18,19 +18,19 @@ Posture = Literal["stand", "sit", "lie"]
 POSTURES: tuple[Posture, ...] = ("stand", "sit", "lie")
 ALWAYS = Curve(points=((0.0, 1.0),))
 NEVER = Curve(points=((0.0, 0.0),))
-# Shares that should make a whole may miss it by so much, as 1/3 in decimals does.
-NEARLY = 1e-6
+# Largest deviation from 1 of a sum of shares, such as of 1/3 written in decimals.
+SUM_ERROR = 1e-6
 
 
 def _check_sum(location: tuple[str, ...], total: float) -> None:
-    if total > 1 + NEARLY:
+    if total > 1 + SUM_ERROR:
         raise problem_at(location, f"the shares add up to {total:g}, more than 1")
 
 
 class Detection(Settings):
-    """How surely a user in view is noticed: the camera's `detection`, times all these.
+    """Probability that a user in view is noticed: the camera's `detection` times all these factors.
 
-    A curve of `bearing` that tells of no negative angle holds for both sides.
+    A curve of `bearing` without negative angles holds for both sides.
     """
 
     distance: Curve = Field(default=ALWAYS, description="by the distance of the user's centre [m]")
@@ -52,8 +52,8 @@ class Detection(Settings):
     light: Curve = Field(default=ALWAYS, description="by the time of day [hours], day after day")
     memory: Duration = Field(
         default=timedelta(0),
-        description="time constant of misses: after it, a draw is still the last one with"
-        " probability 1/e; 0: each look is drawn anew",
+        description="time constant of misses: after it, the last random draw still holds with"
+        " probability 1/e; 0: each look has a new draw",
     )
 
     @model_validator(mode="after")
@@ -67,7 +67,7 @@ class Detection(Settings):
 
 
 class Spot(Settings):
-    """A place that is now and then taken for a person: a coat rack, a screen, a mirror."""
+    """A place that is sometimes mistaken for a person: a coat rack, a screen, a mirror."""
 
     at: tuple[Length, Length] = Field(description="where it is [m]", examples=[[2.5, 1.0]])
     per_hour: float = Field(ge=0, description="false positives per hour in which it is in view")
@@ -75,12 +75,12 @@ class Spot(Settings):
         default=0.0,
         ge=0,
         le=10,
-        description="standard deviation of where they appear, per axis [m]",
+        description="standard deviation of their positions, per axis [m]",
     )
 
 
 class FalsePositives(Settings):
-    """People that are noticed, but aren't there: independent looks with a rate per time in view."""
+    """People that are perceived but aren't there, at random with a rate per time of looking."""
 
     per_hour: float = Field(
         default=0.0, ge=0, description="per hour of looking, uniform over what is in view"
@@ -89,7 +89,7 @@ class FalsePositives(Settings):
         default=(), max_length=64, description="places with rates of their own"
     )
     looks_like: dict[str, Share] = Field(
-        default={}, description="for which user one is taken; the rest is not recognized"
+        default={}, description="which user one is mistaken for; the rest is not recognized"
     )
 
     @model_validator(mode="after")
@@ -99,22 +99,22 @@ class FalsePositives(Settings):
 
 
 class Identity(Settings):
-    """Whom a noticed user is taken for: recognized, taken for another one, or not recognized."""
+    """Identity of a noticed user: recognized, mistaken for another user, or not recognized."""
 
     right: Curve | None = Field(
         default=None, description="recognized, by distance [m]; null: whenever not mistaken"
     )
     mistaken: Curve = Field(
-        default=NEVER, description="taken for another user, by distance [m]; the rest is unknown"
+        default=NEVER, description="mistaken for another user, by distance [m]; the rest is unknown"
     )
     confusion: dict[str, dict[str, Share]] = Field(
         default={},
-        description="for whom each user is mistaken, when mistaken; left out: anyone else alike",
+        description="which user each user is mistaken for, if so; left out: all others equally",
     )
     per_track: bool = Field(
         default=False,
         description="an identity stays until the user isn't noticed for `lost_after`; otherwise"
-        " each look decides anew",
+        " it is drawn anew in each look",
     )
 
     @model_validator(mode="after")
@@ -125,13 +125,13 @@ class Identity(Settings):
                     ("confusion", user), f"{user!r} can't be mistaken for {user!r}: that is right"
                 )
             total = sum(others.values())
-            if abs(total - 1) > NEARLY:
+            if abs(total - 1) > SUM_ERROR:
                 raise problem_at(("confusion", user), f"the shares add up to {total:g}, not to 1")
         return self
 
 
 class Attributes(Settings):
-    """How wrong the rest is; noise is bell-shaped, with these standard deviations."""
+    """Errors of position, heading, posture and activity; noise is bell-shaped, by its deviation."""
 
     range_noise: Length = Field(
         default=0.0, ge=0, le=100, description="of the distance, whatever the distance [m]"
@@ -141,15 +141,15 @@ class Attributes(Settings):
     )
     bearing_noise_deg: AngleDeg = Field(default=0.0, ge=0, le=90, description="of the bearing")
     heading_noise_deg: AngleDeg = Field(
-        default=0.0, ge=0, le=180, description="of where the user is perceived to face"
+        default=0.0, ge=0, le=180, description="of the heading in which the user is perceived"
     )
     posture: dict[Posture, dict[Posture, Share]] = Field(
         default={},
-        description="what a posture is taken for, with which probability; the rest is right",
+        description="probabilities of mistaking a posture for others; the rest is right",
     )
     activity: dict[str, dict[str, Share]] | None = Field(
         default=None,
-        description="what an activity is taken for, with which probability; the rest is right;"
+        description="probabilities of mistaking an activity for others; the rest is right;"
         " null: activities aren't perceived",
         examples=[{"cook": {"breakfast": 0.2}}],
     )
@@ -169,9 +169,13 @@ class Attributes(Settings):
 
 
 class Perception(Settings):
-    """How a robot's perception errs; perfect where nothing is said."""
+    """Errors of a robot's perception; perfect by default."""
 
-    detection: Detection = Field(default=Detection(), description="who is noticed")
-    false_positives: FalsePositives = Field(default=FalsePositives(), description="who isn't there")
-    identity: Identity = Field(default=Identity(), description="who it is taken for")
-    attributes: Attributes = Field(default=Attributes(), description="where, and how")
+    detection: Detection = Field(default=Detection(), description="which users are noticed")
+    false_positives: FalsePositives = Field(
+        default=FalsePositives(), description="people who aren't there"
+    )
+    identity: Identity = Field(default=Identity(), description="which user one is recognized as")
+    attributes: Attributes = Field(
+        default=Attributes(), description="errors of position, heading, posture and activity"
+    )

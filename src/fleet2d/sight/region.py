@@ -1,4 +1,4 @@
-"""What is visible from one place in a home: its outline, its area, and whether it holds a point."""
+"""The region visible from one place in a home: its outline, its area, and the points in it."""
 
 from functools import cached_property
 from typing import Protocol
@@ -15,8 +15,8 @@ from fleet2d.kernels.region import visible_region as visible_region_fast
 Float64 = npt.NDArray[np.float64]
 
 
-class Walled(Protocol):
-    """What a sight line needs to know of a floor plan."""
+class WallPlan(Protocol):
+    """Protocol of plans with walls, as lines of sight need them: such as a floor plan."""
 
     @property
     def mesh(self) -> Mesh:
@@ -24,17 +24,17 @@ class Walled(Protocol):
 
     @property
     def lattice(self) -> Lattice:
-        """The way from metres to lattice units and back."""
+        """Converts metres to lattice units and back."""
 
 
 class VisibleRegion:
-    """Everything that is visible from one place: a star-shaped region, exact in lattice units.
+    """The region visible from one place: star-shaped, exact in lattice units.
 
     A point is in the region if and only if the straight line from the eye to it touches no wall and
     no corner, so the outline isn't part of the region.
 
     Attributes:
-        eye: Where it is seen from, lattice units.
+        eye: The place (x, y) [lattice units].
         right: int32 (n,), for each piece of the region the mesh vertex on its right border.
         wall: int32 (n,), the wall edge of each piece, 3 * triangle + k.
 
@@ -48,16 +48,16 @@ class VisibleRegion:
         (10.0, [True, False])
     """
 
-    def __init__(self, plan: Walled, x: float, y: float) -> None:
-        """Find what is visible from (x, y).
+    def __init__(self, plan: WallPlan, x: float, y: float) -> None:
+        """Compute the region visible from (x, y).
 
         Args:
             plan: A floor plan.
-            x: Where the eye is [m].
-            y: Where the eye is [m].
+            x: Position of the eye [m].
+            y: Position of the eye [m].
 
         Raises:
-            PlacementError: If the eye is outside free space or on a wall.
+            PlacementError: The eye is outside free space or on a wall.
         """
         self._mesh, self._lattice = plan.mesh, plan.lattice
         eye = self._lattice.to_lattice((x, y))
@@ -75,26 +75,26 @@ class VisibleRegion:
 
     @property
     def area_m2(self) -> float:
-        """The area of the region, square metres."""
+        """The area of the region [m²]."""
         return self._outline[1] / self._lattice.units_per_m**2
 
     def polygon(self) -> Float64:
-        """Return the corners of the outline, counter-clockwise: float64 (n, 2), metres."""
+        """Return the corners of the outline, counter-clockwise: float64 (n, 2) [m]."""
         outline, _ = self._outline
-        moved = (outline != np.roll(outline, 1, axis=0)).any(axis=1)
-        return self._lattice.to_metres(outline[moved])
+        differs = (outline != np.roll(outline, 1, axis=0)).any(axis=1)
+        return self._lattice.to_metres(outline[differs])
 
     def contains(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Return which points are visible.
 
         Args:
-            points: (…, 2), metres; each counts as the lattice point nearest to it.
+            points: (…, 2) [m]; each counts as the nearest lattice point.
 
         Returns:
             bool (…).
         """
         lattice_points = self._lattice.to_lattice(points)
         flat = np.ascontiguousarray(lattice_points.reshape(-1, 2))
-        found = region_contains_points(self._mesh, *self.eye, self.right, self.wall, flat)
-        inside: npt.NDArray[np.bool_] = found.reshape(lattice_points.shape[:-1])
-        return inside
+        is_inside = region_contains_points(self._mesh, *self.eye, self.right, self.wall, flat)
+        visible: npt.NDArray[np.bool_] = is_inside.reshape(lattice_points.shape[:-1])
+        return visible

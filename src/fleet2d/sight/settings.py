@@ -11,11 +11,11 @@ from fleet2d.units import PositiveDuration
 
 
 class SightSettings(Settings):
-    """How a run works out what is in view."""
+    """How a run computes what is in view."""
 
     method: Annotated[FieldOfView, OneOf("sight")] = Field(
         default=LineOfSight(),
-        description="how it is told whether somebody is in view: line_of_sight,"
+        description="method that decides whether somebody is in view: line_of_sight,"
         " visibility_polygon, flashlight, or your own",
     )
     people_occlude: bool = Field(
@@ -25,6 +25,6 @@ class SightSettings(Settings):
     )
     seen_every: PositiveDuration | None = Field(
         default=None,
-        description="how often the seen area is worked out, for the layers of what robots have seen"
-        " and the exposure of rooms; null: in every step",
+        description="how often the area in view is computed, for the layers of what robots have"
+        " seen and the exposure of rooms; null: in every step",
     )

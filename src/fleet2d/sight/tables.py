@@ -1,4 +1,4 @@
-"""Perception in the integers of the kernels: tables of probabilities, made once at set-up."""
+"""Perception in the integers of the kernels: tables of probabilities, computed once at set-up."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -55,18 +55,18 @@ from fleet2d.units import micros
 
 I64 = NDArray[np.int64]
 
-NEARLY = 1e-6
+SUM_ERROR = 1e-6  # largest excess over 1 of a sum of probabilities
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What tables depend on besides the cameras.
+class TableContext:
+    """Everything that tables depend on besides the cameras.
 
     Attributes:
         users: Names of the users.
-        radii: Their radii [lattice units].
+        radii: Radii of the users [lattice units].
         lattice: The home's lattice.
-        step_us: Length of a step.
+        step_us: Length of a step [us].
         path: The robot's path in the scenario, for errors.
     """
 
@@ -77,13 +77,13 @@ class Scene:
     path: str
 
 
-def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], scene: Scene) -> Lenses:
+def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableContext) -> Lenses:
     """Return the cameras of a robot as the kernel's arrays."""
-    shape = (len(lenses), len(scene.users))
+    shape = (len(lenses), len(context.users))
     bodies = np.zeros((*shape, max(lens.points for lens in lenses) + 1, 2), np.int64)
     reach, widest = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
     for c, lens in enumerate(lenses):
-        for u, radius in enumerate(scene.radii):
+        for u, radius in enumerate(context.radii):
             body = lens.body(radius)
             bodies[c, u, : len(body)] = body
             reach[c, u] = round(radius) + 1 if lens.points else 0
@@ -118,18 +118,18 @@ def _row(values: object) -> I64:
 
 
 def error_tables(
-    lenses: Sequence[Lens], perceptions: Sequence[Perception | None], scene: Scene
+    lenses: Sequence[Lens], perceptions: Sequence[Perception | None], context: TableContext
 ) -> ErrorTables:
-    """Return how each camera of a robot errs; the streams are left to the caller.
+    """Return the errors of each camera of a robot; the caller fills in the keys of the streams.
 
     Raises:
-        ScenarioError: It names a user who isn't there, probabilities add up to more than 1, or a
-            rate is above one false positive per look.
+        ScenarioError: A user is unknown, probabilities add up to more than 1, or a rate is above
+            one false positive per look.
     """
-    cameras, users = len(lenses), len(scene.users)
-    given = [perception or Perception() for perception in perceptions]
-    sources = 1 + max(len(perception.false_positives.spots) for perception in given)
-    # Where no camera errs, nothing of all this is ever read.
+    cameras, users = len(lenses), len(context.users)
+    models = [perception or Perception() for perception in perceptions]
+    sources = 1 + max(len(model.false_positives.spots) for model in models)
+    # If no camera errs, no table is ever read.
     errs = any(perception is not None for perception in perceptions)
     tables = ErrorTables(
         table=np.zeros((cameras, TABLE if errs else 1), np.int64),
@@ -144,29 +144,29 @@ def error_tables(
     )
     for c, (lens, perception) in enumerate(zip(lenses, perceptions, strict=True)):
         if perception is not None:
-            reach = lens.far + max((round(radius) + 2 for radius in scene.radii), default=0)
+            reach = lens.far + max((round(radius) + 2 for radius in context.radii), default=0)
             table = tables.table[c]
             table[SHIFT] = max(0, reach.bit_length() - (BINS - 1).bit_length())
-            _fill_detection(table, lens, perception.detection, scene)
-            _fill_identity(table, tables.whom[c], perception.identity, scene)
-            _fill_attributes(table, perception.attributes, scene)
-            _fill_false_positives(tables, c, lens, perception.false_positives, scene)
+            _fill_detection(table, lens, perception.detection, context)
+            _fill_identity(table, tables.whom[c], perception.identity, context)
+            _fill_attributes(table, perception.attributes, context)
+            _fill_false_positives(tables, c, lens, perception.false_positives, context)
     return tables
 
 
-def _distances(table: I64, scene: Scene) -> list[float]:
-    """Return the distance in the middle of each entry of the tables by distance [m]."""
+def _distances(table: I64, context: TableContext) -> list[float]:
+    """Return the distance at the middle of each entry of the tables by distance [m]."""
     width = 1 << int(table[SHIFT])
-    return [(i + 0.5) * width / scene.lattice.units_per_m for i in range(BINS)]
+    return [(i + 0.5) * width / context.lattice.units_per_m for i in range(BINS)]
 
 
 def _put(table: I64, at: int, values: Sequence[int] | I64) -> None:
-    """Write a part of a camera's table."""
+    """Write values to a camera's table from the index `at` on."""
     table[at : at + len(values)] = values
 
 
-def _fill_detection(table: I64, lens: Lens, model: Detection, scene: Scene) -> None:
-    _put(table, AT_DISTANCE, model.distance.chances(_distances(table, scene)))
+def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableContext) -> None:
+    _put(table, AT_DISTANCE, model.distance.chances(_distances(table, context)))
     angles = [360 * i / TURN for i in range(-HALF_TURN, HALF_TURN)]
     if not model.bearing.reaches_below_zero:
         angles = [abs(angle) for angle in angles]
@@ -180,52 +180,52 @@ def _fill_detection(table: I64, lens: Lens, model: Detection, scene: Scene) -> N
     hours = [(minute + 0.5) / 60 for minute in range(MINUTES)]
     _put(table, AT_LIGHT, model.light.around_the_clock().chances(hours))
     if model.memory:
-        steps = Decimal(scene.step_us) / micros(model.memory)
+        steps = Decimal(context.step_us) / micros(model.memory)
         _put(table, AT_STAY, [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)])
 
 
-def _fill_identity(table: I64, whom: I64, model: Identity, scene: Scene) -> None:
-    distances = _distances(table, scene)
+def _fill_identity(table: I64, whom: I64, model: Identity, context: TableContext) -> None:
+    distances = _distances(table, context)
     mistaken = model.mistaken.chances(distances)
     right = ONE - mistaken if model.right is None else model.right.chances(distances)
-    over = np.flatnonzero(right + mistaken > ONE + chance(NEARLY))
-    if len(over):
-        i = int(over[0])
+    excess = np.flatnonzero(right + mistaken > ONE + chance(SUM_ERROR))
+    if len(excess):
+        i = int(excess[0])
         raise ScenarioError(
-            f"{scene.path}: perception.identity: at {distances[i]:.2f} m, right"
+            f"{context.path}: perception.identity: at {distances[i]:.2f} m, right"
             f" ({right[i] / ONE:.3g}) and mistaken ({mistaken[i] / ONE:.3g}) add up to more than 1"
         )
     _put(table, AT_RIGHT, right)
     _put(table, AT_MISTAKEN, mistaken)
     table[KEEPS] = model.per_track
-    _check_users(model.confusion, "confusion", scene)
-    for u, user in enumerate(scene.users):
+    _check_users(model.confusion, "confusion", context)
+    for u, user in enumerate(context.users):
         others = model.confusion.get(user)
         if others is None:
-            rest = [name for name in scene.users if name != user]
+            rest = [name for name in context.users if name != user]
             others = {name: 1 / len(rest) for name in rest}
-        _check_users(others, f"confusion.{user}", scene)
-        whom[u] = _whole(cumulative(others, scene.users), others, scene.users)
+        _check_users(others, f"confusion.{user}", context)
+        whom[u] = _whole(cumulative(others, context.users), others, context.users)
 
 
 def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
-    """Let cumulative probabilities that should end at 1 do so, from the last outcome there is."""
+    """Round cumulative probabilities that should end at 1 up to 1, from the last outcome on."""
     last = max((i for i, name in enumerate(order) if shares.get(name)), default=len(order))
     return [*sums[:last], *[ONE] * (len(sums) - last)]
 
 
-def _check_users(names: Mapping[str, object], key: str, scene: Scene) -> None:
+def _check_users(names: Mapping[str, object], key: str, context: TableContext) -> None:
     for name in names:
-        if name not in scene.users:
+        if name not in context.users:
             raise ScenarioError(
-                f"{scene.path}: perception: {key} names {name!r}, who is no user"
-                f"{did_you_mean(name, scene.users)} There are: {', '.join(scene.users)}"
+                f"{context.path}: perception: {key} names {name!r}, who is no user"
+                f"{did_you_mean(name, context.users)} There are: {', '.join(context.users)}"
             )
 
 
-def _fill_attributes(table: I64, model: Attributes, scene: Scene) -> None:
+def _fill_attributes(table: I64, model: Attributes, context: TableContext) -> None:
     per_bell = 65536 / BELL_STD
-    table[RANGE_NOISE] = round(model.range_noise * scene.lattice.units_per_m * per_bell)
+    table[RANGE_NOISE] = round(model.range_noise * context.lattice.units_per_m * per_bell)
     table[RANGE_SHARE] = round(model.range_noise_share * per_bell * 65536)
     table[BEARING_NOISE] = round(model.bearing_noise_deg / 360 * 2 * TURN * per_bell)
     table[HEADING_NOISE] = round(model.heading_noise_deg / 360 * TURN * per_bell)
@@ -237,23 +237,23 @@ def _fill_attributes(table: I64, model: Attributes, scene: Scene) -> None:
 
 
 def _fill_false_positives(
-    tables: ErrorTables, camera: int, lens: Lens, model: FalsePositives, scene: Scene
+    tables: ErrorTables, camera: int, lens: Lens, model: FalsePositives, context: TableContext
 ) -> None:
-    _check_users(model.looks_like, "looks_like", scene)
-    tables.looks_like[camera] = cumulative(model.looks_like, [*scene.users, None])
+    _check_users(model.looks_like, "looks_like", context)
+    tables.looks_like[camera] = cumulative(model.looks_like, [*context.users, None])
     tables.looks_like[camera, -1] = ONE
     rates = [model.per_hour, *(spot.per_hour for spot in model.spots)]
     if not any(rates):
         return
     tables.haunted[camera] = 1
-    hours = Decimal(lens.period * scene.step_us) / (3600 * 10**6)
+    hours = Decimal(lens.period * context.step_us) / (3600 * 10**6)
     mean = sum(map(Decimal, rates)) * hours
     if mean > 1:
         raise ScenarioError(
-            f"{scene.path}: perception.false_positives: {sum(rates):g} per hour are more than one"
+            f"{context.path}: perception.false_positives: {sum(rates):g} per hour are more than one"
             f" in each look, {float(1 / hours):g} per hour"
         )
-    # Poisson processes side by side are one, whose points belong to each by its share of the rate.
+    # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
     term, total = decay(mean), 0.0
     for count in range(MOST_GHOSTS):
         total += term
@@ -264,11 +264,11 @@ def _fill_false_positives(
         cumulative(shares, list(shares)), shares, list(shares)
     )
     for i, spot in enumerate(model.spots, 1):
-        x, y = scene.lattice.point_at(spot.at)
-        noise = round(spot.spread * scene.lattice.units_per_m * 65536 / BELL_STD)
+        x, y = context.lattice.point_at(spot.at)
+        noise = round(spot.spread * context.lattice.units_per_m * 65536 / BELL_STD)
         tables.spot[camera, i] = x, y, noise
 
 
 def is_perfect(perception: Perception | None) -> bool:
-    """Return whether a perception never errs, so that nothing need be drawn."""
+    """Return whether a perception has no errors, so that it needs no random draws."""
     return perception is None or perception == Perception()

@@ -1,4 +1,4 @@
-"""Visibility polygons: all that is visible from a place, kept for when it is needed."""
+"""Visibility polygons: the regions visible from places, in a cache."""
 
 import hashlib
 import os
@@ -31,8 +31,8 @@ class Regions(NamedTuple):
     """The regions visible from the centres of all free cells.
 
     Attributes:
-        number: int32 (rows, columns), the number of each free cell, -1 for others.
-        start: int32 (cells + 1,), where the pieces of each cell begin.
+        number: int32 (rows, columns), the index of each free cell, -1 for others.
+        start: int32 (cells + 1,), the first piece of each cell.
         right: int32, pieces as from `visible_region`.
         wall: int32.
     """
@@ -45,22 +45,23 @@ class Regions(NamedTuple):
 
 @register("sight", "visibility_polygon")
 class VisibilityPolygon(FieldOfView):
-    """Find the region that is visible from a place once, then look points up in it.
+    """Compute the region visible from a place once, then look points up in it.
 
-    Worth it where many points are looked at from few places. A region takes 8 bytes a piece, about
-    200 bytes in a smooth plan and 1 kB in one traced from a sensor.
+    It is worthwhile where many points are tested from few places. A region takes 8 bytes a piece,
+    about 200 bytes in a smooth plan and 1 kB in one traced from a sensor.
     """
 
     precompute: Literal["visited", "all", "file"] = Field(
         default="visited",
-        description="visited: regions of the places that somebody looks from; all: besides, of all"
-        " cells' centres, before the run; file: these are read from a file that processes share",
+        description="visited: regions of the places that cameras look from; all: also of the"
+        " centres of all cells, before the run; file: these come from a file that processes share",
     )
     path: Path | None = Field(
-        default=None, description="with precompute: file: the folder of the files; made if missing"
+        default=None,
+        description="with precompute: file: the folder of the files; created if missing",
     )
     keep: int = Field(
-        default=4096, ge=1, description="regions of visited places that are kept, newest first"
+        default=4096, ge=1, description="number of visited places whose regions are cached"
     )
 
     @model_validator(mode="after")
@@ -70,8 +71,8 @@ class VisibilityPolygon(FieldOfView):
         return self
 
     def start(self, home: "Home") -> None:
-        """Find the regions of all cells, if that is wanted."""
-        self._face(home)
+        """Compute the regions of all cells, if configured."""
+        self._reset(home)
 
     def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
         """Return which points are in the region of (x, y)."""
@@ -84,23 +85,23 @@ class VisibilityPolygon(FieldOfView):
 
     def _region(self, home: "Home", x: int, y: int) -> Pieces:
         if getattr(self, "_walls", None) is not home.walls:
-            self._face(home)
+            self._reset(home)
         row, column = y // SUB, x // SUB
         if self._regions is not None and (x, y) == home.plan.lattice.cell_centre(row, column):
             number, start, right, wall = self._regions
             if 0 <= row < number.shape[0] and 0 <= column < number.shape[1]:
                 cell = number[row, column]
                 if cell >= 0:
-                    here = slice(start[cell], start[cell + 1])
-                    return np.array(right[here]), np.array(wall[here])  # of a file: read only
-        found = self._visited.pop((x, y), None) or visible_region(home.walls, x, y)
-        self._visited[x, y] = found
+                    pieces = slice(start[cell], start[cell + 1])
+                    return np.array(right[pieces]), np.array(wall[pieces])  # of a file: read only
+        region = self._visited.pop((x, y), None) or visible_region(home.walls, x, y)
+        self._visited[x, y] = region
         if len(self._visited) > self.keep:
             self._visited.popitem(last=False)
-        return found
+        return region
 
-    def _face(self, home: "Home") -> None:
-        """Begin anew, with the walls that the home has now."""
+    def _reset(self, home: "Home") -> None:
+        """Empty the cache, for the present walls of the home."""
         self._walls: Mesh = home.walls
         self._visited: OrderedDict[tuple[int, int], Pieces] = OrderedDict()
         self._regions: Regions | None = None
@@ -133,31 +134,31 @@ def _numbers(triangles: I32) -> I32:
 
 
 def _shared_regions(home: "Home", folder: Path) -> Regions:
-    """Return the regions of all cells from the file of these walls, written if it isn't there."""
+    """Return the regions of all cells from the file for these walls; create it if missing."""
     lattice, walls = home.plan.lattice, home.walls
-    content = hashlib.sha256(f"{FORMAT} {lattice.rows} {lattice.columns}".encode())
+    digest = hashlib.sha256(f"{FORMAT} {lattice.rows} {lattice.columns}".encode())
     for array in (walls.vertices, walls.triangles, walls.neighbors):
-        content.update(np.ascontiguousarray(array).astype("<i8").tobytes())
-    file = folder / f"regions-{content.hexdigest()[:24]}.npy"
+        digest.update(np.ascontiguousarray(array).astype("<i8").tobytes())
+    file = folder / f"regions-{digest.hexdigest()[:24]}.npy"
     try:
         if not file.exists():
             _write(file, _regions_of(home))
-        whole: NDArray[Any] = np.load(file, mmap_mode="r")
+        numbers: NDArray[Any] = np.load(file, mmap_mode="r")
     except (OSError, ValueError, EOFError) as error:
         raise ScenarioError(
             f"sight.method.path: {file} can't be used: {error}; remove it, or name another folder"
         ) from None
     triangles = rasterize_cells(walls, lattice.rows, lattice.columns)
     cells = int((triangles >= 0).sum())
-    pieces = int(whole[cells]) if whole.ndim == 1 and len(whole) > cells else -1
-    if whole.dtype != np.dtype("<i4") or len(whole) != cells + 1 + 2 * pieces:
-        raise ScenarioError(f"sight.method.path: {file} is damaged: remove it, it is made anew")
-    start, rest = whole[: cells + 1], whole[cells + 1 :]
+    pieces = int(numbers[cells]) if numbers.ndim == 1 and len(numbers) > cells else -1
+    if numbers.dtype != np.dtype("<i4") or len(numbers) != cells + 1 + 2 * pieces:
+        raise ScenarioError(f"sight.method.path: {file} is damaged: remove it, it is created anew")
+    start, rest = numbers[: cells + 1], numbers[cells + 1 :]
     return Regions(_numbers(triangles), start, rest[:pieces], rest[pieces:])
 
 
 def _write(file: Path, regions: Regions) -> None:
-    """Write regions so that a process beside this one sees all of the file, or none."""
+    """Write regions so that other processes see the whole file, or none."""
     file.parent.mkdir(parents=True, exist_ok=True)
     partial = file.with_name(f".{file.name}.{os.getpid()}")
     with partial.open("wb") as out:

@@ -1,6 +1,6 @@
-"""Tests of robots and of algorithms: trials over many seeds, and checks of one's own components.
+"""Tests of robots and of algorithms: trials over many seeds, and checks of your own components.
 
-Nothing is loaded before it is used: pytest imports the plugin in here at every start.
+Modules are loaded when they are first used: pytest imports this package at every start.
 """
 
 from importlib import import_module
@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fleet2d.testing.algorithms import check_algorithm as check_algorithm
     from fleet2d.testing.claim import trial as trial
-    from fleet2d.testing.life import Trial as Trial
+    from fleet2d.testing.trials import Trial as Trial
 
-_HOME_OF = {"Trial": "life", "check_algorithm": "algorithms", "trial": "claim"}
+_MODULE_OF = {"Trial": "trials", "check_algorithm": "algorithms", "trial": "claim"}
 
 __all__ = ["Trial", "check_algorithm", "trial"]
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used."""
-    if name not in _HOME_OF:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'fleet2d.testing' has no attribute {name!r}")
-    value = getattr(import_module(f"fleet2d.testing.{_HOME_OF[name]}"), name)
+    value = getattr(import_module(f"fleet2d.testing.{_MODULE_OF[name]}"), name)
     globals()[name] = value
     return value

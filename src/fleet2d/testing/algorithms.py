@@ -1,4 +1,4 @@
-"""Checks that one's own components can be run through: do they keep what the engine relies on?"""
+"""Checks of your own algorithms: whether they do what the engine relies on."""
 
 import copy
 import tempfile
@@ -22,25 +22,25 @@ SCENARIO = {
     "robots": {"astro": {"type": "patrol", "dwell": "2 min"}},
     "artifacts": {"trajectories": "off"},
 }
-"""The life in which algorithms are tried: a user who wanders, and a robot on patrol."""
+"""The scenario in which algorithms are checked: a user who wanders, and a robot on patrol."""
 UPDATES = 6
 
 
 def check_algorithm(cls: type[Algorithm], **settings: Any) -> None:
-    """Check that an algorithm is one: run it in a small life, and see that it keeps its promises.
+    """Check an algorithm in a small scenario for all that the engine relies on.
 
-    * It puts out what can be stored, and always the same columns.
-    * Two runs with one seed are the same, and so is a run cut into spans of seven steps.
-    * A copy of the simulation goes on as the original does: it shares no state with it.
-    * It leaves others' lives alone: with and without it, everybody does the same.
-    * What it has learned can be kept and recalled, and comes out the same.
+    * Its outputs can be stored, and always have the same columns.
+    * Two runs with one seed are equal, and so is a run in spans of seven steps.
+    * A copy of the simulation continues like the original: they share no state.
+    * It doesn't change the run: with and without it, users and robots do the same.
+    * Its learned state can be saved and restored, and is the same afterwards.
 
     Args:
         cls: The algorithm's class.
-        settings: Its configuration, where its defaults don't do.
+        settings: Its configuration, where it differs from the defaults.
 
     Raises:
-        AssertionError: It breaks one of these; says which, and how it showed.
+        AssertionError: One of these doesn't hold; the message says which, and how it showed.
 
     Example:
         >>> import numpy as np
@@ -54,7 +54,7 @@ def check_algorithm(cls: type[Algorithm], **settings: Any) -> None:
     problems = list(_problems(cls, settings))
     if problems:
         raise AssertionError(
-            f"{cls.__name__} is no algorithm that the engine can rely on:\n"
+            f"the engine can't rely on the algorithm {cls.__name__}:\n"
             + "\n".join(f"- {problem}" for problem in problems)
         )
 
@@ -62,72 +62,72 @@ def check_algorithm(cls: type[Algorithm], **settings: Any) -> None:
 def _problems(cls: type[Algorithm], settings: Mapping[str, Any]) -> Iterator[str]:
     try:
         algorithm = cls(**settings)
-        stored = _lived(algorithm)
+        run = _run(algorithm)
     except Fleet2DError as error:
         yield str(error)
         return
-    with_it, without = stored.manifest["tables"], _unlearned(algorithm).manifest["tables"]
-    if any(with_it[name] != without[name] for name in ("key_frames", "events", "observations")):
-        yield "others live differently with it: it changes what it is handed"
-    if stored.digest != _lived(cls(**settings)).digest:
+    tables, expected = run.manifest["tables"], _run_without(algorithm).manifest["tables"]
+    if any(tables[name] != expected[name] for name in ("key_frames", "events", "observations")):
+        yield "users and robots behave differently with it: it changes its arguments"
+    if run.digest != _run(cls(**settings)).digest:
         yield (
-            "two runs with one seed differ: draw by state.random(purpose), and depend on no clock,"
+            "two runs with one seed differ: draw by state.random(purpose), and use no clock,"
             " no hash() and no global state"
         )
-    elif stored.digest != _lived(cls(**settings), max_span=7).digest:
-        yield "a run cut into spans of 7 steps differs: go by history and state only"
-    yield from _copies(cls(**settings), stored)
-    yield from _memory(algorithm, cls, settings)
+    elif run.digest != _run(cls(**settings), max_span=7).digest:
+        yield "a run in spans of 7 steps differs: use nothing but history and state"
+    yield from _copy_problems(cls(**settings), run)
+    yield from _state_problems(algorithm, cls, settings)
 
 
-def _document(algorithm: Algorithm, **simulation: Any) -> Scenario:
+def _scenario(algorithm: Algorithm, **simulation: Any) -> Scenario:
     duration = UPDATES * algorithm.period
     times: dict[str, Any] = {**SCENARIO["simulation"], "duration": duration, **simulation}  # type: ignore[dict-item]
     scenario = load_scenario({**SCENARIO, "simulation": times})
     return scenario.model_copy(update={"algorithms": {"checked": algorithm}})
 
 
-def _lived(algorithm: Algorithm, **simulation: Any) -> Run:
-    return Simulation(_document(algorithm, **simulation)).run()
+def _run(algorithm: Algorithm, **simulation: Any) -> Run:
+    return Simulation(_scenario(algorithm, **simulation)).run()
 
 
-def _unlearned(algorithm: Algorithm) -> Run:
-    """Return the same life without the algorithm."""
-    return Simulation(_document(algorithm).model_copy(update={"algorithms": {}})).run()
+def _run_without(algorithm: Algorithm) -> Run:
+    """Return the run of the same scenario without the algorithm."""
+    return Simulation(_scenario(algorithm).model_copy(update={"algorithms": {}})).run()
 
 
-def _copies(algorithm: Algorithm, stored: Run) -> Iterator[str]:
-    original = Simulation(_document(algorithm))
+def _copy_problems(algorithm: Algorithm, run: Run) -> Iterator[str]:
+    original = Simulation(_scenario(algorithm))
     try:
         original.run_until(UPDATES // 2 * algorithm.period)
-        twin = copy.deepcopy(original)
+        duplicate = copy.deepcopy(original)
     except (TypeError, AttributeError, NotImplementedError) as error:
         yield f"its state can't be copied: {error}"
         return
     original.run()
-    if stored.digest != twin.run().digest:
-        yield "a copy of the simulation goes on differently: the copies share state"
+    if run.digest != duplicate.run().digest:
+        yield "a copy of the simulation continues differently: the copies share state"
 
 
-def _memory(
+def _state_problems(
     algorithm: Algorithm, cls: type[Algorithm], settings: Mapping[str, Any]
 ) -> Iterator[str]:
-    simulation = Simulation(_document(algorithm))
+    simulation = Simulation(_scenario(algorithm))
     simulation.run()
     learner = simulation.algorithms["checked"]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "checked.npz"
         try:
             save_learned(learner.remember(), path, cls.__name__)
-            heir = cls(**{**settings, "learned": path})
-            again = Simulation(_document(heir)).algorithms["checked"]
+            restored = cls(**{**settings, "learned": path})
+            second_learner = Simulation(_scenario(restored)).algorithms["checked"]
             second = Path(folder) / "again.npz"
-            save_learned(again.remember(), second, cls.__name__)
+            save_learned(second_learner.remember(), second, cls.__name__)
         except ComponentError as error:
             yield str(error)
             return
         if not _equal(load_learned(path), load_learned(second)):
-            yield "what it remembers changes when it is recalled"
+            yield "its learned state changes when it is saved and restored"
 
 
 def _equal(one: Any, other: Any) -> bool:

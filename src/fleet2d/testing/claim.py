@@ -1,4 +1,4 @@
-"""What a test of trials claims: in which scenarios, over how many seeds, and how often it holds."""
+"""Claims of tests with trials: the scenarios, the seeds, and the rate at which they hold."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,18 +17,18 @@ HOME, HOUSEHOLD = "home", "household"
 
 
 class SetUpError(InputError):
-    """The scenario of a trial is wrong: the test has not begun."""
+    """The scenario of a trial is wrong, so that the test couldn't begin."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One scenario of a claim, and what it is called along the claim's axes."""
+    """One scenario of a claim, with its labels along the claim's axes."""
 
     scenario: Scenario
     labels: Mapping[str, Any] = field(default_factory=dict)
 
     def with_seed(self, seed: int) -> "Variant":
-        """Return the same with a seed."""
+        """Return the variant with another seed."""
         simulation = self.scenario.simulation.model_copy(update={"seed": seed})
         scenario = self.scenario.model_copy(update={"simulation": simulation})
         return Variant(scenario, {**self.labels, "seed": seed})
@@ -39,10 +39,10 @@ class Variant:
         return self.scenario.simulation.seed or 0
 
     @property
-    def words(self) -> str:
-        """Return it as messages call it.
+    def text(self) -> str:
+        """The name of the variant in messages.
 
-        >>> Variant(load_scenario(), {"home": "flat"}).with_seed(3).words
+        >>> Variant(load_scenario(), {"home": "flat"}).with_seed(3).text
         'home flat, seed 3'
         """
         return ", ".join(f"{n} {v}" for n, v in self.labels.items() if v is not None)
@@ -50,18 +50,18 @@ class Variant:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim about a share of lives.
+    """A claim that a test holds in a share of trials.
 
     Attributes:
         source: The scenario, as `fleet2d.load_scenario` takes it.
         overrides: Texts like 'simulation.duration=4 h'.
         settings: Keys of `simulation` or of the scenario.
-        axes: Along which the scenario varies, as in a study file.
-        households: The users by name of household, in place of the scenario's own.
+        axes: Axes along which the scenario varies, as in a study file.
+        households: The users by name of household, which replace those of the scenario.
         seeds: The seeds; empty for the scenario's own.
         holds: The claimed rate.
-        error: How often it is judged wrongly, at most.
-        only: A seed whose lives alone are run; None: all.
+        error: Largest probability of a wrong decision.
+        only: The only seed to run; None: all.
     """
 
     source: Any
@@ -83,11 +83,11 @@ class Claim:
     def rate(self) -> RateTest:
         """The test of the claimed rate."""
         if self.only is not None:
-            return rate_test(len(list(self.lives())))
-        return rate_test(self.lives_at_most, self.holds, self.error)
+            return rate_test(len(list(self.trials())))
+        return rate_test(self.most_trials, self.holds, self.error)
 
     def of_scenario(self, source: str | Path) -> "Claim":
-        """Return the same claim about one scenario alone, with its own seed."""
+        """Return the claim for one scenario only, with its own seed."""
         return Claim(source, holds=1.0, error=self.error)
 
     def prepare(self) -> None:
@@ -103,17 +103,17 @@ class Claim:
 
     @property
     def varies(self) -> bool:
-        """Whether lives differ by more than their seeds."""
+        """Whether trials differ by more than their seeds."""
         return bool(self.axes or self.households)
 
     @property
-    def lives_at_most(self) -> int:
-        """How many lives there are, at most: one for each seed, and for each variant at least."""
+    def most_trials(self) -> int:
+        """Largest number of trials: one for each seed, and at least one for each variant."""
         return max(len(self.seeds), len(self.variants), 1)
 
     @cached_property
     def variants(self) -> tuple[Variant, ...]:
-        """The scenario along its axes, each built and checked; without axes just the scenario."""
+        """The variants of the scenario along its axes, checked; without axes only itself."""
         if not self.varies:
             return (Variant(self.scenario),)
         from fleet2d.studies.design import build_design
@@ -134,18 +134,18 @@ class Claim:
             variants.append(Variant(scenario, labels))
         return tuple(variants)
 
-    def lives(self) -> Iterator[Variant]:
-        """Yield the scenario of each life: round and round the variants, with one seed each."""
+    def trials(self) -> Iterator[Variant]:
+        """Yield the scenario of each trial: the variants in turn, each with the next seed."""
         own = self.scenario.simulation.seed or 0
         seeds = self.seeds or (own,)
-        lives = [
+        pairs = [
             (self.variants[number % len(self.variants)], seeds[number % len(seeds)])
-            for number in range(self.lives_at_most)
+            for number in range(self.most_trials)
         ]
         if self.only is not None:
-            kept = [life for life in lives if life[1] == self.only]
-            lives = kept or [(variant, self.only) for variant in self.variants]
-        for variant, seed in lives:
+            matches = [pair for pair in pairs if pair[1] == self.only]
+            pairs = matches or [(variant, self.only) for variant in self.variants]
+        for variant, seed in pairs:
             yield variant.with_seed(seed)
 
 
@@ -160,20 +160,20 @@ def trial(
     axes: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Callable[[Test], Test]:
-    """Make a test of a function that takes a `trial`: it is called once a life, by pytest.
+    """Turn a function with an argument `trial` into a test: pytest calls it once for each trial.
 
     Args:
         scenario: A YAML file beside the test or in the working folder, 'bundled:NAME', a mapping
             or a Scenario; None: the bundled base scenario.
         overrides: Texts like 'simulation.duration=4 h'.
-        seeds: How many seeds, from 0 on, or which; None: that of the scenario, or 0. With
-            homes, households or axes the seeds go round them.
-        holds: In which share of lives it is to hold. 1: in each, and the first that fails
-            decides; less: as soon as a sequential test tells, see `fleet2d.testing.rate`.
-        error: How often the claim may be judged wrongly.
-        homes: So many synthetic homes, or files, folders and patterns of floor plans.
+        seeds: Number of seeds, from 0 on, or the seeds; None: that of the scenario, or 0. With
+            homes, households or axes each trial takes the next of these and the next seed.
+        holds: The share of trials in which it must hold. 1: in each, and the first failure decides;
+            less: a sequential test decides, see `fleet2d.testing.rate`.
+        error: Largest probability of a wrong decision.
+        homes: Number of synthetic homes, or files, folders and patterns of floor plans.
         households: The users by name of household: `{"couple": {"ana": …, "ben": …}}`.
-        axes: More that varies, as the `axes` of a study file.
+        axes: Further axes, as the `axes` of a study file.
         settings: Keys of `simulation` or of the scenario, such as ``seed=4``.
 
     Example:
@@ -201,13 +201,13 @@ def trial(
 
 
 def _folder_of(function: Callable[..., Any]) -> Path:
-    """Return the folder of the file in which a function is written."""
+    """Return the folder of the file that defines a function."""
     code = getattr(function, "__code__", None)
     return Path(code.co_filename).parent if code is not None else Path()
 
 
 def _beside(function: Callable[..., Any], source: Any) -> Any:
-    """Return a scenario's file as it lies beside the test's, if one does."""
+    """Return the path of a scenario beside the file of the test, if it exists there."""
     if not isinstance(source, str | Path) or str(source).startswith("bundled:"):
         return source
     path = _folder_of(function) / source
@@ -227,6 +227,6 @@ def _homes(
 
 
 def _near(folder: Path, name: str | Path) -> str:
-    """Return a file or a pattern as it lies in a folder, if it does, else as it is written."""
+    """Return a path or pattern relative to a folder, if it exists there, else as it is."""
     path = folder / name
     return str(path if path.exists() or any(path.parent.glob(path.name)) else Path(name).absolute())

@@ -12,12 +12,12 @@ import yaml
 from fleet2d.errors import InputError, RunDirectoryError
 
 if TYPE_CHECKING:
-    from fleet2d.testing.search import Failing, Search, Subject, TryJob
+    from fleet2d.testing.search import FailingPoint, FailureSearch, Subject, TryJob
 
-TRIES_WITHOUT_END = 1_000_000  # where the budget is a time
-SHRINKING = 40
-FOUND = 1
-"""The exit code where something fails, as that of a test."""
+UNLIMITED_TRIES = 1_000_000  # if the budget is a time
+SHRINK_TRIES = 40
+FAILURE_FOUND = 1
+"""The exit code if a run fails, as that of a test."""
 
 
 def falsify(
@@ -25,7 +25,7 @@ def falsify(
         str,
         typer.Argument(
             metavar="SCENARIO.yaml|TEST.py::NAME",
-            help="A scenario that expects something, or a test with a trial.",
+            help="A scenario with expectations, or a test with a trial.",
         ),
     ],
     over: Annotated[
@@ -36,7 +36,7 @@ def falsify(
         ),
     ],
     budget: Annotated[
-        str, typer.Option(metavar="N|TIME", help="How many lives, or for how long, '5 min'.")
+        str, typer.Option(metavar="N|TIME", help="How many runs, or for how long, '5 min'.")
     ] = "200",
     out: Annotated[
         Path, typer.Option(help="The scenario to write that fails; a run beside it.")
@@ -49,7 +49,7 @@ def falsify(
 ) -> None:
     """Look for a home, a household, a timing or a seed that breaks what is expected."""
     from fleet2d.studies.api import make_executor
-    from fleet2d.testing.search import Search, TryJob
+    from fleet2d.testing.search import FailureSearch, TryJob
     from fleet2d.testing.space import parse_over, read_space
 
     if out.exists():
@@ -60,20 +60,22 @@ def falsify(
     space = read_space(parse_over(over))
     space.check(subject.base, subject.folder)
     job = TryJob(subject, space)
-    search = Search(job, tries, seed=seed)
-    show = sys.stderr.isatty() and not quiet
-    failure = search.run(make_executor("local", workers), seconds, _progress if show else None)
+    search = FailureSearch(job, tries, seed=seed)
+    shows_progress = sys.stderr.isatty() and not quiet
+    failure = search.run(
+        make_executor("local", workers), seconds, _progress if shows_progress else None
+    )
     if failure is None:
-        _print_nothing(search, job)
+        _print_no_failure(search, job)
         return
     for line in describe_failure(failure, job, what, out):
         if not quiet:
             typer.echo(line)
-    raise typer.Exit(FOUND)
+    raise typer.Exit(FAILURE_FOUND)
 
 
 def parse_budget(text: str) -> tuple[int, float | None]:
-    """Return how many lives may be run, and for how many seconds.
+    """Return the largest number of runs, and the seconds for them.
 
     Raises:
         InputError: It is neither a number nor a time.
@@ -88,17 +90,17 @@ def parse_budget(text: str) -> tuple[int, float | None]:
     if re.fullmatch(r"[1-9]\d{0,6}", text.strip()):
         return int(text), None
     try:
-        if not text.strip()[-1:].isalpha():  # a bare number is one of lives
+        if not text.strip()[-1:].isalpha():  # a bare number is a number of runs
             raise ValueError
-        return TRIES_WITHOUT_END, parse_duration(text).total_seconds()
+        return UNLIMITED_TRIES, parse_duration(text).total_seconds()
     except (PydanticCustomError, ValueError):
         raise InputError(
-            f"--budget {text}: a number of lives is wanted, like 200, or a time, like '5 min'"
+            f"--budget {text}: a number of runs is wanted, like 200, or a time, like '5 min'"
         ) from None
 
 
 def subject_of(what: str) -> "Subject":
-    """Return what is to be searched.
+    """Return the subject of a search.
 
     Raises:
         InputError: There is no such scenario or test.
@@ -118,30 +120,32 @@ def _check_expects(subject: "Subject", what: str) -> None:
     from fleet2d.scenario.model import scenario_of
 
     if subject.test is None and not scenario_of(subject.base, subject.folder).expect:
-        raise InputError(f"{what} expects nothing: give it a section `expect`, or name a test")
+        raise InputError(f"{what} has no expectations: add a section `expect`, or name a test")
     subject.body()
 
 
-def describe_failure(failure: "Failing", job: "TryJob", what: str, out: Path) -> list[str]:
-    """Write the scenario that fails, and its run beside it; return what there is to say."""
-    from fleet2d.testing.failure import describe_life
+def describe_failure(failure: "FailingPoint", job: "TryJob", what: str, out: Path) -> list[str]:
+    """Write the failing scenario, and its run beside it; return the lines of a report."""
+    from fleet2d.testing.failure import describe_trial
 
-    words = job.space.words(failure.point)
-    life = job.life(failure.point, failure.seed)
-    again = f"fleet2d test {out}"
+    trial = job.run(failure.point, failure.seed)
+    command = f"fleet2d test {out}"
     if job.subject.test is not None:
-        again = f"pytest {what} --fleet2d-scenario {out}"
-    lines = [f"fails at try {failure.number}: {words}, seed {failure.seed}"]
+        command = f"pytest {what} --fleet2d-scenario {out}"
+    point = job.space.text(failure.point)
+    lines = [f"fails at try {failure.number}: {point}, seed {failure.seed}"]
     folder = out.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
-    lines += describe_life(life, job.subject.body(), folder, SHRINKING, again)
-    first = life.failures[0].words.splitlines()[0]
-    out.write_text(_written(failure, job, what, out, first), encoding="utf-8")
+    lines += describe_trial(trial, job.subject.body(), folder, SHRINK_TRIES, command)
+    reason = trial.failures[0].text.splitlines()[0]
+    out.write_text(_scenario_text(failure, job, what, out, reason), encoding="utf-8")
     return [*lines, "", f"kept: {out}"]
 
 
-def _written(failure: "Failing", job: "TryJob", what: str, out: Path, first: str) -> str:
-    """Return the text of a scenario that fails: what it extends, and what was changed."""
+def _scenario_text(
+    failure: "FailingPoint", job: "TryJob", what: str, out: Path, reason: str
+) -> str:
+    """Return the YAML of a failing scenario: the file that it extends, and the changes."""
     from fleet2d.document import Document
     from fleet2d.scenario.compose import assignment, merge
 
@@ -158,11 +162,11 @@ def _written(failure: "Failing", job: "TryJob", what: str, out: Path, first: str
         )
         data = scenario.resolved()
     body = yaml.safe_dump(_plain(data), sort_keys=False, allow_unicode=True)
-    return f"# Fails, found by fleet2d falsify {what}: {first}\n{body}"
+    return f"# Fails, found by fleet2d falsify {what}: {reason}\n{body}"
 
 
 def _plain(value: Any) -> Any:
-    """Return data without the types that YAML doesn't know."""
+    """Return data with plain types that YAML can represent."""
     if isinstance(value, dict):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -170,15 +174,15 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, str) else value
 
 
-def _print_nothing(search: "Search", job: "TryJob") -> None:
-    typer.echo(f"nothing fails in {search.tries} lives")
+def _print_no_failure(search: "FailureSearch", job: "TryJob") -> None:
+    typer.echo(f"nothing fails in {search.tries} runs")
     if search.narrowest is not None:
         margin, point = search.narrowest
-        typer.echo(f"narrowest: margin {margin:.3g} at {job.space.words(point)}")
-    for words, number in search.errors.items():
-        typer.echo(f"{number} could not be run: {words}", err=True)
+        typer.echo(f"narrowest: margin {margin:.3g} at {job.space.text(point)}")
+    for error, number in search.errors.items():
+        typer.echo(f"{number} could not be run: {error}", err=True)
 
 
-def _progress(search: "Search") -> None:
+def _progress(search: "FailureSearch") -> None:
     narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
-    print(f"\r{search.tries} lives{narrowest}   ", end="", file=sys.stderr, flush=True)  # noqa: T201
+    print(f"\r{search.tries} runs{narrowest}   ", end="", file=sys.stderr, flush=True)  # noqa: T201

@@ -1,4 +1,4 @@
-"""A failure explains itself: in words, by a picture, by a run, and by the command to see it."""
+"""Reports of failures: a text, a picture, the stored run, and the command to repeat it."""
 
 import re
 import shlex
@@ -10,114 +10,116 @@ from pathlib import Path
 from fleet2d.clock import Clock
 from fleet2d.errors import Fleet2DError
 from fleet2d.testing.claim import Variant
-from fleet2d.testing.life import ASSERT, Finding, Life
-from fleet2d.testing.running import Body, Outcome, run_life
+from fleet2d.testing.running import Body, ClaimResult, run_trial
 from fleet2d.testing.shrink import Shrinker
+from fleet2d.testing.trials import ASSERT, ExpectationResult, TrialResult
 
 MOST_SEEDS_SHOWN = 8
 
 
 @dataclass(frozen=True)
-class Places:
-    """Where what a test leaves behind goes, and what the test is called.
+class FailureFolder:
+    """Where the artifacts of a failing test go.
 
     Attributes:
-        folder: For all tests.
-        test: What pytest calls the test.
+        parent: The folder for all tests.
+        test: The node id of the test in pytest.
     """
 
-    folder: Path
+    parent: Path
     test: str
 
-    def fresh(self) -> Path:
-        """Return the test's own folder, empty: of the last failure alone."""
-        plain = re.sub(r"[^\w.-]+", "-", self.test).strip("-")
-        folder = self.folder / plain
+    def create(self) -> Path:
+        """Return the test's own folder, without the artifacts of earlier failures."""
+        name = re.sub(r"[^\w.-]+", "-", self.test).strip("-")
+        folder = self.parent / name
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True, exist_ok=True)
         return folder
 
 
-def explain(outcome: Outcome, body: Body, places: Places, tries: int) -> str:
-    """Store a failing life, and the smallest one like it, and return what there is to say.
+def explain(result: ClaimResult, body: Body, place: FailureFolder, tries: int) -> str:
+    """Store a failing run, and the smallest similar one, and return a report.
 
     Args:
-        outcome: Of a claim that was refused.
+        result: The result of a claim that was refused.
         body: The test.
-        places: Where to store.
-        tries: How many lives may be run to make it smaller.
+        place: Where to store the runs.
+        tries: Largest number of runs to make it smaller.
     """
-    folder, life = places.fresh(), outcome.shown
-    again = f"pytest {shlex.quote(places.test)} --fleet2d-seed {life.variant.seed}"
-    lines = [outcome.words, *_by_expectation(outcome), ""]
-    lines += describe_life(life, body, folder, tries, again)
+    folder, trial = place.create(), result.shown
+    command = f"pytest {shlex.quote(place.test)} --fleet2d-seed {trial.variant.seed}"
+    lines = [result.text, *_by_expectation(result), ""]
+    lines += describe_trial(trial, body, folder, tries, command)
     text = "\n".join(lines)
     (folder / "failure.txt").write_text(text + "\n", encoding="utf-8")
     return text
 
 
-def describe_life(life: Life, body: Body, folder: Path, tries: int, again: str) -> Iterable[str]:
-    """Store a failing life, and the smallest one like it; yield what there is to say.
+def describe_trial(
+    trial: TrialResult, body: Body, folder: Path, tries: int, command: str
+) -> Iterable[str]:
+    """Store a failing run, and the smallest similar one; yield the lines of a report.
 
     Args:
-        life: The life.
+        trial: The result of the run.
         body: The test.
-        folder: Where to store.
-        tries: How many lives may be run to make it smaller.
-        again: The command that runs it again.
+        folder: Where to store the runs.
+        tries: Largest number of runs to make it smaller.
+        command: The command that repeats the run.
     """
-    yield f"{life.variant.words}:"
-    yield from _moments(life)
-    yield from _stored(life.variant, frozenset(), body, folder / "run", life)
-    yield f"  again: {again}"
+    yield f"{trial.variant.text}:"
+    yield from _failures(trial)
+    yield from _store(trial.variant, frozenset(), body, folder / "run", trial)
+    yield f"  again: {command}"
     if tries > 0:
-        case = Shrinker(body, tries).shrink(life)
-        if case.life is not life:
+        case = Shrinker(body, tries).shrink(trial)
+        if case.result is not trial:
             yield ""
-            yield f"smaller: {case.words}"
-            yield from _moments(case.life)
-            yield from _stored(case.variant, case.without, body, folder / "smaller", case.life)
+            yield f"smaller: {case.text}"
+            yield from _failures(case.result)
+            yield from _store(case.variant, case.without, body, folder / "smaller", case.result)
 
 
-def _by_expectation(outcome: Outcome) -> Iterable[str]:
-    """Yield a line for each expectation that failed somewhere: in which seeds, and the worst."""
-    failures: dict[str, list[tuple[Life, Finding]]] = {}
-    for life in outcome.failed:
-        for failure in life.failures:
-            failures.setdefault(failure.name, []).append((life, failure))
+def _by_expectation(result: ClaimResult) -> Iterable[str]:
+    """Yield a line for each expectation that failed: in which runs, and the worst."""
+    failures: dict[str, list[tuple[TrialResult, ExpectationResult]]] = {}
+    for trial in result.failed:
+        for failure in trial.failures:
+            failures.setdefault(failure.name, []).append((trial, failure))
     for name, cases in failures.items():
-        if len(outcome.lives) == 1:
+        if len(result.trials) == 1:
             continue
-        seeds = [life.variant.words for life, _ in cases]
+        seeds = [trial.variant.text for trial, _ in cases]
         shown = "; ".join(seeds[:MOST_SEEDS_SHOWN]) + "; …" * (len(seeds) > MOST_SEEDS_SHOWN)
         worst, failure = min(cases, key=lambda case: case[1].margin)
-        yield f"  {name}: failed in {len(cases)} of {len(outcome.lives)} ({shown})"
+        yield f"  {name}: failed in {len(cases)} of {len(result.trials)} ({shown})"
         if len(cases) > 1 and name != ASSERT:
-            yield f"    worst in {worst.variant.words}: {failure.words}"
+            yield f"    worst in {worst.variant.text}: {failure.text}"
 
 
-def _moments(life: Life) -> Iterable[str]:
-    """Yield a line for each failure of a life: what, when, by how much."""
-    simulation = life.variant.scenario.simulation
+def _failures(trial: TrialResult) -> Iterable[str]:
+    """Yield a line for each failure of a run: what failed, when, by how much."""
+    simulation = trial.variant.scenario.simulation
     clock = Clock(simulation.start, simulation.step_us, simulation.steps)
-    for failure in life.failures:
+    for failure in trial.failures:
         at = ""
         if failure.step is not None:
             at = f" at {clock.time(failure.step):%a %d %b %H:%M:%S} (step {failure.step})"
-        first = failure.words.splitlines()[0]
+        first = failure.text.splitlines()[0]
         yield f"  {first}" if failure.name != ASSERT else f"  assert failed{at}: {first}"
 
 
-def _stored(
-    variant: Variant, without: frozenset[int], body: Body, out: Path, life: Life
+def _store(
+    variant: Variant, without: frozenset[int], body: Body, out: Path, trial: TrialResult
 ) -> Iterable[str]:
-    """Run a life again and store it; yield where it is, its picture, and how to see it."""
+    """Repeat a run and store it; yield its path, its picture, and the commands to see it."""
     try:
-        run_life(variant, body, out=out, without=without)
+        run_trial(variant, body, out=out, without=without)
     except Fleet2DError as error:
         yield f"  the run could not be stored: {error}"
         return
-    step = life.failing_step
+    step = trial.failing_step
     yield f"  run: {out}"
     try:
         from fleet2d.runs.run import open_run
@@ -129,5 +131,5 @@ def _stored(
         yield f"  picture: {picture}"
     except Fleet2DError as error:  # such as that matplotlib is not installed
         yield f"  no picture: {error}"
-    quoted = shlex.quote(str(out))
-    yield f"  see it: fleet2d view {quoted}, or fleet2d show {quoted} --at 'step {step}'"
+    path = shlex.quote(str(out))
+    yield f"  see it: fleet2d view {path}, or fleet2d show {path} --at 'step {step}'"

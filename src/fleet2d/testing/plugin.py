@@ -1,4 +1,4 @@
-"""The plugin of pytest: calls a test with a `trial` once a life, and reports what was decided.
+"""The pytest plugin: calls a test with a `trial` once for each run, and reports the decision.
 
 pytest loads it by the entry point of the package; nothing else in Fleet2D imports pytest.
 """
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from fleet2d.testing.running import Body
 
 PROPERTY = "fleet2d"
-"""The property of a test, in JUnit XML, too, that says what was decided."""
+"""The property of a test that holds the decision, also in JUnit XML."""
 TRIAL = "trial"
-CLAIM = "fleet2d_claim"  # the attribute of a function that claims something
+CLAIM = "fleet2d_claim"  # the attribute of a test function that holds its claim
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -58,39 +58,39 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def trial() -> None:
-    """Stand for the trial of each life, which a function with @fleet2d.testing.trial gets."""
+    """Stand for the trial that a function with @fleet2d.testing.trial gets in each run."""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Call a test with a claim once a life, until it is decided."""
+    """Call a test with a claim once for each run, until the claim is decided."""
     claim = getattr(pyfuncitem.obj, CLAIM, None)
     if claim is None:
-        if TRIAL in pyfuncitem.fixturenames and _is_ours(pyfuncitem):
-            pytest.fail("a test with `trial` wants @fleet2d.testing.trial(…)", pytrace=False)
+        if TRIAL in pyfuncitem.fixturenames and _is_own_fixture(pyfuncitem):
+            pytest.fail("a test with `trial` needs @fleet2d.testing.trial(…)", pytrace=False)
         return None
     from fleet2d.testing.claim import SetUpError
-    from fleet2d.testing.failure import Places, explain
+    from fleet2d.testing.failure import FailureFolder, explain
     from fleet2d.testing.running import run_claim
 
-    # pytest shows the lines of the test; what `fail` says has none.
+    # pytest shows the lines of the test, but not those of its call to `fail`.
     __tracebackhide__ = _is_error
-    claim = _chosen(claim, pyfuncitem.config)
+    claim = _with_options(claim, pyfuncitem.config)
     body = _body(pyfuncitem)
     try:
         claim.prepare()
-        outcome = run_claim(claim, body)
+        result = run_claim(claim, body)
     except SetUpError as error:
         pytest.fail(str(error), pytrace=False)
-    pyfuncitem.user_properties.append((PROPERTY, outcome.words))
-    if not outcome.holds:
+    pyfuncitem.user_properties.append((PROPERTY, result.text))
+    if not result.holds:
         tries = pyfuncitem.config.getoption("--fleet2d-shrink")
-        places = Places(_folder(pyfuncitem), pyfuncitem.nodeid)
-        text = explain(outcome, body, places, tries)
-        failure = outcome.shown.error
+        folder = FailureFolder(_folder(pyfuncitem), pyfuncitem.nodeid)
+        text = explain(result, body, folder, tries)
+        failure = result.shown.error
         if failure is None:
             pytest.fail(text, pytrace=False)
-        failure.add_note(text)  # pytest shows what was compared
+        failure.add_note(text)  # pytest shows the compared values
         raise failure
     return True
 
@@ -99,8 +99,8 @@ def _is_error(info: Any) -> bool:
     return not info.errisinstance(pytest.fail.Exception)
 
 
-def _chosen(claim: "Claim", config: pytest.Config) -> "Claim":
-    """Return a claim as the options change it."""
+def _with_options(claim: "Claim", config: pytest.Config) -> "Claim":
+    """Return a claim with the options of the command line applied."""
     scenario = config.getoption("--fleet2d-scenario")
     if scenario is not None:
         claim = claim.of_scenario(scenario)
@@ -109,10 +109,10 @@ def _chosen(claim: "Claim", config: pytest.Config) -> "Claim":
 
 
 def _body(item: pytest.Function) -> "Body":
-    """Return the test with all of its fixtures filled in but the trial."""
+    """Return the test with all fixtures bound except the trial."""
     names = item._fixtureinfo.argnames
     if TRIAL not in names:
-        pytest.fail("@fleet2d.testing.trial wants a test with an argument `trial`", pytrace=False)
+        pytest.fail("@fleet2d.testing.trial needs a test with an argument `trial`", pytrace=False)
     arguments = {name: item.funcargs[name] for name in names if name != TRIAL}
     function = item.obj
 
@@ -124,16 +124,17 @@ def _body(item: pytest.Function) -> "Body":
     return body
 
 
-def _is_ours(item: pytest.Function) -> bool:
+def _is_own_fixture(item: pytest.Function) -> bool:
+    """Return whether the fixture `trial` of a test is that of this plugin."""
     definitions = item._fixtureinfo.name2fixturedefs.get(TRIAL) or ()
-    return any(one.func.__module__ == __name__ for one in definitions[-1:])
+    return any(definition.func.__module__ == __name__ for definition in definitions[-1:])
 
 
 def _folder(item: pytest.Function) -> Path:
-    """Return the folder for what a test leaves behind."""
-    chosen = item.config.getoption("--fleet2d-artifacts")
-    if chosen is not None:
-        return Path(chosen)
+    """Return the folder for the artifacts of a failing test."""
+    option = item.config.getoption("--fleet2d-artifacts")
+    if option is not None:
+        return Path(option)
     cache = getattr(item.config, "cache", None)
     if cache is not None:
         return Path(cache.mkdir("fleet2d"))
@@ -141,15 +142,15 @@ def _folder(item: pytest.Function) -> Path:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say of each trial over several lives what was decided."""
+    """Print the decision on each test with several runs."""
     lines = []
     for reports in terminalreporter.stats.values():
         for report in reports:
             if getattr(report, "when", None) != "call":
                 continue
-            words = dict(report.user_properties).get(PROPERTY)
-            if words not in (None, "held", "failed"):
-                lines.append(f"{report.nodeid}: {words}")
+            text = dict(report.user_properties).get(PROPERTY)
+            if text not in (None, "held", "failed"):
+                lines.append(f"{report.nodeid}: {text}")
     if lines:
         terminalreporter.section("trials")
         for line in sorted(lines):

@@ -1,8 +1,8 @@
-"""Claims about rates: is a test to hold in 95 % of lives judged right, after as few as possible?
+"""Sequential tests of rates: decide whether a test holds in, say, 95 % of trials, with few trials.
 
-The judge is Wald's sequential probability ratio test, cut off at a number of seeds. Its boundaries
-are numbers of failures, so that its error rates are exact sums over binomial paths, not
-approximations; the rate that it tells from the claimed one follows from the number of seeds.
+This is Wald's sequential probability ratio test, truncated at a number of seeds. Its boundaries are
+numbers of failures, so that its error rates are exact sums over binomial paths, not approximations;
+the largest rate that it can distinguish from the claimed one follows from the number of seeds.
 
 Wald, A. (1945). Sequential tests of statistical hypotheses. Ann. Math. Statist. 16(2), 117–186.
 """
@@ -22,16 +22,18 @@ BISECTIONS = 14
 
 @dataclass(frozen=True)
 class RateTest:
-    """When a claim about a rate is decided, and how often wrongly.
+    """A sequential test of a claimed rate.
 
     Attributes:
-        seeds: How many seeds are looked at, at most.
+        seeds: Largest number of seeds.
         holds: The claimed rate, above 0 and up to 1.
-        error: How often, at most, a true claim is refused; and a rate of `told_from` accepted.
-        told_from: The largest rate that is told from the claimed one with that error.
-        accept: The most failures with which the claim is accepted, by seeds looked at: int64
-            (seeds + 1,), -1 where it can't be yet.
-        refuse: The fewest failures with which it is refused: int64 (seeds + 1,).
+        error: Largest probability of refusing a true claim, and of accepting a rate of
+            `told_from`.
+        told_from: The largest rate that the test distinguishes from the claimed one with that
+            error.
+        accept: int64 (seeds + 1,), the most failures with which the claim is accepted, by number of
+            seeds so far; -1 where it can't be accepted yet.
+        refuse: int64 (seeds + 1,), the fewest failures with which the claim is refused.
 
     Example:
         >>> test = rate_test(seeds=100, holds=0.95)
@@ -53,14 +55,12 @@ class RateTest:
         return True if failures <= self.accept[seeds] else None
 
     def acceptance(self, rate: float) -> float:
-        """Return how likely the claim is accepted where the true rate is this; exact."""
-        accepted, _ = _walk(self.accept, self.refuse, rate)
-        return accepted
+        """Return the exact probability that the claim is accepted if this is the true rate."""
+        return _walk(self.accept, self.refuse, rate)[0]
 
     def mean_seeds(self, rate: float) -> float:
-        """Return how many seeds it takes on average where the true rate is this; exact."""
-        _, undecided = _walk(self.accept, self.refuse, rate)
-        return float(sum(undecided))
+        """Return the exact mean number of seeds until a decision if this is the true rate."""
+        return float(sum(_walk(self.accept, self.refuse, rate)[1]))
 
 
 @lru_cache(maxsize=64)
@@ -68,7 +68,7 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
     """Return the sequential test of a claim.
 
     Args:
-        seeds: How many seeds there are at most.
+        seeds: Largest number of seeds.
         holds: The claimed rate; 1 claims that every seed holds, and one failure refuses it.
         error: The error rate, for both kinds of error.
 
@@ -105,27 +105,27 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
 
 
 def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
-    """Return the test of a claimed rate against another, which never refuses truth too often.
+    """Return the test of a claimed rate against another, with at most `error` wrong refusals.
 
-    Boundaries before the last seed each spend half of the error at most (Ville's inequality);
-    the one at the last seed spends what is left.
+    The boundaries before the last seed use at most half of the error each (Ville's inequality);
+    the boundary at the last seed uses the remainder.
     """
     number = np.arange(seeds + 1)
-    likelier = math.log((1 - other) / (1 - holds))  # by which a failure speaks for the other rate
+    failure = math.log((1 - other) / (1 - holds))  # evidence of one failure for the other rate
     with np.errstate(divide="ignore"):
-        held = float(np.log(holds / other)) if other > 0 else math.inf
-    enough = math.log(2 / error)
-    if math.isinf(held):  # one that holds refutes a rate of 0
+        success = float(np.log(holds / other)) if other > 0 else math.inf
+    threshold = math.log(2 / error)
+    if math.isinf(success):  # one success refutes a rate of 0
         accept, refuse = np.full(seeds + 1, -1), number + 1
     else:
-        slope, shift = held / (held + likelier), enough / (held + likelier)
+        slope, shift = success / (success + failure), threshold / (success + failure)
         accept = np.floor(slope * number - shift).astype(np.int64).clip(-1)
         refuse = np.minimum(np.ceil(slope * number + shift), seeds + 1).astype(np.int64)
     accept[seeds] = -1
     refuse[seeds] = seeds + 2
     refused, last = _ending(accept, refuse, holds)
-    # The most failures at the last seed with which truth is refused no oftener than it may be.
-    tail = refused + np.cumsum(last[::-1])[::-1]  # refused if so many failures are too many
+    # The fewest failures to refuse at the last seed so that refusals stay within the error.
+    tail = refused + np.cumsum(last[::-1])[::-1]  # refusals if that many failures refuse
     most = int(np.argmax(np.append(tail, 0.0) <= error)) - 1
     accept[seeds], refuse[seeds] = most, most + 1
     return RateTest(seeds, holds, error, other, accept, refuse)
@@ -141,31 +141,37 @@ def _steps(
     undecided[0] = 1.0
     steps = []
     for number in range(1, len(accept)):
-        moved = undecided * rate
-        moved[1:] += undecided[:-1] * (1 - rate)
+        mass = undecided * rate
+        mass[1:] += undecided[:-1] * (1 - rate)
         is_accepted, is_refused = failures <= accept[number], failures >= refuse[number]
-        steps.append((float(moved[is_accepted].sum()), float(moved[is_refused].sum()), moved))
-        undecided = np.where(is_accepted | is_refused, 0.0, moved)
+        steps.append(
+            (
+                float(mass[is_accepted].sum()),
+                float(mass[is_refused].sum()),
+                mass,
+            )
+        )
+        undecided = np.where(is_accepted | is_refused, 0.0, mass)
     return steps
 
 
 def _walk(
     accept: NDArray[np.int64], refuse: NDArray[np.int64], rate: float
 ) -> tuple[float, list[float]]:
-    """Return how likely acceptance is, and how likely each seed is needed."""
-    accepted, going = 0.0, 1.0
+    """Return the probability of acceptance, and the probability that each seed is needed."""
+    accepted, undecided = 0.0, 1.0
     needed = []
-    for yes, no, _ in _steps(accept, refuse, rate):
-        needed.append(going)
-        accepted += yes
-        going -= yes + no
+    for accepted_now, refused_now, _ in _steps(accept, refuse, rate):
+        needed.append(undecided)
+        accepted += accepted_now
+        undecided -= accepted_now + refused_now
     return accepted, needed
 
 
 def _ending(
     accept: NDArray[np.int64], refuse: NDArray[np.int64], rate: float
 ) -> tuple[float, NDArray[np.float64]]:
-    """Return how likely refusal before the last seed is, and failures at the last by number."""
+    """Return the probability of refusal before the last seed, and of each number of failures."""
     steps = _steps(accept, refuse, rate)
-    refused = sum(no for _, no, _ in steps[:-1])
+    refused = sum(refused_now for _, refused_now, _ in steps[:-1])
     return refused, steps[-1][2]

@@ -1,4 +1,4 @@
-"""Running a claim: one life after the other, until it is decided."""
+"""Run the trials of a claim, one after the other, until it is decided."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from fleet2d.errors import InputError
 from fleet2d.floorplan.home.home import keep_homes
 from fleet2d.floorplan.source import keep_plans
 from fleet2d.testing.claim import Claim, SetUpError, Variant
-from fleet2d.testing.life import Life, Trial
+from fleet2d.testing.trials import Trial, TrialResult
 
 Body = Callable[[Trial], Any]
-"""A test function, all of its arguments but the trial filled in."""
+"""A test function with all arguments bound except the trial."""
 
-MOST_HOMES = 32  # that are kept in memory
+MOST_HOMES = 32  # in memory
 NOTHING = ArtifactSettings(
     trajectories="off",
     key_frames=False,
@@ -27,34 +27,34 @@ NOTHING = ArtifactSettings(
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of a claim.
+class ClaimResult:
+    """The result of a claim.
 
     Attributes:
-        claim: What was claimed.
-        lives: The lives that it took, in order.
+        claim: The claim.
+        trials: The results of its trials, in order.
         holds: Whether the claim is accepted.
     """
 
     claim: Claim
-    lives: tuple[Life, ...]
+    trials: tuple[TrialResult, ...]
     holds: bool
 
     @property
-    def failed(self) -> tuple[Life, ...]:
-        """The lives in which something failed."""
-        return tuple(life for life in self.lives if not life.holds)
+    def failed(self) -> tuple[TrialResult, ...]:
+        """The trials that failed."""
+        return tuple(trial for trial in self.trials if not trial.holds)
 
     @property
-    def shown(self) -> Life:
-        """The failing life that is told about: the shortest."""
-        return min(self.failed, key=lambda life: (life.failing_step, life.variant.seed))
+    def shown(self) -> TrialResult:
+        """The failed trial to report: the shortest."""
+        return min(self.failed, key=lambda trial: (trial.failing_step, trial.variant.seed))
 
     @property
-    def words(self) -> str:
-        """What was decided, and on how much."""
-        number, failures = len(self.lives), len(self.failed)
-        rate, unit = self.claim.rate, "life" if self.claim.varies else "seed"
+    def text(self) -> str:
+        """The decision, and the number of trials that it is based on."""
+        number, failures = len(self.trials), len(self.failed)
+        rate, unit = self.claim.rate, "run" if self.claim.varies else "seed"
         held = f"held in {number - failures} of {number} {plural(unit, number)}"
         if rate.seeds == 1:
             return "held" if self.holds else "failed"
@@ -68,8 +68,8 @@ class Outcome:
         )
 
 
-def run_claim(claim: Claim, body: Body) -> Outcome:
-    """Run lives until the claim is decided.
+def run_claim(claim: Claim, body: Body) -> ClaimResult:
+    """Run trials until the claim is decided.
 
     Raises:
         Fleet2DError: The scenario or the test is wrong, or a component failed.
@@ -77,28 +77,28 @@ def run_claim(claim: Claim, body: Body) -> Outcome:
     for keep in (keep_homes, keep_plans):
         keep(min(len(claim.variants), MOST_HOMES))
     __tracebackhide__ = True
-    rate, lives, failures = claim.rate, list[Life](), 0
-    for variant in claim.lives():
-        life = run_life(variant, body)
-        lives.append(life)
-        failures += not life.holds
-        decided = rate.decide(len(lives), failures)
-        if decided is not None:
-            return Outcome(claim, tuple(lives), decided)
+    rate, trials, failures = claim.rate, list[TrialResult](), 0
+    for variant in claim.trials():
+        trial = run_trial(variant, body)
+        trials.append(trial)
+        failures += not trial.holds
+        holds = rate.decide(len(trials), failures)
+        if holds is not None:
+            return ClaimResult(claim, tuple(trials), holds)
     raise AssertionError("the last seed decides")
 
 
-def run_life(
+def run_trial(
     variant: Variant,
     body: Body,
     *,
     out: Path | None = None,
     without: Collection[int] = (),
-) -> Life:
-    """Run one life of a test.
+) -> TrialResult:
+    """Run one trial of a test.
 
     Args:
-        variant: What is simulated.
+        variant: The scenario.
         body: The test.
         out: A new directory in which the whole run is stored; None stores nothing.
         without: Numbers of interventions to leave out.
@@ -112,7 +112,7 @@ def run_life(
     try:
         trial = Trial(scenario, out=out, without=without)
     except InputError as problem:
-        raise SetUpError(f"{variant.words}: {problem}") from problem
+        raise SetUpError(f"{variant.text}: {problem}") from problem
     error: AssertionError | None = None
     __tracebackhide__ = True  # pytest shows the lines of the test
     try:
@@ -120,24 +120,24 @@ def run_life(
     except AssertionError as failure:
         error = failure
     except Exception as failure:
-        failure.add_note(f"in {variant.words}")
+        failure.add_note(f"in {variant.text}")
         raise
-    findings = trial.conclude() if error is None else ()
-    life = Life(variant, findings, trial.step, trial.acts, error)
+    results = trial.conclude() if error is None else ()
+    result = TrialResult(variant, results, trial.step, trial.acts, error)
     if out is not None and not trial.done:
         trial.run()
     elif out is not None:
         trial.finish()
-    return life
+    return result
 
 
 def plural(word: str, number: int) -> str:
-    """Return a word for so many.
+    """Return the singular or plural of a word for a number.
 
-    >>> plural("seed", 1), plural("life", 2)
-    ('seed', 'lives')
+    >>> plural("seed", 1), plural("run", 2)
+    ('seed', 'runs')
     """
-    return word if number == 1 else "lives" if word == "life" else f"{word}s"
+    return word if number == 1 else f"{word}s"
 
 
 def percent(share: float) -> str:

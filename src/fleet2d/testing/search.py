@@ -1,4 +1,4 @@
-"""Searching for a failure: random first, then guided by how narrowly expectations held."""
+"""Search for a failing run: random at first, then guided by the margins of expectations."""
 
 import importlib.util
 import pickle
@@ -19,9 +19,9 @@ from fleet2d.studies.execution import Executor, Lost
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
-from fleet2d.testing.life import Life, Trial
-from fleet2d.testing.running import Body, run_life
-from fleet2d.testing.space import Space
+from fleet2d.testing.running import Body, run_trial
+from fleet2d.testing.space import SearchSpace
+from fleet2d.testing.trials import Trial, TrialResult
 
 if TYPE_CHECKING:
     import optuna
@@ -33,12 +33,12 @@ CANDIDATES = 64
 
 @dataclass(frozen=True)
 class Subject:
-    """What is searched for a failure: a scenario that expects something, or a test.
+    """What to search for a failure: a scenario with expectations, or a test.
 
     Attributes:
         base: The composed scenario.
-        folder: The folder that its paths start from.
-        test: The file of a test and its name; None for the expectations of the scenario.
+        folder: The folder that its paths are relative to.
+        test: The file of a test and its name; None: the expectations of the scenario.
     """
 
     base: Document
@@ -46,21 +46,21 @@ class Subject:
     test: tuple[Path, str] | None = None
 
     def body(self) -> Body:
-        """Return what is done in each life.
+        """Return the test function to call in each run.
 
         Raises:
             InputError: There is no such test.
         """
-        return _nothing if self.test is None else load_test(*self.test)
+        return _empty_test if self.test is None else load_test(*self.test)
 
 
 @dataclass(frozen=True)
 class TryTask(WorkerTask):
-    """One life.
+    """One run of the search.
 
     Attributes:
-        point: Where in the space.
-        seed: Of the life.
+        point: The point of the search space.
+        seed: Seed of the run.
     """
 
     point: dict[str, Any] = field(default_factory=dict)
@@ -69,14 +69,14 @@ class TryTask(WorkerTask):
 
 @dataclass
 class TryJob:
-    """Runs lives, and returns by how much all held in each."""
+    """Runs the tasks of a search, and returns the margin of each run."""
 
     subject: Subject
-    space: Space
+    space: SearchSpace
     _body: Body | None = None
 
-    def life(self, point: dict[str, Any], seed: int) -> Life:
-        """Run a life.
+    def run(self, point: dict[str, Any], seed: int) -> TrialResult:
+        """Run the trial at a point.
 
         Raises:
             Fleet2DError: The scenario is wrong, or a component failed.
@@ -85,67 +85,67 @@ class TryJob:
             self._body = self.subject.body()
         subject = self.subject
         scenario = self.space.scenario(subject.base, subject.folder, point, seed)
-        return run_life(Variant(scenario, {"seed": seed}), self._body)
+        return run_trial(Variant(scenario, {"seed": seed}), self._body)
 
     def __call__(self, task: WorkerTask) -> bytes:
         """Return (margin, error), pickled; one of them is None."""
         assert isinstance(task, TryTask)
         try:
-            return pickle.dumps((self.life(task.point, task.seed).margin, None))
-        except Exception as error:  # noqa: BLE001 - a point may be no home; it is reported
+            return pickle.dumps((self.run(task.point, task.seed).margin, None))
+        except Exception as error:  # noqa: BLE001 - some points give no valid home; reported
             return pickle.dumps((None, describe_error(error)))
 
 
 class TrySchedule(TaskSchedule):
-    """Lives to run: random points at first, then those that Optuna asks for.
+    """The tasks of a search: random points at first, then those that Optuna suggests.
 
     Attributes:
-        done: How many lives are over.
+        started: Number of runs started so far.
     """
 
-    def __init__(self, search: "Search", budget: int, deadline: float | None) -> None:
-        """Ask nothing yet."""
+    def __init__(self, search: "FailureSearch", budget: int, deadline: float | None) -> None:
+        """Begin without tasks."""
         super().__init__(())
         self._search, self._budget, self._deadline = search, budget, deadline
-        self._again: list[TryTask] = []
-        self.begun = 0
+        self._returned: list[TryTask] = []
+        self.started = 0
 
     def __len__(self) -> int:
-        """Return how many lives there may be."""
-        return self._budget - self.begun + len(self._again)
+        """Return the largest number of runs still to come."""
+        return self._budget - self.started + len(self._returned)
 
     def __bool__(self) -> bool:
-        """Return whether there is anything left to run."""
+        """Return whether there are runs to come."""
         if self._search.failure is not None:
             return False
-        late = self._deadline is not None and time.monotonic() > self._deadline
-        return bool(self._again) or (self.begun < self._budget and not late)
+        is_late = self._deadline is not None and time.monotonic() > self._deadline
+        return bool(self._returned) or (self.started < self._budget and not is_late)
 
     def take(self, worker: Hashable) -> WorkerTask | None:
-        """Return the next life."""
+        """Return the next task."""
         if not self:
             return None
-        if self._again:
-            return self._again.pop()
-        task = self._search.ask(self.begun)
-        self.begun += 1
+        if self._returned:
+            return self._returned.pop()
+        task = self._search.ask(self.started)
+        self.started += 1
         return task
 
     def put_back(self, task: WorkerTask) -> None:
-        """Let a life be run again."""
+        """Return a task to be run again."""
         assert isinstance(task, TryTask)
-        self._again.append(task)
+        self._returned.append(task)
 
 
 @dataclass(frozen=True)
-class Failing:
-    """A life that fails.
+class FailingPoint:
+    """A point of the search space at which the run fails.
 
     Attributes:
-        number: Which of the tries it was, from 1.
-        point: Where in the space.
-        seed: Of the life.
-        margin: Below 0.
+        number: Number of the run, from 1.
+        point: The point.
+        seed: Seed of the run.
+        margin: Margin of the run, below 0.
     """
 
     number: int
@@ -154,24 +154,24 @@ class Failing:
     margin: float
 
 
-class Search:
-    """A search for a life in which an expectation fails.
+class FailureSearch:
+    """A search for a run in which an expectation fails.
 
     Attributes:
-        failure: The first failure; None so far.
-        tries: How many lives are over.
+        failure: The first failure; None until there is one.
+        tries: Number of finished runs.
         narrowest: The least margin so far, and its point.
-        errors: What went wrong in lives that could not be run, and how often.
+        errors: Errors of runs that couldn't be simulated, with how often they happened.
     """
 
     def __init__(self, job: TryJob, budget: int, *, seed: int = 0, is_guided: bool = True) -> None:
-        """Prepare; with is_guided=False all points are random, to compare with."""
+        """Prepare a search; with is_guided=False all points are random, for comparison."""
         self._job, self._budget, self._seed = job, budget, seed
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
         self._random = max(LEAST_RANDOM, round(RANDOM_SHARE * budget)) if is_guided else budget
         self._study = _optuna(seed, self._random) if is_guided else None
-        self._asked: dict[int, Any] = {}
-        self.failure: Failing | None = None
+        self._suggested: dict[int, Any] = {}
+        self.failure: FailingPoint | None = None
         self.tries = 0
         self.narrowest: tuple[float, dict[str, Any]] | None = None
         self.errors: dict[str, int] = {}
@@ -180,14 +180,14 @@ class Search:
         self,
         executor: Executor,
         seconds: float | None = None,
-        observer: Callable[["Search"], None] | None = None,
-    ) -> Failing | None:
-        """Search until something fails, or the budget is spent.
+        observer: Callable[["FailureSearch"], None] | None = None,
+    ) -> FailingPoint | None:
+        """Search until a run fails, or the budget is used up.
 
         Args:
-            executor: Runs the lives.
-            seconds: Wall time after which no life is begun.
-            observer: Called after each life.
+            executor: Executes the runs.
+            seconds: Wall time after which no run is started.
+            observer: Called after each run.
         """
         deadline = None if seconds is None else time.monotonic() + seconds
         schedule = TrySchedule(self, self._budget, deadline)
@@ -196,9 +196,9 @@ class Search:
             for event in events:
                 assert isinstance(event.task, TryTask)
                 margin, error = (
-                    (None, event.reason) if isinstance(event, Lost) else pickle.loads(event.payload)  # noqa: S301 - from our own workers
+                    (None, event.reason) if isinstance(event, Lost) else pickle.loads(event.payload)  # noqa: S301 - by this program's workers
                 )
-                self._take(event.task, margin, error)
+                self._add(event.task, margin, error)
                 if observer is not None:
                     observer(self)
                 if self.failure is not None:
@@ -208,21 +208,21 @@ class Search:
         return self.failure
 
     def ask(self, number: int) -> TryTask:
-        """Return the life of a number: its point, and a seed of its own."""
+        """Return the task of a number: its point, and its own seed."""
         if self._study is None:
             point = self._job.space.draw(self._generator)
         else:
             trial = self._study.ask()
-            self._asked[number] = trial
+            self._suggested[number] = trial
             point = self._job.space.ask(trial)
         return TryTask(number, number, "", point=point, seed=self._seed + number)
 
-    def _take(self, task: TryTask, margin: float | None, error: str | None) -> None:
+    def _add(self, task: TryTask, margin: float | None, error: str | None) -> None:
         self.tries += 1
-        trial = self._asked.pop(task.number, None)
+        trial = self._suggested.pop(task.number, None)
         if margin is None:
-            words = error or "it could not be run"
-            self.errors[words] = self.errors.get(words, 0) + 1
+            text = error or "it could not be run"
+            self.errors[text] = self.errors.get(text, 0) + 1
         elif self.narrowest is None or margin < self.narrowest[0]:
             self.narrowest = margin, task.point
         if self._study is not None and trial is not None:
@@ -231,7 +231,7 @@ class Search:
             state = TrialState.FAIL if margin is None else None
             self._study.tell(trial, margin, state=state)
         if margin is not None and margin < 0:
-            self.failure = Failing(self.tries, task.point, task.seed, margin)
+            self.failure = FailingPoint(self.tries, task.point, task.seed, margin)
 
 
 def _optuna(seed: int, startup: int) -> "optuna.Study":
@@ -246,15 +246,15 @@ def _optuna(seed: int, startup: int) -> "optuna.Study":
     return optuna.create_study(sampler=sampler)
 
 
-def _nothing(trial: Trial) -> None:
-    """Do nothing: what is expected stands in the scenario."""
+def _empty_test(trial: Trial) -> None:
+    """Do nothing: the expectations are in the scenario."""
 
 
 def load_test(path: Path, name: str) -> Body:
     """Return a test of a file.
 
     Raises:
-        InputError: There is no such file or test, or it takes more than a trial.
+        InputError: There is no such file or test, or it has other arguments than a trial.
     """
     function, _ = claimed_test(path, name)
     return function
@@ -264,7 +264,7 @@ def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
     """Return a test of a file, and its claim.
 
     Raises:
-        InputError: There is no such file or test, or it takes more than a trial.
+        InputError: There is no such file or test, or it has other arguments than a trial.
     """
     if not path.is_file():
         raise InputError(f"there is no {path}: name a scenario, or a test as FILE.py::NAME")
@@ -274,7 +274,7 @@ def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
     assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[module_name] = module
-    sys.path.insert(0, str(path.parent.absolute()))  # as pytest has it
+    sys.path.insert(0, str(path.parent.absolute()))  # as pytest does
     try:
         specification.loader.exec_module(module)
     finally:
@@ -286,10 +286,10 @@ def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
             f" {', '.join(tests) or 'none'}"
         )
     function = getattr(module, name)
-    more = [name for name in signature(function).parameters if name != "trial"]
-    if more or hasattr(function, "pytestmark"):
+    others = [name for name in signature(function).parameters if name != "trial"]
+    if others or hasattr(function, "pytestmark"):
         raise InputError(
-            f"{path}::{name} takes {', '.join(more) or 'parameters'} beside the trial: only a test"
-            " of a trial alone can be searched"
+            f"{path}::{name} takes {', '.join(others) or 'parameters'} beside the trial: only a"
+            " test of a trial alone can be searched"
         )
     return lambda trial: function(trial=trial), getattr(function, ATTRIBUTE)

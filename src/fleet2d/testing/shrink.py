@@ -1,4 +1,4 @@
-"""Making a failure smaller: a shorter life, fewer people and interventions that still fail."""
+"""Make a failing run smaller: shorter, with fewer people and interventions, still failing."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -8,82 +8,81 @@ from typing import Any
 from fleet2d.errors import Fleet2DError
 from fleet2d.scenario.model import load_scenario
 from fleet2d.testing.claim import Variant
-from fleet2d.testing.life import Life
-from fleet2d.testing.running import Body, run_life
+from fleet2d.testing.running import Body, run_trial
+from fleet2d.testing.trials import TrialResult
 
 SECTIONS = ("users", "robots", "objects", "algorithms", "metrics")
-"""The sections whose entries are left out one by one."""
+"""The sections of the scenario whose entries are left out one by one."""
 LEADS = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
-"""How long before the failure a shorter life begins, tried in this order."""
+"""Times from the start of a shorter run to the failure, tried in this order."""
 
 
 @dataclass(frozen=True)
-class Case:
-    """A failing life, as little of it as is needed so far.
+class FailingCase:
+    """A failing run, reduced so far.
 
     Attributes:
         variant: The scenario.
-        without: Numbers of interventions that are left out.
-        life: What became of it.
+        without: Numbers of the interventions that are left out.
+        result: The result of the run.
     """
 
     variant: Variant
     without: frozenset[int]
-    life: Life
+    result: TrialResult
 
     @property
-    def words(self) -> str:
-        """What is left: when, who, and how many interventions."""
+    def text(self) -> str:
+        """A summary: the time, the people, and the number of interventions."""
         simulation = self.variant.scenario.simulation
         end = simulation.start + simulation.duration
         people = ", ".join(self.variant.scenario.users) or "nobody"
-        number = f"{self.interventions} of {self.life.interventions} interventions"
+        number = f"{self.interventions} of {self.result.interventions} interventions"
         return (
             f"{simulation.start:%a %d %b %H:%M:%S} to {end:%a %d %b %H:%M:%S}, with {people}"
-            f"{f', {number}' if self.life.interventions else ''}"
+            f"{f', {number}' if self.result.interventions else ''}"
         )
 
     @property
     def interventions(self) -> int:
-        """How many interventions are left."""
-        return self.life.interventions - len(self.without)
+        """Number of remaining interventions."""
+        return self.result.interventions - len(self.without)
 
 
 class Shrinker:
-    """Tries smaller versions of a failing life.
+    """Tries smaller versions of a failing run.
 
-    A smaller one counts where one of the same expectations fails in it: one that fails otherwise,
-    or can't be run, doesn't.
+    A smaller version counts if one of the same expectations fails in it, but not if another one
+    fails, or if it can't be simulated.
     """
 
     def __init__(self, body: Body, tries: int) -> None:
-        """Begin.
+        """Prepare.
 
         Args:
             body: The test.
-            tries: How many lives may be run.
+            tries: Largest number of runs.
         """
         self._body, self.tries = body, tries
 
-    def shrink(self, life: Life) -> Case:
-        """Return the smallest failing version that is found of a failing life."""
-        case = Case(life.variant, frozenset(), life)
-        for smaller in (_shorter, self._later, self._undone, self._fewer, _shorter):
-            found = smaller(case)
-            tried = found if isinstance(found, Case) else self._try(case, found, case.without)
-            case = tried or case
-        return case
+    def shrink(self, result: TrialResult) -> FailingCase:
+        """Return the smallest failing version that it finds of a failing run."""
+        case = FailingCase(result.variant, frozenset(), result)
+        case = self._try(case, _shorter(case), case.without) or case
+        for reduce in (self._later, self._undone, self._fewer):
+            case = reduce(case)
+        return self._try(case, _shorter(case), case.without) or case
 
-    def _later(self, case: Case) -> Case:
-        """Let the life begin as shortly before the failure as it still fails."""
+    def _later(self, case: FailingCase) -> FailingCase:
+        """Let the run begin as shortly before the failure as it still fails."""
         for variant in _later_starts(case):
             smaller = self._try(case, variant, case.without)
             if smaller is not None:
                 return self._try(smaller, _shorter(smaller), smaller.without) or smaller
         return case
 
-    def _fewer(self, case: Case) -> Case:
-        """Leave out people, robots and things, one after the other."""
+    def _fewer(self, case: FailingCase) -> FailingCase:
+        """Leave out people, robots, objects, algorithms and metrics, one after the other."""
         for section in SECTIONS:
             for name in getattr(case.variant.scenario, section):
                 variant = _without_entry(case.variant, section, name)
@@ -92,40 +91,42 @@ class Shrinker:
             case = self._try(case, _edited(case.variant, changes=[]), case.without) or case
         return case
 
-    def _undone(self, case: Case) -> Case:
+    def _undone(self, case: FailingCase) -> FailingCase:
         """Leave out interventions, the last first."""
-        for number in reversed(range(case.life.interventions)):
+        for number in reversed(range(case.result.interventions)):
             case = self._try(case, case.variant, case.without | {number}) or case
         return case
 
-    def _try(self, case: Case, variant: Variant | None, without: frozenset[int]) -> Case | None:
+    def _try(
+        self, case: FailingCase, variant: Variant | None, without: frozenset[int]
+    ) -> FailingCase | None:
         """Return a version if it fails as the case does; None otherwise."""
         if variant is None or self.tries <= 0:
             return None
         self.tries -= 1
         try:
-            life = run_life(variant, self._body, without=without)
-        except Exception:  # noqa: BLE001 - what can't be run is no smaller version
+            result = run_trial(variant, self._body, without=without)
+        except Exception:  # noqa: BLE001 - a version that can't be simulated doesn't count
             return None
-        names = {failure.name for failure in case.life.failures}
-        fails = any(failure.name in names for failure in life.failures)
-        return Case(variant, without, life) if fails else None
+        names = {failure.name for failure in case.result.failures}
+        fails = any(failure.name in names for failure in result.failures)
+        return FailingCase(variant, without, result) if fails else None
 
 
-def _shorter(case: Case) -> Variant | None:
-    """Return the scenario up to the failure; None where it lasts no longer."""
+def _shorter(case: FailingCase) -> Variant | None:
+    """Return the scenario up to the failure; None if it already ends there."""
     simulation = case.variant.scenario.simulation
-    steps = case.life.failing_step + 1
+    steps = case.result.failing_step + 1
     if steps >= simulation.steps:
         return None
     return _edited(case.variant, simulation={"duration": steps * simulation.step})
 
 
-def _later_starts(case: Case) -> Iterator[Variant | None]:
+def _later_starts(case: FailingCase) -> Iterator[Variant | None]:
     """Yield the scenario with later starts, the latest first."""
     simulation = case.variant.scenario.simulation
     end = simulation.start + simulation.duration
-    failing = simulation.start + case.life.failing_step * simulation.step
+    failing = simulation.start + case.result.failing_step * simulation.step
     for lead in LEADS:
         start = (failing - lead).replace(second=0, microsecond=0)
         if simulation.start < start < end:
@@ -141,7 +142,7 @@ def _without_entry(variant: Variant, section: str, name: str) -> Variant | None:
 
 
 def _edited(variant: Variant, **sections: Any) -> Variant | None:
-    """Return a variant with some keys changed; None if it is no scenario then."""
+    """Return a variant with some keys changed; None if that is no valid scenario."""
     content = variant.scenario.resolved()
     for name, value in sections.items():
         content[name] = {**content[name], **value} if name == "simulation" else value

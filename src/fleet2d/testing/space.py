@@ -1,4 +1,4 @@
-"""Where a search for failures looks: homes, households, timings, and any key of a scenario."""
+"""The space of a search for failures: homes, households, timings, and any key of a scenario."""
 
 import random
 from collections.abc import Mapping
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     import optuna
 
 Settings = Mapping[str, Any]
-"""A point of the space: for each dimension a number, or which of its choices."""
+"""A point of the space: for each dimension a number, or the index of a choice."""
 
 _AXIS: TypeAdapter[Any] = TypeAdapter(AnyAxis)
 
 
 @dataclass(frozen=True)
-class Space:
-    """What may vary, by name: ranges of numbers, and lists of choices.
+class SearchSpace:
+    """The dimensions of a search, by name: ranges of numbers, and lists of choices.
 
     Example:
         >>> speed, home = {"low": 0.2, "high": 0.8}, {"synthetic": 3}
@@ -43,32 +43,32 @@ class Space:
     choices: Mapping[str, tuple[Choice, ...]]
 
     def ask(self, trial: "optuna.Trial") -> dict[str, Any]:
-        """Return the point that Optuna wants tried."""
-        point = {name: suggested(trial, name, one) for name, one in self.ranges.items()}
+        """Return the point that Optuna suggests."""
+        point = {name: suggested(trial, name, parameter) for name, parameter in self.ranges.items()}
         for name, choices in self.choices.items():
             point[name] = trial.suggest_categorical(name, range(len(choices)))
         return point
 
     def draw(self, generator: random.Random) -> dict[str, Any]:
         """Return a random point."""
-        point = {name: one.at(generator.random()) for name, one in self.ranges.items()}
+        point = {name: parameter.at(generator.random()) for name, parameter in self.ranges.items()}
         for name, choices in self.choices.items():
             point[name] = generator.randrange(len(choices))
         return point
 
     def changes(self, point: Settings) -> list[tuple[Keys, Any]]:
-        """Return what a point sets: key paths and values."""
-        found: list[tuple[Keys, Any]] = []
+        """Return the key paths and values that a point sets."""
+        changes: list[tuple[Keys, Any]] = []
         for name, value in point.items():
             if name in self.ranges:
                 parameter = self.ranges[name]
-                found.append((key_path(parameter.key), parameter.with_unit(value)))
+                changes.append((key_path(parameter.key), parameter.with_unit(value)))
             else:
-                found += self.choices[name][value].changes
-        return found
+                changes += self.choices[name][value].changes
+        return changes
 
-    def words(self, point: Settings) -> str:
-        """Return a point as messages write it."""
+    def text(self, point: Settings) -> str:
+        """Return a point as text for messages."""
         parts = [f"{n} = {v}" for n, v in point.items() if n in self.ranges]
         parts += [self.choices[n][v].words for n, v in point.items() if n in self.choices]
         return ", ".join(parts)
@@ -77,12 +77,12 @@ class Space:
         """Return the scenario of a point.
 
         Raises:
-            InputError: It is none, or its home can't be built.
+            InputError: It is no valid scenario, or its home can't be built.
         """
         changes = [(("simulation", "seed"), seed), *self.changes(point)]
-        words = self.words(point)
-        single = [assignment(keys, value, words) for keys, value in changes]
-        return scenario_of(apply_changes(base, single), folder)
+        source = self.text(point)
+        assignments = [assignment(keys, value, source) for keys, value in changes]
+        return scenario_of(apply_changes(base, assignments), folder)
 
     def check(self, base: Document, folder: Path) -> None:
         """Build a scenario for each end of each range, and for each choice.
@@ -104,15 +104,15 @@ class Space:
             raise type(error)(f"over {name}: {error}") from None
 
 
-def read_space(content: Mapping[str, Any]) -> Space:
-    """Return the space that a mapping describes, an axis by name.
+def read_space(content: Mapping[str, Any]) -> SearchSpace:
+    """Return the space that a mapping of axes by name describes.
 
     An axis is a range, ``{key: robots.astro.speed, low: 0.3, high: 0.8}``, with `unit`, `log` and
-    `integer` as in the `tune` section of a study; or one of a study's axes. Without a key its name
-    is the key.
+    `integer` as in the `tune` section of a study; or one of a study's axes. By default its name is
+    its key.
 
     Raises:
-        InputError: An axis is none.
+        InputError: An axis is wrong.
     """
     ranges, choices = dict[str, Parameter](), dict[str, tuple[Choice, ...]]()
     if not content:
@@ -131,11 +131,11 @@ def read_space(content: Mapping[str, Any]) -> Space:
             first = error.errors(include_url=False)[0]
             key = ".".join(map(str, (name, *first["loc"])))
             raise ScenarioError(f"over {key}: {first['msg']}") from None
-    return Space(ranges, choices)
+    return SearchSpace(ranges, choices)
 
 
 def parse_over(texts: list[str]) -> dict[str, Any]:
-    """Read what `--over` was given: YAML files of axes, and single axes, NAME=YAML.
+    """Read the values of `--over`: YAML files of axes, and single axes, NAME=YAML.
 
     Raises:
         InputError: One can't be read.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
-from fleet2d.sight.region import VisibleRegion, Walled
+from fleet2d.sight.region import VisibleRegion, WallPlan
 from fleet2d.view.traces import Trace
 
 BLUR_M = 0.14  # a body is a soft spot of about its own size
@@ -210,7 +210,7 @@ def telling_view(
 
 
 def field_of_view(
-    plan: Walled, xy: F64, heading: float, camera: dict[str, Any]
+    plan: WallPlan, xy: F64, heading: float, camera: dict[str, Any]
 ) -> shapely.MultiPolygon:
     """Return what a camera sees from a place [m]: visible, in range, and within its angle."""
     try:

@@ -6,8 +6,8 @@ import pytest
 from tests.scenes import AGENDA, scenario
 
 from fleet2d.testing.claim import Claim
-from fleet2d.testing.life import Trial, comparable
-from fleet2d.testing.running import run_life
+from fleet2d.testing.running import run_trial
+from fleet2d.testing.trials import Trial, comparable
 
 PEOPLE = {"ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"}}
 FLAT = Claim(scenario("2 h", users=PEOPLE, robots={"astro": "patrol"})).variants[0]
@@ -21,7 +21,7 @@ def test_it_goes_on_until_all_is_decided_and_no_longer() -> None:
     def to_the_end(trial: Trial) -> None:
         trial.expect("always(distance(astro, ana) >= 0 m)")
 
-    early, late = run_life(FLAT, soon), run_life(FLAT, to_the_end)
+    early, late = run_trial(FLAT, soon), run_trial(FLAT, to_the_end)
     assert early.holds
     assert late.holds
     assert 100 < early.steps < 400
@@ -37,7 +37,7 @@ def test_all_that_fails_is_named_with_its_step_and_margin() -> None:
         trial.expect("eventually(room(ana) == bathroom, within=1 min)", name="washes")
         trial.expect("never(room(ana) == bathroom)", name="dry")
 
-    life = run_life(FLAT, body)
+    life = run_trial(FLAT, body)
     assert ["far", "washes"] == [failure.name for failure in life.failures]
     assert [60, 120] == [failure.step for failure in life.failures]
     assert -1 < life.failures[0].margin < 0
@@ -55,7 +55,7 @@ def test_interventions_can_be_left_out(without: Any) -> None:
         trial.advance()
         rooms.extend([trial.state["ana"]["room"], trial.state["astro"]["room"]])
 
-    life = run_life(FLAT, body, without=without)
+    life = run_trial(FLAT, body, without=without)
     assert 2 == life.interventions
     assert (0 not in without) == (rooms[0] == "kitchen_0")
     assert (1 not in without) == (rooms[1] == "bathroom_0")
