@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
-from tests.thorough import THOROUGH
+from tests.thorough import some
 
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.kernels.mesh import Mesh, rasterize_cells
@@ -87,7 +87,7 @@ def plan_files(shared_data: Path) -> list[Path]:
     """
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert len(paths) == 50
-    return paths if THOROUGH else paths[::10]
+    return list(some(paths, 10))
 
 
 def all_homes(shared_data: Path) -> Iterator[Home]:

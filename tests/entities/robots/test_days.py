@@ -13,6 +13,7 @@ from tests.entities.robots.robots import (
     home_with,
 )
 from tests.scenes import digests, path, run
+from tests.thorough import THOROUGH
 
 import fleet2d
 from fleet2d.kernels.mesh import strictly_inside
@@ -58,8 +59,15 @@ def home_file(folder: Path, which: str) -> Path:
     return files[0] if which == "first" else files[len(files) // 2]
 
 
-@pytest.mark.parametrize("which", ["first", "middle"])
-@pytest.mark.parametrize("name", list(DAYS))
+@pytest.mark.parametrize(
+    ("name", "which"),
+    [
+        (name, which)
+        for i, name in enumerate(DAYS)
+        for j, which in enumerate(("first", "middle"))
+        if THOROUGH or i % 2 == j
+    ],
+)
 def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which: str) -> None:
     behaviors, wanted = DAYS[name]
     ana = fleet2d.load_scenario("bundled:base").users["ana"].model_dump(mode="json")

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from tests.routines.days import MONDAY
 from tests.scenes import run, scenario, table
+from tests.thorough import THOROUGH
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
@@ -30,8 +31,10 @@ def apart(counts: Counter[str], target: dict[str, float]) -> float:
     return sum(abs(counts[c] / total - share) for c, share in target.items()) / 2
 
 
-def test_shares_of_a_thousand_people_follow_the_survey_hour_by_hour() -> None:
-    simulation = Simulation(scenario("5 min", users=users(1000, group="workers")))
+def test_shares_of_many_people_follow_the_survey_hour_by_hour() -> None:
+    simulation = Simulation(
+        scenario("5 min", users=users(1000 if THOROUGH else 300, group="workers"))
+    )
     counts: dict[tuple[str, int], Counter[str]] = {}
     for actor in simulation.actors.values():
         for ordinal in range(MONDAY, MONDAY + 7):
@@ -85,11 +88,11 @@ def test_asking_for_a_day_again_or_from_a_branch_gives_the_same() -> None:
 
 
 def test_groups_are_drawn_by_their_shares() -> None:
-    simulation = Simulation(scenario("5 min", users=users(400)))
+    simulation = Simulation(scenario("5 min", users=users(200)))
     drawn = Counter(a.behaviors[0].people.name for a in simulation.actors.values())
     for name in survey.groups():
         share = survey.table()["groups"][name]["share"] / 10_000
-        assert share == pytest.approx(drawn[name] / 400, abs=0.08)
+        assert share == pytest.approx(drawn[name] / 200, abs=0.08)
 
 
 def test_people_of_the_survey_live_in_the_home() -> None:

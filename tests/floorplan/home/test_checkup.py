@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import shapely
+from tests.homes import plan_files
 from typer.testing import CliRunner
 
 from fleet2d.cli import app
@@ -210,7 +211,7 @@ def test_home_that_no_body_fits_into_is_unlivable() -> None:
 
 
 def test_every_plan_has_a_check_up(shared_data: Path) -> None:
-    paths = [*sorted((shared_data / "houseexpo").glob("*.json"))[:12]]
+    paths = plan_files(shared_data)
     paths += [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]
     for path in paths:
         for finding in checkup(load_floorplan(path)):
