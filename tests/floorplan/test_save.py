@@ -11,7 +11,7 @@ from tests.scenes import Cli
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import HOMES
 from fleet2d.floorplan.formats.native import native_document
-from fleet2d.floorplan.formats.native_schema import native_schema
+from fleet2d.floorplan.formats.native_file import native_schema
 from fleet2d.floorplan.load import is_floorplan, load_floorplan
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion

@@ -11,7 +11,8 @@ from typing import Any
 from fleet2d.component import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import HOMES, bundled_names
-from fleet2d.floorplan.formats.native import FORMAT, native_plan, read_native
+from fleet2d.floorplan.formats.native import native_plan, read_native
+from fleet2d.floorplan.formats.native_file import FORMAT
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML, FloorPlanSource, read_document, read_yaml
 from fleet2d.problems import did_you_mean

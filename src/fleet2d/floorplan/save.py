@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.geojson_file import COLLECTION
-from fleet2d.floorplan.formats.native import cell_polygons, native_document, written_object
+from fleet2d.floorplan.formats.native import cell_polygons, native_document, object_document
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML
 
@@ -58,7 +58,7 @@ def geojson_document(plan: FloorPlan) -> dict[str, Any]:
         kind = "door" if door.leaf else "opening"
         features.append(_feature(LineString([door.start, door.end]), kind, name=door.name))
     for thing in plan.objects:
-        properties = written_object(thing)
+        properties = object_document(thing)
         del properties["footprint"]
         features.append(_feature(thing.footprint, "object", **properties))
     features += [_feature(area, "no_go") for area in plan.no_go]

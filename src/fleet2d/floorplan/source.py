@@ -2,9 +2,9 @@
 
 import hashlib
 import json
-import math
 from abc import abstractmethod
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -25,10 +25,6 @@ from fleet2d.paths import InputPath
 from fleet2d.units import Length
 from fleet2d.yaml_tree import NodeError
 
-# No home is as large: a coordinate beyond this is not in metres.
-MAX_COORDINATE_M = 100_000.0
-TINY = 1e-12
-
 YAML = (".yaml", ".yml")
 # Homes that a process caches, read and furnished.
 CACHED_PLANS = 8
@@ -39,9 +35,6 @@ _PLANS = Cache(CACHED_PLANS)
 def keep_plans(count: int) -> None:
     """Cache at least `count` homes, read and furnished, for later runs."""
     _PLANS.grow(count)
-
-
-Point = tuple[float, float]
 
 
 class FloorPlanSource(Component):
@@ -162,6 +155,15 @@ class PixelSource(FloorPlanSource):
 # --- Files -------------------------------------------------------------------------------------
 
 
+@contextmanager
+def in_file(path: Path) -> Iterator[None]:
+    """Put the path of a file before the errors that are raised in the block."""
+    try:
+        yield
+    except FloorPlanError as error:
+        raise FloorPlanError(f"{path}: {error}") from error
+
+
 def read_document(path: Path) -> dict[str, Any]:
     """Return the mapping in a YAML file (.yaml, .yml), else the object in a JSON file.
 
@@ -235,92 +237,3 @@ def _mapping(content: object, path: Path, expected: str) -> dict[str, Any]:
     kinds = {list: "a list", str: "a text", type(None): "nothing"}
     kind = kinds.get(type(content), "a single value")
     raise FloorPlanError(f"{path} holds {kind}: a floor plan is {expected}")
-
-
-# --- Values ------------------------------------------------------------------------------------
-
-
-def read_numbers(value: object, count: int, where: str) -> tuple[float, ...]:
-    """Return `count` coordinates [m] of a JSON list.
-
-    Args:
-        value: The value in the file.
-        count: Number of coordinates.
-        where: The place in the file, for messages.
-
-    Raises:
-        FloorPlanError: It is not a list of `count` finite numbers in a sensible range.
-    """
-    if not isinstance(value, list) or len(value) != count:
-        raise FloorPlanError(
-            f"{where} is {shown_value(value)}: a list of {count} numbers [m] is expected"
-        )
-    for number in value:
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            wrong = shown_value(number)
-            raise FloorPlanError(f"{where} is {shown_value(value)}: {wrong} is not a number")
-        if isinstance(number, float) and not math.isfinite(number):
-            raise FloorPlanError(
-                f"{where} is {shown_value(value)}: coordinates must be finite numbers"
-            )
-        if abs(number) > MAX_COORDINATE_M:
-            raise FloorPlanError(
-                f"{where} is {shown_value(value)}: too far out for coordinates in metres"
-            )
-    return tuple(clean_coordinate(number) for number in value)
-
-
-def clean_coordinate(number: float) -> float:
-    """Return a coordinate as a float, with tiny ones set to 0, since GEOS divides by them."""
-    return 0.0 if abs(number) < TINY else float(number)
-
-
-def read_ring(value: object, where: str) -> list[Point]:
-    """Return the corners of a closed outline, without repetitions, also of the first at the end.
-
-    Raises:
-        FloorPlanError: It is not a list of at least three different points.
-    """
-    if not isinstance(value, list):
-        raise FloorPlanError(
-            f"{where} is {shown_value(value)}: a list of points [x, y] is expected"
-        )
-    points: list[Point] = []
-    for number, item in enumerate(value):
-        x, y = read_numbers(item, 2, f"{where}[{number}]")
-        if not points or points[-1] != (x, y):
-            points.append((x, y))
-    while len(points) > 1 and points[0] == points[-1]:
-        points.pop()
-    if len(set(points)) < 3:
-        raise FloorPlanError(
-            f"{where} has {len(set(points))} different points: an outline has at least 3"
-        )
-    return points
-
-
-def shown_value(value: object) -> str:
-    """Return a value of a file for a message: as JSON, cut if it is long.
-
-    >>> shown_value([True, None, "x" * 100])
-    '[true, null, "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx...'
-    """
-    text = _json_head(value, 3)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _json_head(value: object, depth: int) -> str:
-    """Return the beginning of a value as JSON, quickly however large or deep the value is."""
-    if isinstance(value, list | dict) and value and depth == 0:
-        return "[…]" if isinstance(value, list) else "{…}"
-    if isinstance(value, list):
-        return f"[{', '.join(_json_head(item, depth - 1) for item in value[:30])}]"
-    if isinstance(value, dict):
-        first = list(value.items())[:30]
-        pairs = (f"{_json_head(key, 0)}: {_json_head(item, depth - 1)}" for key, item in first)
-        return f"{{{', '.join(pairs)}}}"
-    if isinstance(value, int) and abs(value) >= 10**60:
-        return f"a whole number of {value.bit_length()} bits"
-    if isinstance(value, str):
-        value = value[:100]
-    return json.dumps(value, default=str)

@@ -320,8 +320,11 @@ NAN, INFINITY = float("nan"), float("inf")
         ({"verts": [[0, 0], [9e4, 0], [1, 1]]}, "too large for cells of 0.05 m"),
         ({"verts": [[0, 0], [1, 1], [2, 2]]}, "encloses no area"),
         ({"verts": [[0, 0], [0.02, 0], [0.02, 0.02]]}, "holds no cell of 0.05 m"),
-        ({"verts": SQUARE, "room_category": []}, "room_category is not an object"),
-        ({"verts": SQUARE, "room_category": {"Hall": 3}}, "room_category.Hall is not a list"),
+        ({"verts": SQUARE, "room_category": []}, r"room_category is \[\]: an object is expected"),
+        (
+            {"verts": SQUARE, "room_category": {"Hall": 3}},
+            "room_category.Hall is 3: a list of boxes",
+        ),
         (
             {"verts": SQUARE, "room_category": {"Hall": [[0, 0, 1]]}},
             r"room_category.Hall\[0\] is \[0, 0, 1\]: a list of 4 numbers",

@@ -9,30 +9,33 @@ from pydantic import Field, TypeAdapter
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.occupancy import Mask, OccupancyMap, free_space
+from fleet2d.floorplan.formats.occupancy import (
+    RAY_WIDTH_M,
+    SPECK_AREA_M2,
+    Mask,
+    OccupancyMap,
+    OccupancySource,
+    free_space,
+)
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
-from fleet2d.floorplan.formats.ros import RAY_WIDTH_M, SPECK_AREA_M2
 from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import PixelSource
+from fleet2d.floorplan.source import in_file
 from fleet2d.kernels.masks import label_parts
 from fleet2d.paths import InputPath
-from fleet2d.units import Length, PositiveLength, Share
+from fleet2d.units import PositiveLength, Share
 
 THRESHOLD = 0.5
 
 
 @register("floorplan", "image")
-class Image(PixelSource):
+class Image(OccupancySource):
     """A drawing: dark walls on light ground.
 
     Attributes:
         path: The picture, PNG or PGM.
         resolution: Side of a pixel, at most 1 m.
-        threshold: What is darker than this share of white is wall.
-        speck_area_m2: Groups of dark pixels smaller than this with light ones all round, such as
-            lettering, become free; 0 keeps all.
-        ray_width: Free space narrower than this doesn't lead on; 0 keeps all that is connected.
+        threshold: Share of white below which a pixel is wall.
     """
 
     path: InputPath = Field(description="the picture, PNG or PGM")
@@ -40,17 +43,7 @@ class Image(PixelSource):
         le=MAX_CELL_M, description="side of a pixel: a drawing doesn't say how large the home is"
     )
     threshold: Share = Field(
-        default=THRESHOLD, description="what is darker than this share of white is wall"
-    )
-    speck_area_m2: float = Field(
-        default=SPECK_AREA_M2,
-        ge=0,
-        description="smaller groups of dark pixels with light ones all round become free",
-    )
-    ray_width: Length = Field(
-        default=RAY_WIDTH_M,
-        ge=0,
-        description="free space narrower than this doesn't lead on; 0 keeps all that is connected",
+        default=THRESHOLD, description="share of white below which a pixel is wall"
     )
 
     @classmethod
@@ -62,12 +55,7 @@ class Image(PixelSource):
     def load(self) -> FloorPlan:
         """Read the drawing."""
         return read_image(
-            self.path,
-            self.resolution,
-            self.cell,
-            threshold=self.threshold,
-            speck_area_m2=self.speck_area_m2,
-            ray_width=self.ray_width,
+            self.path, self.resolution, self.cell, threshold=self.threshold, **self.cleaning
         )
 
 
@@ -82,14 +70,14 @@ def read_image(
 ) -> FloorPlan:
     """Read a floor plan that is drawn as dark walls on light ground.
 
-    Light pixels that others join to the edge of the picture are outside; of the rest, the largest
-    connected part is the home, as in the map of a robot. What isn't opaque is outside, too.
+    Light pixels that are connected to the edge of the picture are outside, and so are pixels that
+    aren't opaque. Of the rest, the largest connected part is the home, as in the map of a robot.
 
     Args:
         path: The picture, PNG or PGM.
         resolution: Side of a pixel [m]. The lower left corner of the picture is the origin.
         cell: Side of a grid cell [m]; None for the side of a pixel.
-        threshold: What is darker than this share of white is wall.
+        threshold: Share of white below which a pixel is wall.
         speck_area_m2: Groups of dark pixels smaller than this become free [m²]; see `free_space`.
         ray_width: Free space narrower than this doesn't lead on [m]; see `free_space`.
 
@@ -97,14 +85,14 @@ def read_image(
         FloorPlanError: It can't be read, or no light space is enclosed by dark walls.
     """
     picture = read_grey(path)
-    try:
+    with in_file(path):
         if not 0 < resolution <= MAX_CELL_M:
             raise FloorPlanError(
                 f"resolution is {resolution:g} m per pixel: above 0 and at most {MAX_CELL_M:g} m is"
                 " expected"
             )
         light = _light(picture, threshold)
-        inside = _enclosed(light)
+        inside = _inside(light)
         raw = OccupancyMap(inside[::-1], ~light[::-1], resolution)
         free, notes = free_space(raw, speck_area_m2=speck_area_m2, ray_width=ray_width)
         return FloorPlan.build(
@@ -116,8 +104,6 @@ def read_image(
             source=f"drawing, {path.name}",
             notes=notes,
         )
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
 
 
 def _light(picture: GreyPicture, threshold: float) -> Mask:
@@ -125,14 +111,14 @@ def _light(picture: GreyPicture, threshold: float) -> Mask:
     return light if picture.clear is None else light | picture.clear
 
 
-def _enclosed(light: Mask) -> Mask:
-    """Return the light pixels that no others join to the edge of the picture.
+def _inside(light: Mask) -> Mask:
+    """Return the light pixels that are not connected to the edge of the picture.
 
     Raises:
         FloorPlanError: There are none.
     """
     part = label_parts(np.pad(light, 1, constant_values=True), False)[1:-1, 1:-1]
-    inside: Mask = light & (part != 0)  # the first part is the line round the picture
+    inside: Mask = light & (part != 0)  # the first part is the margin
     if inside.any():
         return inside
     if not light.any():

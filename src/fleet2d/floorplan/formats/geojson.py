@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 from shapely import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.fields import validated
 from fleet2d.floorplan.formats.geojson_file import Feature, Move, Units, in_metres, read_features
-from fleet2d.floorplan.formats.native import read_blocks, read_uses
+from fleet2d.floorplan.formats.native_file import ObjectUse
 from fleet2d.floorplan.names import distinct_names
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
@@ -26,18 +27,18 @@ from fleet2d.floorplan.rooms.passage import (
     shared_borders,
 )
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, UNKNOWN, room_type, usual_type
-from fleet2d.floorplan.source import FloorPlanSource, read_json, read_numbers
+from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
 WALL_M = 0.1
-# How far inside the door one stands that leads outside, and how far off an entrance may be put.
+# Distance of the entrance from a door that leads outside, and how far an entrance may be moved.
 INSIDE_M, ENTRANCE_REACH_M = 0.3, 1.0
-# Side of an object of which the file only has the place.
+# Side of an object that is drawn as a point.
 POINT_OBJECT_M = 0.1
 
 _USES = ("category", "type", "usage", "use", "room", "room_type", "function")
-# IMDF's categories of units, where the vocabulary has another word for them.
+# IMDF's categories of units that have another name in the vocabulary.
 _IMDF_TYPES = {
     "restroom": "toilet",
     "shower": "bathroom",
@@ -53,20 +54,23 @@ _IMDF_TYPES = {
 }
 
 
+_OBJECT_USE = TypeAdapter(ObjectUse)
+
+
 @register("floorplan", "geojson")
 class GeoJson(FloorPlanSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
 
     Attributes:
         path: The plan's GeoJSON file.
-        units: What its coordinates are; auto goes by the file.
+        units: Units of its coordinates; auto determines them from the file.
         wall_m: Thickness of walls drawn as lines, and of those between rooms that touch.
-        level: Which floor, by its id, name or ordinal; None for the one of ordinal 0.
+        level: The floor, by its id, name or ordinal; None for the one of ordinal 0.
     """
 
     path: InputPath = Field(description="the plan's GeoJSON file")
     units: Units = Field(
-        default="auto", description="what its coordinates are; auto goes by the file"
+        default="auto", description="units of its coordinates; auto determines them from the file"
     )
     wall_m: Length = Field(
         default=WALL_M,
@@ -97,22 +101,22 @@ def read_geojson(
 ) -> FloorPlan:
     """Read a GeoJSON floor plan.
 
-    Free are the areas of kind `free`; where there are none, the rooms. Walls are taken away from
-    that. Where neither is in the file, walls stand where rooms touch. Doors lead through walls.
+    Free space is the areas of kind `free` or, if there are none, the rooms, without the walls. A
+    file with neither free areas nor walls gets walls where rooms touch. Doors lead through walls.
 
     Args:
         path: The GeoJSON file, a FeatureCollection.
         cell: Side of a grid cell [m].
-        units: What the coordinates are; auto goes by the file's member `units`, else by how far
-            it extends.
+        units: Units of the coordinates; auto determines them by the file's member `units`, else
+            by its extent.
         wall_m: Thickness of walls that are drawn as lines, and of those where rooms touch [m].
-        level: Which floor, by its id, name or ordinal; None for the one of ordinal 0.
+        level: The floor, by its id, name or ordinal; None for the one of ordinal 0.
 
     Raises:
         FloorPlanError: The file can't be read, isn't such a plan, or has no free space.
     """
     content = read_json(path)
-    try:
+    with in_file(path):
         notes: list[str] = []
         raw = read_features(content, level, notes)
         features, move = in_metres(raw, content, units, notes)
@@ -120,13 +124,11 @@ def read_geojson(
         return _Draft(features, move, wall_m, notes).plan(
             name if isinstance(name, str) and name else path.stem, cell, path.name
         )
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
 
 
 @dataclass
 class _Door:
-    """A doorway of the file: its middle line and what lies there."""
+    """A doorway of the file, and its passage through the wall."""
 
     feature: Feature
     passage: Passage
@@ -138,7 +140,7 @@ class _Door:
 
 
 class _Draft:
-    """A plan on its way from features to what `FloorPlan.build` takes; all in metres."""
+    """Converts features to the arguments of `FloorPlan.build`; all in metres."""
 
     def __init__(
         self, features: Sequence[Feature], move: Move, wall_m: float, notes: list[str]
@@ -174,16 +176,13 @@ class _Draft:
     # --- Free space ----------------------------------------------------------------------------
 
     def _free(self, wall_m: float) -> MultiPolygon:
-        """Return the free space, without the doors that lead through its walls."""
+        """Return the free space between the walls, before doors open these."""
         open_space, walls = _areas(self._of("free")), self._walls(wall_m)
         if open_space.is_empty and not self.rooms:
             raise FloorPlanError(
                 "it has no room and no free space: no feature of kind room or free"
             )
-        if open_space.is_empty:
-            free = self._room_space(walls, wall_m)
-        else:
-            free = open_space
+        free = self._room_space(walls, wall_m) if open_space.is_empty else open_space
         free = _multi(free.difference(walls))
         if free.is_empty:
             raise FloorPlanError("no free space is left: all of it is wall")
@@ -199,7 +198,7 @@ class _Draft:
         return shapely.union_all([*solid, _thick(lines, wall_m)])
 
     def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
-        """Return the rooms, with walls between those that touch, unless the file has those."""
+        """Return the rooms, with walls where they touch unless the file draws these."""
         free, borders = _areas(self._of("room")), shared_borders(self.rooms)
         length = sum(line.length for line in borders)
         near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
@@ -209,7 +208,7 @@ class _Draft:
                 f"rooms touch along {length:.1f} m: there are walls of {wall_m:g} m but for doors"
             )
             return _multi(free.difference(_thick(borders, wall_m)))
-        # A gap that is no wider than drawings are exact isn't meant.
+        # A gap within the precision of drawings is no wall.
         joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
         return _multi(shapely.union_all([free, *joints]))
 
@@ -232,10 +231,10 @@ class _Draft:
                     self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
         self.free = _multi(shapely.union_all([self.free, *cuts]))
 
-    # --- What is in it -------------------------------------------------------------------------
+    # --- Rooms and objects ---------------------------------------------------------------------
 
     def _regions(self, cell: float) -> list[LabelledRegion]:
-        """Return the rooms, and with each its half of the passages through its walls."""
+        """Return the rooms, each with its half of the passages through its walls."""
         halves: list[list[Polygon]] = [[] for _ in self.rooms]
         for door in self.doors if self.rooms else ():
             for half in door.passage.halves:
@@ -243,23 +242,23 @@ class _Draft:
                 overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
                 if max(overlap) < half.area / 2:
                     halves[away.index(min(away))].append(half)
-        given = [room.text("name") for room in self._of("room")]
-        names = distinct_names(given, "rooms", self.notes)
+        own_names = [room.text("name") for room in self._of("room")]
+        names = distinct_names(own_names, "rooms", self.notes)
         regions = []
-        for feature, area, more, name in zip(
+        for feature, area, half_parts, name in zip(
             self._of("room"), self.rooms, halves, names, strict=True
         ):
-            # Walls move to the lattice: a little more, so that no cell at them is in no room.
-            shape = shapely.union_all([area, *more]).buffer(cell / 16, join_style="mitre")
+            # Slightly grown: walls move to the lattice, and every cell at them needs a room.
+            shape = shapely.union_all([area, *half_parts]).buffer(cell / 16, join_style="mitre")
             labels, kind = _use_of(feature)
-            said = feature.properties.get("labels")
-            if isinstance(said, list) and all(isinstance(label, str) for label in said):
-                labels = tuple(said)
+            own_labels = feature.properties.get("labels")
+            if isinstance(own_labels, list) and all(isinstance(x, str) for x in own_labels):
+                labels = tuple(own_labels)
             regions.append(LabelledRegion(labels, _multi(shape), name, kind))
         return regions
 
     def _entrance(self) -> tuple[float, float] | None:
-        """Return the place just inside the front door, if the file tells."""
+        """Return the place just inside the front door, if the file has one."""
         shapes = [feature.shape for feature in self._of("entrance")]
         if shapes:
             if len(shapes) > 1:
@@ -277,11 +276,13 @@ class _Draft:
         return round(float(at.x), 6), round(float(at.y), 6)
 
     def _objects(self) -> list[PlacedObject]:
-        return [thing for feature in self._of("object") for thing in _placed(feature, self.move)]
+        return [
+            thing for feature in self._of("object") for thing in _to_objects(feature, self.move)
+        ]
 
 
 def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
-    """Return a room's labels and its type: by what it is used for, else by its name."""
+    """Return a room's labels and type: by its use in the file, else by its name."""
     use, name = room.text(*_USES) or UNKNOWN, room.text("name")
     kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
     if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:
@@ -289,35 +290,40 @@ def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     return () if kind == UNKNOWN else (use,), kind
 
 
-def _moved(move: Move, x: float, y: float) -> tuple[float, float]:
+def _to_plan(move: Move, x: float, y: float) -> tuple[float, float]:
     """Return a place of the file in the frame of the plan [m]."""
-    there_x, there_y = move(np.array([[x, y]]))[0].tolist()
-    return there_x, there_y
+    plan_x, plan_y = move(np.array([[x, y]]))[0].tolist()
+    return plan_x, plan_y
 
 
-def _placed(feature: Feature, move: Move) -> Iterable[PlacedObject]:
-    shape, properties, where = feature.shape, feature.properties, f"{feature.where}.properties"
+def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
+    shape = feature.shape
     if isinstance(shape, Point):
         half = POINT_OBJECT_M / 2
         shape = shapely.box(shape.x - half, shape.y - half, shape.x + half, shape.y + half)
     kind = feature.text("type", "category", "object") or "object"
-    blocks = read_blocks(properties.get("blocks", "path"), f"{where}.blocks")
-    (heading,) = read_numbers([properties.get("heading") or 0.0], 1, f"{where}.heading")
+    properties = {key: feature.properties.get(key) for key in ObjectUse.model_fields}
+    present = {key: value for key, value in properties.items() if value is not None}
+    use_of = validated(_OBJECT_USE, present, f"{feature.where}.properties")
     uses = []
-    for use in read_uses(properties.get("uses") or [], f"{where}.uses"):
-        x, y = _moved(move, use.x, use.y)
-        approach = None if use.approach is None else _moved(move, *use.approach)
+    for use in use_of.use_places():
+        x, y = _to_plan(move, use.x, use.y)
+        approach = None if use.approach is None else _to_plan(move, *use.approach)
         uses.append(replace(use, x=x, y=y, approach=approach))
     name, parts = feature.text("name") or "", _parts(shape)
     for number, part in enumerate(parts):
-        own = f"{name} {number + 1}" if name and len(parts) > 1 else name
         yield PlacedObject(
-            own, room_type(kind), part, blocks, () if number else tuple(uses), heading
+            f"{name} {number + 1}" if name and len(parts) > 1 else name,
+            room_type(kind),
+            part,
+            use_of.blocks,
+            () if number else tuple(uses),
+            use_of.heading,
         )
 
 
 def _thick(lines: Iterable[BaseGeometry], wall_m: float) -> BaseGeometry:
-    """Return walls of a thickness along lines; square at the ends, so that corners are filled."""
+    """Return walls along lines; square at the ends, so that corners are filled."""
     shapes = [line.buffer(wall_m / 2, cap_style="square", join_style="mitre") for line in lines]
     return shapely.union_all(shapes)
 

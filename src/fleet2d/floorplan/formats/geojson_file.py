@@ -1,7 +1,7 @@
-"""The content of a GeoJSON floor plan: its features in metres, each of a kind that we know.
+"""The content of a GeoJSON floor plan: features of known kinds, in metres.
 
-Two dialects are read, also mixed: our own, where the property `kind` says what a feature is, and
-that of IMDF (Indoor Mapping Data Format), where the member `feature_type` does.
+Two dialects are read, also mixed: our own, which names the kind of a feature by its property
+`kind`, and IMDF (Indoor Mapping Data Format), which names it by its member `feature_type`.
 """
 
 import math
@@ -12,14 +12,15 @@ from typing import Any, Literal
 
 import numpy as np
 import shapely
+import shapely.geometry
 from numpy.typing import NDArray
-from shapely import LineString, MultiLineString, MultiPolygon, Point, Polygon
+from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import POLYGONS
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, clean_coordinate, shown_value
 from fleet2d.floorplan.rooms.vocabulary import room_type
-from fleet2d.floorplan.source import MAX_COORDINATE_M, clean_coordinate, shown_value
 from fleet2d.problems import did_you_mean
 
 COLLECTION = "FeatureCollection"
@@ -29,12 +30,13 @@ Move = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 # WGS 84: half the larger axis [m], and the square of the eccentricity.
 SEMI_MAJOR_M, ECCENTRICITY_2 = 6378137.0, 0.00669437999014
-# A home is at least half a metre wide, and none reaches over a twentieth of a degree (5 km).
+# Least width of a home [m], and largest [degrees], about 5 km.
 SMALLEST_M, LARGEST_DEGREES = 0.5, 0.05
-# Beyond this no coordinate is read at all: UTM's northings reach ten million.
+# The largest coordinate that is read; UTM's northings reach ten million.
 FARTHEST = 1e8
 
 _SURFACES, _LINES = ("Polygon", "MultiPolygon"), ("LineString", "MultiLineString")
+_DEPTHS = {"Point": 0, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
 GEOMETRIES = {
     "room": _SURFACES,
     "free": _SURFACES,
@@ -45,7 +47,7 @@ GEOMETRIES = {
     "wall": (*_LINES, *_SURFACES),
     "entrance": ("Point", "LineString"),
 }
-"""What each kind of feature may be."""
+"""The types of geometry that each kind of feature may have."""
 
 _IMDF_KINDS = {"unit": "room", "opening": "opening", "fixture": "object", "kiosk": "object"}
 _IMDF_SOLID = ("brick", "column", "concrete", "drywall", "glass", "structure", "wall")
@@ -55,13 +57,13 @@ _KIND_WORDS = {"furniture": "object", "no_go_area": "no_go"} | {kind: kind for k
 
 @dataclass(frozen=True)
 class Feature:
-    """A thing in the file.
+    """A feature of the file.
 
     Attributes:
         kind: One of `GEOMETRIES`.
-        where: How a message names its place in the file.
-        shape: Where it is; in the units of the file until `in_metres`.
-        properties: What the file says of it.
+        where: Its place in the file, for messages.
+        shape: Its geometry; in the units of the file until `in_metres`.
+        properties: Its properties in the file.
         level: The floor that it is on, or None.
     """
 
@@ -72,10 +74,10 @@ class Feature:
     level: str | None = None
 
     def text(self, *keys: str) -> str | None:
-        """Return the first of some properties that is a text, in one line; in any language."""
+        """Return the first of some properties that is a text, in one line; English if it has it."""
         for key in keys:
             value = self.properties.get(key)
-            if isinstance(value, dict):  # of IMDF: by language
+            if isinstance(value, dict):  # in IMDF by language
                 texts = [v for v in (value.get("en"), *value.values()) if isinstance(v, str)]
                 value = texts[0] if texts else None
             if isinstance(value, str) and value.strip():
@@ -84,24 +86,24 @@ class Feature:
 
 
 def read_features(content: dict[str, Any], level: str | None, notes: list[str]) -> list[Feature]:
-    """Return the features that a plan is made of, in the units of the file.
+    """Return the features of known kinds on one floor, in the units of the file.
 
     Args:
-        content: The file.
-        level: Which floor, where there are several; None for the one of ordinal 0, or the first.
-        notes: To which is added what is odd.
+        content: The content of the file.
+        level: The floor, if there are several; None for the one of ordinal 0, or the first.
+        notes: Sentences on what is odd are added.
 
     Raises:
         FloorPlanError: It isn't such a file, a feature is damaged, or there is no such floor.
     """
-    found = content.get("features")
-    if content.get("type") != COLLECTION or not isinstance(found, list):
+    items = content.get("features")
+    if content.get("type") != COLLECTION or not isinstance(items, list):
         raise FloorPlanError(f'no GeoJSON plan: "type": "{COLLECTION}" with features is expected')
-    POLYGONS.check(len(found), "it", FloorPlanError)
+    POLYGONS.check(len(items), "it", FloorPlanError)
     features: list[Feature] = []
     floors: list[dict[str, Any]] = []
-    unread: Counter[str] = Counter()
-    for number, item in enumerate(found):
+    ignored: Counter[str] = Counter()
+    for number, item in enumerate(items):
         where = f"features[{number}]"
         if not isinstance(item, dict):
             raise FloorPlanError(f"{where} is {shown_value(item)}: a Feature is expected")
@@ -112,12 +114,12 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
         if name == "level":
             floors.append({**properties, "id": item.get("id")})
         elif kind is None:
-            unread[name] += 1
+            ignored[name] += 1
         else:
             shape = _shape(item.get("geometry"), kind, where, notes)
             features.append(Feature(kind, where, shape, properties, _level(properties)))
-    if unread:
-        names = ", ".join(f"{name} ({count})" for name, count in unread.items())
+    if ignored:
+        names = ", ".join(f"{name} ({count})" for name, count in ignored.items())
         notes.append(f"also in the file, without effect on the plan: {names}")
     return _on_one_floor(features, floors, level, notes)
 
@@ -125,20 +127,20 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
 def in_metres(
     features: Sequence[Feature], content: dict[str, Any], units: Units, notes: list[str]
 ) -> tuple[list[Feature], Move]:
-    """Return the features in metres, and what moves a place of the file there.
+    """Return the features in metres, and the function that moves places of the file there.
 
     Raises:
-        FloorPlanError: Nothing tells whether the file has metres or degrees.
+        FloorPlanError: The units of the file are unclear.
     """
     if not features:
         return [], lambda xy: xy
     bounds = shapely.total_bounds([feature.shape for feature in features])
     units = _units(content, bounds, units)
-    move = _projection(bounds, notes) if units == "degrees" else _nearer(bounds, notes)
+    move = _projection(bounds, notes) if units == "degrees" else _shift(bounds, notes)
     moved = []
     for feature in features:
         shape = shapely.transform(feature.shape, move)
-        if not shape.is_valid:  # rounding may have closed a narrow place
+        if not shape.is_valid:  # rounding may close a narrow place
             shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
         if shape.is_empty:
             notes.append(f"{feature.where}, {feature.kind}, has no extent: ignored")
@@ -151,14 +153,14 @@ def in_metres(
 
 
 def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple[str | None, str]:
-    """Return a feature's kind, or None and what to call it in a note."""
-    own = properties.get("kind")
-    if own is not None:
-        if not isinstance(own, str) or own not in GEOMETRIES:
+    """Return a feature's kind, None for an unknown one, and its name for a note."""
+    kind = properties.get("kind")
+    if kind is not None:
+        if not isinstance(kind, str) or kind not in GEOMETRIES:
             known = ", ".join(GEOMETRIES)
-            hint = did_you_mean(own, GEOMETRIES)
-            raise FloorPlanError(f"{where}: unknown kind {shown_value(own)}{hint} Known: {known}")
-        return own, own
+            hint = did_you_mean(kind, GEOMETRIES)
+            raise FloorPlanError(f"{where}: unknown kind {shown_value(kind)}{hint} Known: {known}")
+        return kind, kind
     imdf = item.get("feature_type", properties.get("feature_type"))
     category = str(properties.get("category")).partition(".")[0]
     if isinstance(imdf, str):
@@ -166,20 +168,20 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
             return "wall", imdf
         if imdf == "unit" and category in _IMDF_NO_FLOOR:
             return None, category
-        if imdf == "opening" and _hung(properties.get("door")):
+        if imdf == "opening" and _has_leaf(properties.get("door")):
             return "door", imdf
         return _IMDF_KINDS.get(imdf), imdf
     for key in ("type", "category"):
-        word = properties.get(key)
-        if isinstance(word, str) and room_type(word) in _KIND_WORDS:
-            return _KIND_WORDS[room_type(word)], word
+        text = properties.get(key)
+        if isinstance(text, str) and room_type(text) in _KIND_WORDS:
+            return _KIND_WORDS[room_type(text)], text
     geometry = item.get("geometry")
     form = geometry.get("type") if isinstance(geometry, dict) else None
     return ("room", "room") if form in _SURFACES else (None, f"{form or 'feature'} without a kind")
 
 
-def _hung(door: object) -> bool:
-    """Whether IMDF says that a door hangs in an opening."""
+def _has_leaf(door: object) -> bool:
+    """Return whether a door hangs in an opening, by its IMDF property."""
     return isinstance(door, dict) and door.get("type") != "open"
 
 
@@ -194,110 +196,93 @@ def _level(properties: dict[str, Any]) -> str | None:
 def _on_one_floor(
     features: list[Feature], floors: list[dict[str, Any]], level: str | None, notes: list[str]
 ) -> list[Feature]:
-    """Return the features of one floor, and those of none."""
-    present = list(dict.fromkeys(f.level for f in features if f.level is not None))
-    called: dict[str, list[str]] = {}
-    for name in present:
+    """Return the features of one floor, and those that name no floor."""
+    levels = list(dict.fromkeys(f.level for f in features if f.level is not None))
+    names_of: dict[str, list[str]] = {}
+    for name in levels:
         floor = next((floor for floor in floors if str(floor.get("id")) == name), {})
-        words = Feature("level", "", Point(), floor)
-        more = (floor.get("ordinal"), words.text("short_name"), words.text("name"))
-        called[name] = [name, *(str(word) for word in more if word is not None)]
+        feature = Feature("level", "", Point(), floor)
+        further = (floor.get("ordinal"), feature.text("short_name"), feature.text("name"))
+        names_of[name] = [name, *(str(word) for word in further if word is not None)]
     if level is None:
-        if len(present) < 2:
+        if len(levels) < 2:
             return features
-        ground = (name for name in present if "0" in called[name])
-        chosen = next(ground, present[0])
+        ground = (name for name in levels if "0" in names_of[name])
+        chosen = next(ground, levels[0])
     else:
-        fitting = [name for name in present if level in called[name]]
-        if not fitting:
-            known = ", ".join(" or ".join(words) for words in called.values()) or "none"
+        matches = [name for name in levels if level in names_of[name]]
+        if not matches:
+            known = ", ".join(" or ".join(names) for names in names_of.values()) or "none"
             raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
-        chosen = fitting[0]
-    others = ", ".join(called[name][-1] for name in present if name != chosen)
+        chosen = matches[0]
+    others = ", ".join(names_of[name][-1] for name in levels if name != chosen)
     if others:
-        notes.append(f"of its levels, {called[chosen][-1]} was taken, and not {others}")
+        notes.append(f"of its levels, {names_of[chosen][-1]} was taken, and not {others}")
     return [feature for feature in features if feature.level in (None, chosen)]
 
 
 # --- Geometries --------------------------------------------------------------------------------
 
 
+def _coordinates(value: object, depth: int, least: int, where: str) -> Any:
+    """Return a position, or nested lists of them.
+
+    Args:
+        value: The coordinates in the file.
+        depth: Levels of lists above positions: 0 for a position itself.
+        least: Number of different positions that a line or ring has.
+        where: Their place in the file, for messages.
+    """
+    if depth == 0:
+        return _position(value, where)
+    if not isinstance(value, list):
+        raise FloorPlanError(f"{where} is {shown_value(value)}: a list is expected")
+    items = [_coordinates(v, depth - 1, least, f"{where}[{k}]") for k, v in enumerate(value)]
+    if depth == 1 and len(set(items)) < least:
+        raise FloorPlanError(
+            f"{where} has {len(set(items))} different points: at least {least} are expected"
+        )
+    if not items:
+        raise FloorPlanError(f"{where} is empty: an outline or a line is expected")
+    return items
+
+
+def _position(value: object, where: str) -> tuple[float, float]:
+    """Return a position; a third number, its height, is ignored."""
+    if not isinstance(value, list) or len(value) < 2:
+        raise FloorPlanError(f"{where} is {shown_value(value)}: a list of 2 numbers is expected")
+    for number in value[:2]:
+        is_number = isinstance(number, int | float) and not isinstance(number, bool)
+        if not is_number or not abs(number) <= FARTHEST:
+            wrong = shown_value(number)
+            raise FloorPlanError(f"{where} is {shown_value(value)}: {wrong} is no coordinate")
+    return clean_coordinate(value[0]), clean_coordinate(value[1])
+
+
 def _shape(geometry: object, kind: str, where: str, notes: list[str]) -> BaseGeometry:
     where = f"{where}.geometry"
     if not isinstance(geometry, dict):
         raise FloorPlanError(f"{where} is {shown_value(geometry)}: a geometry is expected")
-    form, places = geometry.get("type"), geometry.get("coordinates")
+    form = geometry.get("type")
     if form not in GEOMETRIES[kind]:
         known = ", ".join(GEOMETRIES[kind])
         raise FloorPlanError(f"{where} of a {kind} is {shown_value(form)}: {known} is expected")
     where = f"{where}.coordinates"
-    if form == "Point":
-        return Point(_place(places, where))
-    if form == "LineString":
-        return _line(places, where)
-    if form == "MultiLineString":
-        return MultiLineString([_line(p, w) for p, w in _listed(places, where)])
-    if form == "Polygon":
-        return _sound(_polygon(places, where), where, notes)
-    return _sound(MultiPolygon([_polygon(p, w) for p, w in _listed(places, where)]), where, notes)
-
-
-def _polygon(value: object, where: str) -> Polygon:
-    rings = [_ring(ring, place) for ring, place in _listed(value, where)]
-    if not rings:
-        raise FloorPlanError(f"{where} is empty: a polygon has an outline")
-    return Polygon(rings[0], rings[1:])
-
-
-def _ring(value: object, where: str) -> list[tuple[float, float]]:
-    places = [_place(place, at) for place, at in _listed(value, where)]
-    if len(set(places)) < 3:
-        raise FloorPlanError(
-            f"{where} has {len(set(places))} different points: an outline has at least 3"
-        )
-    return places
-
-
-def _line(value: object, where: str) -> LineString:
-    places = [_place(place, at) for place, at in _listed(value, where)]
-    if len(set(places)) < 2:
-        raise FloorPlanError(f"{where} has {len(set(places))} different points: a line has 2")
-    return LineString(places)
-
-
-def _place(value: object, where: str) -> tuple[float, float]:
-    """Return a position; the height that may follow is not read."""
-    if not isinstance(value, list) or len(value) < 2:
-        raise FloorPlanError(f"{where} is {shown_value(value)}: a list of 2 numbers is expected")
-    for number in value[:2]:
-        sensible = isinstance(number, int | float) and not isinstance(number, bool)
-        if not sensible or not abs(number) <= FARTHEST:
-            found = shown_value(number)
-            raise FloorPlanError(f"{where} is {shown_value(value)}: {found} is no coordinate")
-    return clean_coordinate(value[0]), clean_coordinate(value[1])
-
-
-def _listed(value: object, where: str) -> list[tuple[object, str]]:
-    if not isinstance(value, list):
-        raise FloorPlanError(f"{where} is {shown_value(value)}: a list is expected")
-    return [(item, f"{where}[{number}]") for number, item in enumerate(value)]
-
-
-def _sound(shape: Polygon | MultiPolygon, where: str, notes: list[str]) -> BaseGeometry:
-    """Return an area; one that touches or crosses itself is all that it goes round."""
-    if shape.is_valid:
+    least = 3 if form in _SURFACES else 2
+    coordinates = _coordinates(geometry.get("coordinates"), _DEPTHS[form], least, where)
+    shape: BaseGeometry = shapely.geometry.shape({"type": form, "coordinates": coordinates})
+    if shape.is_valid or form not in _SURFACES:
         return shape
     at = shapely.is_valid_reason(shape).rpartition("[")[2].rstrip("]").replace(" ", ", ")
-    repaired = shapely.make_valid(shape, method="structure", keep_collapsed=False)
     notes.append(f"{where} touches or crosses itself at ({at}): all that it goes round was taken")
-    return repaired
+    return shapely.make_valid(shape, method="structure", keep_collapsed=False)
 
 
 # --- Units -------------------------------------------------------------------------------------
 
 
 def _units(content: dict[str, Any], bounds: NDArray[np.float64], units: Units) -> Units:
-    """Tell metres from degrees: by the setting, the file's word, its kind, or its extent."""
+    """Return the units: of the setting, else those that the file declares, else by its extent."""
     declared = content.get("units", "auto") if units == "auto" else units
     if declared not in ("auto", "m", "degrees"):
         raise FloorPlanError(f"units is {shown_value(declared)}: m, degrees or auto is expected")
@@ -319,7 +304,7 @@ def _units(content: dict[str, Any], bounds: NDArray[np.float64], units: Units) -
 
 
 def _projection(bounds: NDArray[np.float64], notes: list[str]) -> Move:
-    """Return what moves longitude and latitude to metres east and north of their centre.
+    """Return the function from longitude and latitude to metres east and north of their centre.
 
     The plane touches the ellipsoid in the centre: over 1 km the error is below 0.1 m.
     """
@@ -337,8 +322,8 @@ def _projection(bounds: NDArray[np.float64], notes: list[str]) -> Move:
     return lambda xy: np.round((xy - centre) * scale, 3)
 
 
-def _nearer(bounds: NDArray[np.float64], notes: list[str]) -> Move:
-    """Return what brings far metres, such as UTM's, near the origin."""
+def _shift(bounds: NDArray[np.float64], notes: list[str]) -> Move:
+    """Return the function that moves far coordinates, such as UTM's, near the origin."""
     if np.abs(bounds).max() <= MAX_COORDINATE_M / 10:
         return lambda xy: xy
     corner = np.floor(bounds[:2])

@@ -1,17 +1,33 @@
 """Floor plans of the HouseExpo data set: one outline and boxes with a room category each."""
 
 from pathlib import Path
+from typing import Annotated
 
 import shapely
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from shapely import Polygon
 from shapely.geometry import MultiPolygon
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.fields import Box, Listed, Point, Ring, list_of, validated
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.source import FloorPlanSource, read_json, read_numbers, read_ring
+from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
 from fleet2d.paths import InputPath
+
+
+class _HouseFile(BaseModel):
+    """The keys of a HouseExpo file that are read; the outline and boxes by category [m]."""
+
+    model_config = ConfigDict(defer_build=True)
+
+    verts: Ring
+    room_category: dict[str, Annotated[Listed[Box], list_of("boxes [x0, y0, x1, y1]")]] | None = (
+        None
+    )
+
+
+_HOUSE_FILE = TypeAdapter(_HouseFile)
 
 
 @register("floorplan", "houseexpo", aliases=("he",))
@@ -32,9 +48,9 @@ class HouseExpo(FloorPlanSource):
 def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
     """Read a HouseExpo file.
 
-    Its `verts` are one outline that traces the inner walls too. Its `room_category` boxes overlap
-    each other and the walls, repeat under two names, and may be missing: see `assign_rooms` for
-    what comes of them.
+    Its `verts` are one outline that traces the inner walls, too. Its `room_category` boxes overlap
+    each other and the walls, repeat under two names, and may be missing; `label_rooms` divides the
+    rooms by them.
 
     Args:
         path: The JSON file.
@@ -48,9 +64,10 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
         hint = " (it is in Fleet2D's own format: use type native)" if "format" in content else ""
         raise FloorPlanError(f"{path} is no HouseExpo plan: it has no key `verts`{hint}")
     name = content.get("id")
-    try:
-        free, notes = _free_space(content["verts"])
-        regions, box_notes = _regions(content.get("room_category"))
+    with in_file(path):
+        house = validated(_HOUSE_FILE, content)
+        free, notes = _free_space(house.verts)
+        regions, box_notes = _regions(house.room_category or {})
         return FloorPlan.build(
             name if isinstance(name, str) and name else path.stem,
             free,
@@ -61,18 +78,16 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
             regions_are="boxes",
             notes=[*notes, *box_notes],
         )
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
 
 
-def _free_space(verts: object) -> tuple[Polygon | MultiPolygon, list[str]]:
-    """Return what the outline encloses [m], and a sentence if that took a decision."""
-    outline = Polygon(read_ring(verts, "verts"))
+def _free_space(corners: list[Point]) -> tuple[Polygon | MultiPolygon, list[str]]:
+    """Return the space that the outline encloses [m], and a note if it had to be repaired."""
+    outline = Polygon(corners)
     if outline.is_valid:
         return outline, []
-    # Traced outlines touch themselves where a passage is no wider than a pixel, and at times cross.
-    # Inside is what they go round at all ("structure" is nonzero winding): where a loop runs over
-    # itself stays free, while even-odd would raise a wall in the middle of the room.
+    # Traced outlines touch themselves where a passage is no wider than a pixel, and may cross. All
+    # that they go round is inside ("structure" is nonzero winding): even-odd would put a wall into
+    # the room where a loop overlaps itself.
     repaired = shapely.make_valid(outline, method="structure", keep_collapsed=False)
     at = shapely.is_valid_reason(outline).rpartition("[")[2].rstrip("]").replace(" ", ", ")
     parts = [part for part in shapely.get_parts(repaired) if part.geom_type == "Polygon"]
@@ -80,25 +95,16 @@ def _free_space(verts: object) -> tuple[Polygon | MultiPolygon, list[str]]:
     return MultiPolygon(parts), [note]
 
 
-def _regions(categories: object) -> tuple[list[LabelledRegion], list[str]]:
-    """Return the labelled boxes in file order, and a sentence for each that was the wrong way."""
-    if categories is None:
-        return [], []
-    if not isinstance(categories, dict):
-        raise FloorPlanError("room_category is not an object of category names and their boxes")
+def _regions(categories: dict[str, list[Box]]) -> tuple[list[LabelledRegion], list[str]]:
+    """Return the labelled boxes in file order, and a note for each with swapped corners."""
     regions: list[LabelledRegion] = []
     notes: list[str] = []
     for category, boxes in categories.items():
-        if not isinstance(boxes, list):
-            raise FloorPlanError(
-                f"room_category.{category} is not a list of boxes [x0, y0, x1, y1]"
-            )
-        for number, box in enumerate(boxes):
-            where = f"room_category.{category}[{number}]"
-            x0, y0, x1, y1 = read_numbers(box, 4, where)
+        for number, (x0, y0, x1, y1) in enumerate(boxes):
             if x1 < x0 or y1 < y0:
                 notes.append(
-                    f"{where} runs from its high to its low corner: taken the right way round"
+                    f"room_category.{category}[{number}] runs from its high to its low corner:"
+                    " taken the right way round"
                 )
             shape = shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
             regions.append(LabelledRegion((category,), shape))

@@ -1,4 +1,4 @@
-"""From an occupancy map to free space: clean the pixels, then follow their sides."""
+"""Turn an occupancy map into free space: clean the pixels, then trace their sides."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,22 +6,54 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import count_steps, label_parts, trace_rings
+from fleet2d.units import Length
 
 Mask = NDArray[np.bool_]
 Parts = NDArray[np.int32]
 
-# Rounding of decimal lengths to pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
+SPECK_AREA_M2 = 0.02
+RAY_WIDTH_M = 0.3
+# Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
 TINY = 1e-9
+
+
+class OccupancySource(PixelSource):
+    """A source of a floor plan made of free, occupied and unknown pixels; see `free_space`.
+
+    Attributes:
+        speck_area_m2: Groups of pixels smaller than this with free ones all round, such as the legs
+            of a chair or lettering, become free; 0 keeps all.
+        ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
+            and gaps in walls; 0 keeps all that is connected.
+    """
+
+    speck_area_m2: float = Field(
+        default=SPECK_AREA_M2,
+        ge=0,
+        description="smaller groups of pixels with free ones all round become free; 0 keeps all",
+    )
+    ray_width: Length = Field(
+        default=RAY_WIDTH_M,
+        ge=0,
+        description="free space narrower than this doesn't lead on; 0 keeps all that is connected",
+    )
+
+    @property
+    def cleaning(self) -> dict[str, float]:
+        """The settings of `free_space`, by parameter."""
+        return {"speck_area_m2": self.speck_area_m2, "ray_width": self.ray_width}
 
 
 @dataclass(frozen=True)
 class OccupancyMap:
-    """What a robot knows of a floor, pixel by pixel; what is in neither mask is unknown.
+    """A robot's map of a floor in pixels; pixels in neither mask are unknown.
 
     Attributes:
         free: Pixels known to be free, bool (rows, columns), the first row at the bottom.
@@ -38,20 +70,20 @@ class OccupancyMap:
     turn: tuple[float, float] = (1.0, 0.0)
 
     def to_metres(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return places (…, 2) [m] that are given as (column, row), from the lower left corner."""
+        """Return places (column, row) from the lower left corner in metres (…, 2)."""
         cosine, sine = self.turn
         x, y = xy[..., 0] * self.pixel, xy[..., 1] * self.pixel
         turned = np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=-1)
         places: NDArray[np.float64] = turned + np.array(self.origin)
         return places
 
-    def cropped(self) -> "OccupancyMap":
-        """Return the part round the free pixels, with a pixel to spare where the map has one."""
+    def crop(self) -> "OccupancyMap":
+        """Return the part around the free pixels, with a margin of one pixel if the map has it."""
         rows, columns = (np.flatnonzero(self.free.any(axis=axis)) for axis in (1, 0))
         low = (max(int(columns[0]) - 1, 0), max(int(rows[0]) - 1, 0))
         window = (slice(low[1], int(rows[-1]) + 2), slice(low[0], int(columns[-1]) + 2))
         x, y = self.to_metres(np.array(low, np.float64)).tolist()
-        # In one memory order, whatever the maker's: the kernels are compiled for that.
+        # The kernels are compiled for this memory order.
         free, occupied = (np.ascontiguousarray(m[window]) for m in (self.free, self.occupied))
         return replace(self, free=free, occupied=occupied, origin=(x, y))
 
@@ -59,17 +91,17 @@ class OccupancyMap:
 def free_space(
     raw: OccupancyMap, *, speck_area_m2: float, ray_width: float
 ) -> tuple[Polygon, list[str]]:
-    """Take the one home out of an occupancy map, and leave out noise, specks and rays.
+    """Return the home in an occupancy map, without noise, specks and rays.
 
-    1. A group of pixels that are not free, surrounded by free ones and smaller in all than
+    1. A group of pixels that are not free, surrounded by free ones and smaller than
        `speck_area_m2`, becomes free.
-    2. Space through which no disc of `ray_width` passes separates: of what a disc reaches, the
-       largest connected part is the home.
-    3. Around it, narrower space belongs to the home if all of it is within `ray_width` of where
-       the disc reaches; if it leads further, only what is within half of that does.
+    2. Of the space that a disc of diameter `ray_width` reaches, the largest connected part is the
+       home.
+    3. Narrower space around it belongs to the home if all of it is within `ray_width` of the space
+       that the disc reaches; if it leads further, only the part within half of that.
 
-    Everything else is wall. The disc is a number of whole pixels across, and odd, so that all
-    sides are treated alike: `ray_width` is rounded down to that.
+    Everything else is wall. The diameter of the disc is an odd number of pixels, so that all sides
+    are treated alike: `ray_width` is rounded down to that.
 
     Args:
         raw: The map.
@@ -77,14 +109,14 @@ def free_space(
         ray_width: Diameter of the disc [m]; up to a pixel cuts nothing that is connected.
 
     Returns:
-        The free space [m], every wall on the sides of pixels, and a sentence for each thing done.
+        The free space [m], with all walls on sides of pixels, and a note for each change.
 
     Raises:
         FloorPlanError: No space is free, or none is wide enough.
     """
     if not raw.free.any():
         raise FloorPlanError("no pixel is free: check negate, free_thresh and occupied_thresh")
-    raw = raw.cropped()
+    raw = raw.crop()
     specks, notes = _specks(raw, speck_area_m2)
     free = raw.free | specks
     home = _home(free, raw.pixel, ray_width)
@@ -114,12 +146,12 @@ def outline(free: Mask) -> Polygon:
 
 
 def _specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Mask, list[str]]:
-    """Return the pixels of small groups that only free ones surround."""
-    # One line of unknown round the map: what reaches its edge is surrounded by nothing.
+    """Return the pixels of small groups that are surrounded by free ones, and a note."""
+    # A margin around the map joins all groups that reach its edge.
     part = label_parts(~np.pad(raw.free, 1), True)[1:-1, 1:-1]
     sizes = np.bincount(part[~raw.free], minlength=1)
     small = (sizes > 0) & (sizes * raw.pixel**2 < speck_area_m2 - TINY)
-    small[0] = False  # the part of the surrounding line, which comes first
+    small[0] = False  # the part of the margin, which comes first
     area = float(sizes[small].sum()) * raw.pixel**2
     specks: Mask = ~raw.free & small[part]
     if not small.any():
@@ -153,33 +185,33 @@ def _home(free: Mask, pixel: float, ray_width: float) -> Mask:
 
 
 def _left_out(raw: OccupancyMap, free: Mask, home: Mask, ray_width: float) -> list[str]:
-    """Say what free space isn't the home's: what is narrow and hangs on, and what is apart."""
+    """Return notes on free space outside the home: joined by narrow passages, or not at all."""
     notes = []
     joined = count_steps(home, free) >= 0
-    for where, how in (
+    for mask, reason in (
         (joined & ~home, f"only passages narrower than {ray_width:g} m join"),
         (free & ~joined, "nothing joins"),
     ):
-        if where.any():
-            part = label_parts(where, False)
-            sizes = np.bincount(part[where])
+        if mask.any():
+            part = label_parts(mask, False)
+            sizes = np.bincount(part[mask])
             largest = part == np.argmax(sizes)
             middle = np.argwhere(largest)[:, ::-1].mean(axis=0) + 0.5
             x, y = raw.to_metres(middle).tolist()
             area, most = (float(n) * raw.pixel**2 for n in (sizes.sum(), sizes.max()))
             notes.append(
-                f"left out: {area:.2f} m2 of free space, in pieces: {len(sizes)}, that {how} to the"
-                f" rest; the largest, {most:.2f} m2, is round ({x:.2f}, {y:.2f}) m"
+                f"left out: {area:.2f} m2 of free space, in pieces: {len(sizes)}, that {reason} to"
+                f" the rest; the largest, {most:.2f} m2, is round ({x:.2f}, {y:.2f}) m"
             )
     return notes
 
 
 def _open_border(raw: OccupancyMap, home: Mask) -> list[str]:
-    """Say how much of the outline is no obstacle in the map, but where its knowledge ends."""
+    """Return notes on the parts of the outline where the map ends without an obstacle."""
     notes = []
     inside, unknown = np.pad(home, 1), np.pad(~raw.free & ~raw.occupied, 1)
-    around = [np.roll(unknown, shift, axis) for axis in (0, 1) for shift in (1, -1)]
-    sides = sum(int(np.count_nonzero(inside & beside)) for beside in around)
+    neighbors = [np.roll(unknown, shift, axis) for axis in (0, 1) for shift in (1, -1)]
+    sides = sum(int(np.count_nonzero(inside & beside)) for beside in neighbors)
     if sides:
         notes.append(
             f"{sides * raw.pixel:.2f} m of the walls are where free space meets unknown, without an"

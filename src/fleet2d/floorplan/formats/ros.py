@@ -14,18 +14,22 @@ from shapely import Polygon
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.occupancy import OccupancyMap, free_space
+from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, shown_value
+from fleet2d.floorplan.formats.occupancy import (
+    RAY_WIDTH_M,
+    SPECK_AREA_M2,
+    OccupancyMap,
+    OccupancySource,
+    free_space,
+)
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import MAX_COORDINATE_M, PixelSource, read_yaml, shown_value
+from fleet2d.floorplan.source import in_file, read_yaml
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
-SPECK_AREA_M2 = 0.02
-RAY_WIDTH_M = 0.3
-
-# The grey that map savers write for unknown, and above which free_thresh it would be free.
+# The grey that map savers write for unknown; above this free_thresh it would count as free.
 UNKNOWN_GREY = 205 / 255
 MAX_RESOLUTION_M = MAX_CELL_M
 
@@ -40,30 +44,16 @@ _KEYS = {
 
 
 @register("floorplan", "ros")
-class Ros(PixelSource):
+class Ros(OccupancySource):
     """A map of the ROS map_server.
 
     Attributes:
         path: The map's YAML file; it names the image.
-        speck_area_m2: Groups of pixels smaller than this with free space all round, such as the
-            legs of a chair, become free; 0 keeps all.
-        ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
-            and gaps in walls; 0 keeps all that is connected.
         simplify: How far straightened walls may be from the sides of the map's pixels; 0 keeps
             the walls exact.
     """
 
     path: InputPath = Field(description="the map's YAML file; it names the image")
-    speck_area_m2: float = Field(
-        default=SPECK_AREA_M2,
-        ge=0,
-        description="smaller groups of pixels with free space all round become free; 0 keeps all",
-    )
-    ray_width: Length = Field(
-        default=RAY_WIDTH_M,
-        ge=0,
-        description="free space narrower than this doesn't lead on; 0 keeps all that is connected",
-    )
     simplify: Length = Field(
         default=0.0,
         ge=0,
@@ -82,13 +72,7 @@ class Ros(PixelSource):
 
     def load(self) -> FloorPlan:
         """Read the map."""
-        return read_ros(
-            self.path,
-            self.cell,
-            speck_area_m2=self.speck_area_m2,
-            ray_width=self.ray_width,
-            simplify=self.simplify,
-        )
+        return read_ros(self.path, self.cell, simplify=self.simplify, **self.cleaning)
 
 
 def read_ros(
@@ -112,14 +96,14 @@ def read_ros(
         FloorPlanError: A file can't be read, isn't such a map, or has no free space.
     """
     content = read_yaml(path)
-    try:
+    with in_file(path):
         settings = _settings(content)
         file, notes = _image_file(settings.image, path)
         raw = _occupancy(settings, read_grey(file), notes)
         free, done = free_space(raw, speck_area_m2=speck_area_m2, ray_width=ray_width)
         notes += done
         if simplify > 0:
-            free = _simplified(free, simplify, notes)
+            free = _simplify(free, simplify, notes)
         return FloorPlan.build(
             path.stem,
             free,
@@ -129,8 +113,6 @@ def read_ros(
             regions_are="none",
             notes=notes,
         )
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
 
 
 # --- The YAML file -----------------------------------------------------------------------------
@@ -138,7 +120,7 @@ def read_ros(
 
 @dataclass(frozen=True)
 class _MapSettings:
-    """What the YAML file says; lengths in metres, the angle in radians."""
+    """The settings in the YAML file; lengths in metres, the angle in radians."""
 
     image: str
     resolution: float
@@ -190,7 +172,7 @@ def _settings(content: dict[str, Any]) -> _MapSettings:
 
 
 def _number(value: object, key: str) -> float:
-    """Return a finite number; YAML takes 5e-2, which people write, for text."""
+    """Return a finite number; also from a text like 5e-2, which YAML doesn't read as a number."""
     try:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError
@@ -223,11 +205,11 @@ def _origin(value: object) -> tuple[float, float, float]:
 
 
 def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
-    """Find the image, and say so if it isn't where the YAML file says."""
+    """Return the image's file, and a note if it isn't where the YAML file says."""
     file = path.parent / image
     if _is_file(file):
         return file, []
-    # Maps move to other computers, and absolute paths in them don't.
+    # A map that was copied from another computer may name its image by an absolute path.
     beside = path.parent / image.replace("\\", "/").rpartition("/")[2]
     if _is_file(beside):
         return beside, [f"there is no image {image}: {beside.name} beside {path.name} was taken"]
@@ -245,14 +227,14 @@ def _is_file(path: Path) -> bool:
 
 
 def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -> OccupancyMap:
-    """Tell free, occupied and unknown pixels apart as map_server does."""
+    """Divide pixels into free, occupied and unknown ones as map_server does."""
     shades = np.arange(picture.white + 1) / picture.white
     chance = shades if settings.negate else 1 - shades
-    if settings.raw:  # percent; what is above 100 is unknown, and neither free nor occupied
+    if settings.raw:  # percent; values above 100 are unknown
         percent = np.rint(shades * 255)
         chance = np.where(percent <= 100, percent / 100, np.nan)
-    occupied = _chosen(chance > settings.occupied_thresh, picture)
-    free = _chosen(chance < settings.free_thresh, picture)
+    occupied = _opaque(chance > settings.occupied_thresh, picture)
+    free = _opaque(chance < settings.free_thresh, picture)
     grey = round(UNKNOWN_GREY * picture.white)
     if not settings.negate and chance[grey] < settings.free_thresh and picture.white >= 255:
         pixels = int(np.count_nonzero(picture.values == grey))
@@ -262,19 +244,19 @@ def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -
                 " savers write for unknown count as free; 0.196 makes them unknown"
             )
     x, y, yaw = settings.origin
-    # Rounded, so that the last bit of a machine's cosine doesn't matter, and quarter turns are.
+    # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
     turn = (round(math.cos(yaw), 12), round(math.sin(yaw), 12))
     return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn)
 
 
-def _chosen(shades: NDArray[np.bool_], picture: GreyPicture) -> NDArray[np.bool_]:
-    """Return the opaque pixels of some shades."""
-    opaque: NDArray[np.bool_] = shades[picture.values]
-    return opaque if picture.clear is None else opaque & ~picture.clear
+def _opaque(shades: NDArray[np.bool_], picture: GreyPicture) -> NDArray[np.bool_]:
+    """Return the opaque pixels of some shades, bool (rows, columns)."""
+    pixels: NDArray[np.bool_] = shades[picture.values]
+    return pixels if picture.clear is None else pixels & ~picture.clear
 
 
-def _simplified(free: Polygon, tolerance: float, notes: list[str]) -> Polygon:
-    """Return the polygon with fewer corners, if that leaves a sound one."""
+def _simplify(free: Polygon, tolerance: float, notes: list[str]) -> Polygon:
+    """Return the polygon with fewer corners, if it stays valid."""
     simple: Polygon = shapely.simplify(free, tolerance, preserve_topology=True)
     if simple.is_empty or not simple.is_valid:
         notes.append(f"walls are exact: straightening them within {tolerance:g} m would cross them")

@@ -23,10 +23,10 @@ from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.formats.valetudo_file import (
-    Box,
-    Layer,
     Mask,
-    checked_map,
+    PixelBox,
+    PixelLayer,
+    check_map,
     entities_of,
     note_size,
     objects_in,
@@ -39,7 +39,7 @@ from fleet2d.floorplan.names import distinct_names
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, usual_type
-from fleet2d.floorplan.source import PixelSource, read_json
+from fleet2d.floorplan.source import PixelSource, in_file, read_json
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
 from fleet2d.paths import InputPath
@@ -75,7 +75,7 @@ class Valetudo(PixelSource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the side of the map's pixels."""
-        return pixel_side(checked_map(read_json(settings["path"])))
+        return pixel_side(check_map(read_json(settings["path"])))
 
     def load(self) -> FloorPlan:
         """Read the map."""
@@ -98,12 +98,12 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
         FloorPlanError: The file can't be read, isn't such a map, or has no floor.
     """
     content = read_json(path)
-    try:
-        content = checked_map(content)
+    with in_file(path):
+        content = check_map(content)
         pixel_m = pixel_side(content)
         notes: list[str] = []
         layers = read_layers(content, notes)
-        box = Box.around(np.concatenate([layer.runs for layer in layers]))
+        box = PixelBox.around(np.concatenate([layer.runs for layer in layers]))
         note_size(content, box, notes)
         free = _free_pixels(layers, box, notes)
         areas = _no_go_areas(content, free, box, no_go, notes)
@@ -123,8 +123,6 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
             no_go=areas,
             notes=notes,
         )
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
 
 
 def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
@@ -138,13 +136,10 @@ def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
         FloorPlanError: The file can't be read, or isn't such a map.
     """
     content = read_json(path)
-    try:
+    with in_file(path):
         pieces = [
-            read_points(entity, where)
-            for entity, where in entities_of(checked_map(content), "path")
+            read_points(entity, where) for entity, where in entities_of(check_map(content), "path")
         ]
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
     return [piece for piece in pieces if len(piece)]
 
 
@@ -164,28 +159,26 @@ def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
         FloorPlanError: The file can't be read, or isn't such a map.
     """
     content = read_json(path)
-    try:
-        return read_charger(checked_map(content))
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
+    with in_file(path):
+        return read_charger(check_map(content))
 
 
 # --- Free space and rooms ----------------------------------------------------------------------
 
 
-def _free_pixels(layers: list[Layer], box: Box, notes: list[str]) -> Mask:
+def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> Mask:
     """Return which pixels are floor and not wall, bool (rows, columns)."""
     segments_at = np.zeros((box.rows, box.columns), np.uint16)
     floor, wall = (np.zeros(segments_at.shape, np.bool_) for _ in range(2))
     for layer in layers:
-        part = Box.around(layer.runs)
+        part = PixelBox.around(layer.runs)
         window = box.window(part)
         if layer.kind == "wall":
-            wall[window] |= part.painted(layer.runs)
+            wall[window] |= part.paint(layer.runs)
         else:
-            floor[window] |= part.painted(layer.runs)
+            floor[window] |= part.paint(layer.runs)
         if layer.kind == "segment":
-            segments_at[window] += part.painted(layer.runs)
+            segments_at[window] += part.paint(layer.runs)
     for both, what in (
         (floor & wall, "floor and wall: they are taken for wall"),
         (segments_at > 1, "in several segments: they belong to the smallest of those"),
@@ -195,7 +188,7 @@ def _free_pixels(layers: list[Layer], box: Box, notes: list[str]) -> Mask:
     return floor & ~wall
 
 
-def _in_metres(mask: Mask, box: Box, pixel_m: float) -> MultiPolygon:
+def _in_metres(mask: Mask, box: PixelBox, pixel_m: float) -> MultiPolygon:
     """Return the exact outlines of pixels [m]."""
     part = label_parts(mask, False)
     if part.max(initial=-1) >= MAX_PARTS:
@@ -217,14 +210,14 @@ def _in_metres(mask: Mask, box: Box, pixel_m: float) -> MultiPolygon:
     return shapely.transform(MultiPolygon(polygons), lambda xy: xy * pixel_m)
 
 
-def _regions(layers: list[Layer], pixel_m: float, notes: list[str]) -> list[LabelledRegion]:
+def _regions(layers: list[PixelLayer], pixel_m: float, notes: list[str]) -> list[LabelledRegion]:
     """Return the segments in the file's order, each under a name of its own."""
     regions: list[LabelledRegion] = []
     segments = [layer for layer in layers if layer.kind == "segment"]
     names = distinct_names([segment.name for segment in segments], "segments", notes)
     for layer, name in zip(segments, names, strict=True):
-        box = Box.around(layer.runs)
-        shape = _in_metres(box.painted(layer.runs), box, pixel_m)
+        box = PixelBox.around(layer.runs)
+        shape = _in_metres(box.paint(layer.runs), box, pixel_m)
         kind = usual_type(layer.name) if layer.named else UNKNOWN
         regions.append(LabelledRegion((layer.name,), shape, name, kind))
     return regions
@@ -234,7 +227,7 @@ def _regions(layers: list[Layer], pixel_m: float, notes: list[str]) -> list[Labe
 
 
 def _no_go_areas(
-    content: dict[str, Any], free: Mask, box: Box, no_go: NoGo, notes: list[str]
+    content: dict[str, Any], free: Mask, box: PixelBox, no_go: NoGo, notes: list[str]
 ) -> list[Polygon]:
     """Return the areas that robots keep out of [m]; those that are walls leave the free pixels."""
     pixel_m = pixel_side(content)
@@ -279,7 +272,7 @@ def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
     return [part for part in shapely.get_parts(metres).tolist() if part.geom_type == "Polygon"]
 
 
-def _take_out(shape: BaseGeometry, free: Mask, box: Box) -> None:
+def _take_out(shape: BaseGeometry, free: Mask, box: PixelBox) -> None:
     """Take out of the free pixels those that a shape [pixels] reaches into."""
     shape = shape.buffer(-TINY, join_style="mitre")
     x0, y0, x1, y1 = shape.bounds
@@ -293,7 +286,7 @@ def _take_out(shape: BaseGeometry, free: Mask, box: Box) -> None:
         free[row, columns] = ~shapely.intersects(shape, pixels)
 
 
-def _charger(content: dict[str, Any], free: Mask, box: Box) -> list[PlacedObject]:
+def _charger(content: dict[str, Any], free: Mask, box: PixelBox) -> list[PlacedObject]:
     """Return the vacuum's charger, and where one stands in front of it."""
     at = read_charger(content)
     if at is None:

@@ -7,13 +7,19 @@ of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.source import MAX_COORDINATE_M, shown_value
+from fleet2d.floorplan.formats.fields import (
+    MAX_COORDINATE_M,
+    Listed,
+    shown_value,
+    validated,
+)
 
 MAP_CLASS = "ValetudoMap"
 VERSION = 2
@@ -28,8 +34,16 @@ CM_PER_M = 100
 Mask = NDArray[np.bool_]
 
 
+_LIMIT_CM = MAX_COORDINATE_M * CM_PER_M
+_OBJECTS = TypeAdapter(Listed[dict[str, Any]])
+_PIXELS = TypeAdapter(
+    Listed[Annotated[int, Field(strict=True, ge=-MAX_PIXEL_NUMBER, le=MAX_PIXEL_NUMBER)]]
+)
+_POINTS = TypeAdapter(Listed[Annotated[float, Field(strict=True, ge=-_LIMIT_CM, le=_LIMIT_CM)]])
+
+
 @dataclass(frozen=True)
-class Layer:
+class PixelLayer:
     """Pixels of one kind.
 
     Attributes:
@@ -47,7 +61,7 @@ class Layer:
 
 
 @dataclass(frozen=True)
-class Box:
+class PixelBox:
     """A window of pixels: its lowest column and row, and how many of them it has."""
 
     column: int
@@ -56,7 +70,7 @@ class Box:
     rows: int
 
     @classmethod
-    def around(cls, runs: NDArray[np.int64]) -> "Box":
+    def around(cls, runs: NDArray[np.int64]) -> "PixelBox":
         """Return the smallest box that holds all runs.
 
         Raises:
@@ -71,12 +85,12 @@ class Box:
             )
         return box
 
-    def window(self, part: "Box") -> tuple[slice, slice]:
+    def window(self, part: "PixelBox") -> tuple[slice, slice]:
         """Return where `part` lies in an array over this box."""
         row, column = part.row - self.row, part.column - self.column
         return slice(row, row + part.rows), slice(column, column + part.columns)
 
-    def painted(self, runs: NDArray[np.int64]) -> Mask:
+    def paint(self, runs: NDArray[np.int64]) -> Mask:
         """Return which pixels the runs cover, bool (rows, columns), the first row at the bottom."""
         steps = np.zeros((self.rows, self.columns + 1), np.int32)
         row, column = runs[:, 1] - self.row, runs[:, 0] - self.column
@@ -86,7 +100,7 @@ class Box:
         return mask
 
 
-def checked_map(content: dict[str, Any]) -> dict[str, Any]:
+def check_map(content: dict[str, Any]) -> dict[str, Any]:
     """Return the content if it is a map of the version that we read."""
     if content.get("__class") != MAP_CLASS:
         raise FloorPlanError(f'no Valetudo map: "__class" is not "{MAP_CLASS}"')
@@ -119,7 +133,7 @@ def pixel_side(content: dict[str, Any]) -> float:
     return size / CM_PER_M
 
 
-def note_size(content: dict[str, Any], box: Box, notes: list[str]) -> None:
+def note_size(content: dict[str, Any], box: PixelBox, notes: list[str]) -> None:
     """Say if the pixels in `box` go beyond the size that the map states [cm]."""
     size = content.get("size")
     if size is None:
@@ -137,19 +151,14 @@ def note_size(content: dict[str, Any], box: Box, notes: list[str]) -> None:
 
 
 def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], str]]:
-    """Return the objects in one of the map's lists, and how to name each in an error."""
-    found = content.get(key, [])
-    if not isinstance(found, list):
-        raise FloorPlanError(f"{key} is {shown_value(found)}: a list is expected")
-    for number, item in enumerate(found):
-        if not isinstance(item, dict):
-            raise FloorPlanError(f"{key}[{number}] is {shown_value(item)}: an object is expected")
-    return [(item, f"{key}[{number}]") for number, item in enumerate(found)]
+    """Return the objects in one of the map's lists, each with its place in the file."""
+    items = validated(_OBJECTS, content.get(key, []), key)
+    return [(item, f"{key}[{number}]") for number, item in enumerate(items)]
 
 
-def read_layers(content: dict[str, Any], notes: list[str]) -> list[Layer]:
+def read_layers(content: dict[str, Any], notes: list[str]) -> list[PixelLayer]:
     """Return the layers with pixels, in the file's order; say what is odd about any of them."""
-    layers: list[Layer] = []
+    layers: list[PixelLayer] = []
     for layer, where in objects_in(content, "layers"):
         kind = layer.get("type")
         if kind not in ("floor", "segment", "wall"):
@@ -163,12 +172,12 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[Layer]:
             continue
         dimensions = layer.get("dimensions")
         stated = dimensions.get("pixelCount") if isinstance(dimensions, dict) else None
-        pixels = int(np.count_nonzero(Box.around(runs).painted(runs)))
+        pixels = int(np.count_nonzero(PixelBox.around(runs).paint(runs)))
         if stated is not None and stated != pixels:
             notes.append(
                 f"{what} has {pixels} pixels, though its pixelCount says {shown_value(stated)}"
             )
-        layers.append(Layer(kind, name, named, runs))
+        layers.append(PixelLayer(kind, name, named, runs))
     if all(layer.kind == "wall" for layer in layers):
         raise FloorPlanError("it has no floor: no layer of type floor or segment has any pixel")
     return layers
@@ -199,22 +208,12 @@ def _whole_numbers(
     layer: dict[str, Any], key: str, group: int, what: str, where: str
 ) -> NDArray[np.int64]:
     """Return a flat list of whole numbers in groups, int64 (n, group)."""
-    values = layer.get(key) or []
-    if not isinstance(values, list):
-        raise FloorPlanError(
-            f"{where}.{key} is {shown_value(values)}: a list of {what} is expected"
-        )
+    values = validated(_PIXELS, layer.get(key) or [], f"{where}.{key}")
     if len(values) % group:
         raise FloorPlanError(
             f"{where}.{key} has {len(values)} numbers, which is no multiple of {group} ({what}): it"
             " is cut off"
         )
-    for value in values:
-        if type(value) is not int or abs(value) > MAX_PIXEL_NUMBER:
-            raise FloorPlanError(
-                f"{where}.{key} has {shown_value(value)}: whole numbers up to {MAX_PIXEL_NUMBER}"
-                " are expected"
-            )
     return np.array(values, np.int64).reshape(-1, group)
 
 
@@ -228,17 +227,11 @@ def entities_of(content: dict[str, Any], kind: str) -> Iterator[tuple[dict[str, 
 
 def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
     """Return an entity's points, float64 (n, 2) [m]."""
-    values = entity.get("points")
-    if not isinstance(values, list) or len(values) % 2:
+    values = validated(_POINTS, entity.get("points"), f"{where}.points")
+    if len(values) % 2:
         raise FloorPlanError(
             f"{where}.points is {shown_value(values)}: a list x, y, x, y, … is expected"
         )
-    for value in values:
-        sensible = isinstance(value, int | float) and not isinstance(value, bool)
-        if not sensible or not abs(value) <= MAX_COORDINATE_M * CM_PER_M:
-            raise FloorPlanError(
-                f"{where}.points has {shown_value(value)}: no sensible centimetres"
-            )
     places = np.array(values, np.float64).reshape(-1, 2) / CM_PER_M
     places[:, 1] *= -1
     return places

@@ -1,0 +1,215 @@
+"""The content of a file in Fleet2D's own floor plan format, and its JSON Schema."""
+
+from typing import Annotated, Any, Literal, Self, TypeVar
+
+import shapely
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    model_validator,
+)
+from pydantic_core import core_schema
+from shapely import MultiPolygon, Polygon
+
+from fleet2d.floorplan.formats.fields import (
+    RING_SCHEMA,
+    Coordinate,
+    FileModel,
+    Listed,
+    Point,
+    Ring,
+    Text,
+)
+from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
+from fleet2d.floorplan.plan import LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
+from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, room_type
+from fleet2d.problems import problem
+
+FORMAT = "fleet2d-floorplan"
+VERSION = 1
+
+Shape = TypeVar("Shape", Polygon, MultiPolygon)
+
+
+class Part(FileModel):
+    """An area: an outline and its holes."""
+
+    outline: Ring = Field(description="corners, the first not repeated at the end")
+    holes: Listed[Ring] = Field(default_factory=list, description="outlines of its holes")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_valid(self.polygon)
+        return self
+
+    @property
+    def polygon(self) -> Polygon:
+        """The area [m]."""
+        return Polygon(self.outline, self.holes)
+
+
+class _CornersAlone:
+    """Says in the JSON Schema that an area without holes may be written as its corners alone."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [RING_SCHEMA, handler(schema)]}
+
+
+Area = Annotated[
+    Part,
+    BeforeValidator(lambda value: value if isinstance(value, dict) else {"outline": value}),
+    _CornersAlone(),
+]
+
+
+def _check_valid(shape: Polygon | MultiPolygon) -> None:
+    """Refuse a shape that crosses itself; unlike a traced outline, one in our format must not."""
+    if not shape.is_valid:
+        reason, _, at = shapely.is_valid_reason(shape).partition("[")
+        place = f" at ({at.rstrip(']').replace(' ', ', ')}) m" if at else ""
+        raise problem(f"is no sound outline: {reason.lower()}{place}")
+
+
+def space_of(parts: list[Part]) -> Polygon | MultiPolygon:
+    """Return the union of parts [m]."""
+    return parts[0].polygon if len(parts) == 1 else MultiPolygon([part.polygon for part in parts])
+
+
+def _check_space(parts: list[Part]) -> list[Part]:
+    _check_valid(space_of(parts))
+    return parts
+
+
+Space = Annotated[Listed[Part], AfterValidator(_check_space)]
+
+
+class RoomEntry(FileModel):
+    """A room: its type, and where it is, by either `polygon` or `region`."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["polygon"]}, {"required": ["region"]}]}
+    )
+
+    type: Text = Field(description="what it is used for, such as bedroom")
+    name: Text | None = Field(default=None, description="its name; left out: its type and a number")
+    labels: Listed[Text] | None = Field(default=None, description="every type that it has")
+    polygon: Area | None = Field(default=None, description="where it is")
+    region: Space | None = Field(default=None, description="where it is, if in several parts")
+
+    @model_validator(mode="after")
+    def _check_place(self) -> Self:
+        if (self.polygon is None) == (self.region is None):
+            raise problem("needs either polygon (its corners) or region (outlines with holes)")
+        return self
+
+    def to_region(self) -> LabelledRegion:
+        """Return the room as a region of the plan."""
+        kind, labels = room_type(self.type), self.labels
+        if labels is None:
+            labels = [self.type] if kind != UNKNOWN else []
+        parts = [self.polygon] if self.polygon is not None else self.region or []
+        return LabelledRegion(tuple(labels), space_of(parts), self.name, kind)
+
+
+class DoorwayEntry(FileModel):
+    """A passage between two rooms, as a line across it."""
+
+    start: Point
+    end: Point
+    name: Text | None = Field(default=None, description="its name; left out: those of its rooms")
+    leaf: bool = Field(default=True, description="whether a door hangs in it")
+
+    def to_line(self) -> DoorLine:
+        """Return the doorway as a line of the plan."""
+        return DoorLine(self.start, self.end, self.name, self.leaf)
+
+
+class UseEntry(FileModel):
+    """A place to use an object from."""
+
+    x: Coordinate
+    y: Coordinate
+    heading: Coordinate = Field(description="direction that the person faces")
+    posture: Posture = "stand"
+    approach: Point | None = Field(default=None, description="place from which one steps there")
+
+
+class ObjectUse(FileModel):
+    """How an object is used."""
+
+    blocks: Blocks = Field(
+        default="path", description="what can't pass: nothing, bodies, or bodies and sight"
+    )
+    heading: Coordinate = Field(default=0.0, description="direction of its front")
+    uses: Listed[UseEntry] = Field(default_factory=list, description="places to use it from")
+
+    def use_places(self) -> tuple[UsePlace, ...]:
+        """Return the places to use it from."""
+        return tuple(UsePlace(**dict(use)) for use in self.uses)
+
+
+class ObjectEntry(ObjectUse):
+    """A piece of furniture or a device; it is no wall."""
+
+    type: Text = Field(description="what it is, such as bed")
+    footprint: Area
+    name: Text | None = Field(default=None, description="its name; left out: its type and a number")
+
+    def to_object(self) -> PlacedObject:
+        """Return the object as one of the plan."""
+        return PlacedObject(
+            name=self.name or "",
+            type=self.type,
+            footprint=self.footprint.polygon,
+            blocks=self.blocks,
+            uses=self.use_places(),
+            heading=self.heading,
+        )
+
+
+class PlanFile(FileModel):
+    """A home. Lengths are in metres, angles in radians counter-clockwise from +x."""
+
+    model_config = ConfigDict(title="Fleet2D floor plan")
+
+    format: Literal["fleet2d-floorplan"]
+    version: Literal[1]
+    name: Text | None = Field(default=None, description="name of the plan; left out: of its file")
+    free: Space = Field(
+        description="the parts of the free space between the walls",
+        json_schema_extra={"minItems": 1},
+    )
+    rooms: Listed[RoomEntry] | None = Field(
+        default=None, description="its rooms; space of none is the room unknown_0"
+    )
+    doorways: Listed[DoorwayEntry] | None = Field(
+        default=None, description="passages between rooms; left out: the walls are searched"
+    )
+    objects: Listed[ObjectEntry] = Field(
+        default_factory=list, description="furniture and devices; they are no walls"
+    )
+    no_go: Listed[Area] = Field(default_factory=list, description="areas that robots keep out of")
+    entrance: Point | None = Field(default=None, description="a place just inside the front door")
+
+
+PLAN_FILE = TypeAdapter(PlanFile)
+
+
+def native_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a floor plan file.
+
+    It describes what a file may contain. Whether outlines cross, doorways lie in passages and names
+    differ is checked only when the plan is read.
+
+    >>> sorted(native_schema()["required"])
+    ['format', 'free', 'version']
+    """
+    dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return dialect | PlanFile.model_json_schema()
