@@ -1,14 +1,14 @@
-// Notes beside the bundle which sources it was built from, so that a test can tell that it is theirs.
+// Write the hash of the sources beside the bundle, so that a test can compare them.
 import { createHash } from "node:crypto";
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 
-const kept = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"];
+const files = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"];
 const sources = readdirSync("src", { recursive: true, withFileTypes: true })
   .filter((entry) => entry.isFile())
   .map((entry) => join(entry.parentPath, entry.name).replaceAll("\\", "/"));
 const hash = createHash("sha256");
-for (const name of [...kept, ...sources].sort()) {
+for (const name of [...files, ...sources].sort()) {
   hash.update(`${name}\n`);
   hash.update(readFileSync(name));
 }

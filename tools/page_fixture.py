@@ -1,4 +1,4 @@
-"""Write what the page's unit tests compare with: a run, and what Python says of it at some steps.
+"""Write the fixture of the page's unit tests: a run, and its state at some steps as Python has it.
 
 `python tools/page_fixture.py` writes ``page/test/run.json``. The run and the expectations belong
 together, so the file only needs to be written again when the page reads something new.
@@ -14,8 +14,9 @@ import numpy as np
 import fleet2d
 from fleet2d.floorplan.home.home import Home
 from fleet2d.sight.region import VisibleRegion
+from fleet2d.view.life import SightWalls
 from fleet2d.viewer.export import embedded_run
-from fleet2d.viewer.shown_run import ShownRun
+from fleet2d.viewer.page_data import PageData
 
 TARGET = Path(__file__).parents[1] / "page" / "test" / "run.json"
 SCENARIO: dict[str, Any] = {
@@ -30,23 +31,16 @@ SCENARIO: dict[str, Any] = {
 STEPS = 200
 
 
-class _Walled:
-    """A home as sight meets it."""
-
-    def __init__(self, home: Home) -> None:
-        self.mesh, self.lattice = home.walls, home.plan.lattice
-
-
 def main() -> None:
     """Write the file."""
-    shown = ShownRun(fleet2d.run(SCENARIO))
-    run = shown.run
+    data = PageData(fleet2d.run(SCENARIO))
+    run = data.run
     draw = np.random.default_rng(0)
     steps = np.sort(draw.choice(run.manifest["steps"], STEPS, replace=False))
-    every = timedelta(microseconds=run.manifest["step_us"])
+    interval = timedelta(microseconds=run.manifest["step_us"])
     poses = {}
     for name in (*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]):
-        path = run.path(name, every)
+        path = run.path(name, interval)
         poses[name] = {
             "x": path.x[steps].tolist(),
             "y": path.y[steps].tolist(),
@@ -54,14 +48,14 @@ def main() -> None:
             "away": path.away[steps].tolist(),
             "room": path.room[steps].tolist(),
         }
-    walled = _Walled(Home(run.plan))
-    at = run.path("astro", every)
+    walls = SightWalls.of(Home(run.plan))
+    path = run.path("astro", interval)
     regions = [
-        {"x": x, "y": y, "area": VisibleRegion(walled, x, y).area_m2}
-        for x, y in zip(at.x[steps[:40]].tolist(), at.y[steps[:40]].tolist(), strict=True)
+        {"x": x, "y": y, "area": VisibleRegion(walls, x, y).area_m2}
+        for x, y in zip(path.x[steps[:40]].tolist(), path.y[steps[:40]].tolist(), strict=True)
     ]
     expected = {"steps": steps.tolist(), "poses": poses, "regions": regions}
-    content = {"run": embedded_run(shown, 0, run.manifest["steps"]), "expected": expected}
+    content = {"run": embedded_run(data, 0, run.manifest["steps"]), "expected": expected}
     TARGET.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
 
 

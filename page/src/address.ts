@@ -59,22 +59,22 @@ export function applyAddress(text: string, run: Run): void {
 
 /** Keep the address up to date, and follow it when it is changed. */
 export function followAddress(run: Run): void {
-  let written = "";
+  let lastHash = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
   effect(() => {
     const address = addressOf(run);
     clearTimeout(timer);
     timer = setTimeout(() => {
-      written = `#${address}`;
+      lastHash = `#${address}`;
       try {
-        history.replaceState(null, "", written);
+        history.replaceState(null, "", lastHash);
       } catch {
         // A frame in a notebook has no address of its own.
       }
     }, DELAY_MS);
   });
   addEventListener("hashchange", () => {
-    if (location.hash !== written) applyAddress(location.hash, run);
+    if (location.hash !== lastHash) applyAddress(location.hash, run);
   });
 }
 

@@ -1,6 +1,6 @@
 // Written by `python -m fleet2d.viewer.typescript` from fleet2d.viewer.contract.
 
-/** A room: its colours on the plan and in lanes, and where its name is written [m]. */
+/** A room: its colours on the plan and in lanes, and the anchor of its name [m]. */
 export interface RoomFacts {
   name: string;
   type: string;
@@ -19,7 +19,7 @@ export interface DoorFacts {
   locked: boolean;
 }
 
-/** A piece of furniture: its outline [m], and whom it stops: nothing, path or sight. */
+/** A piece of furniture: its outline [m], and what it blocks: nothing, path or sight. */
 export interface ObjectFacts {
   name: string;
   type: string;
@@ -79,7 +79,7 @@ export interface ColumnFacts {
   description: string;
 }
 
-/** A table of the run, and what put it out. */
+/** A table of the run, and the kind of component that wrote it. */
 export interface TableFacts {
   name: string;
   rows: number;
@@ -88,20 +88,20 @@ export interface TableFacts {
   columns: ColumnFacts[];
 }
 
-/** From this step on, sight ends at the walls of this number. */
+/** The number of the walls that block sight from this step on. */
 export interface WallsChange {
   step: number;
   walls: number;
 }
 
-/** What ends sight, as a mesh [lattice]: flat lists of x and y, and of three per triangle. */
+/** Walls that block sight, as a mesh [lattice]: x and y of vertices, indices of triangles. */
 export interface WallsFacts {
   vertices: number[];
   triangles: number[];
   neighbors: number[];
 }
 
-/** Something to mark on the timeline: an intervention, or how an expectation came out. It lasts from `step` to before `end`; those of a `lane` don't overlap but for interventions. */
+/** A mark on the timeline: an intervention, or a stretch in which an expectation held or not. It lasts from `step` to before `end`. Marks of a `lane` don't overlap, except interventions. */
 export interface MarkFacts {
   lane: string;
   step: number;
@@ -110,7 +110,7 @@ export interface MarkFacts {
   label: string;
 }
 
-/** Stretches in which a robot noticed a user: steps `first` to `last`, both included. `false` marks stretches in which what was noticed was not that user. */
+/** Stretches in which a robot noticed a user: steps `first` to `last`, both included. `false` marks stretches in which the robot took something else for that user. */
 export interface SightingFacts {
   robot: string;
   user: string;
@@ -142,19 +142,19 @@ export interface RunFacts {
   walks_every_s: number;
 }
 
-/** Why something can't be shown. */
+/** The reason why something can't be shown. */
 export interface Problem {
   message: string;
 }
 
-/** What the page shows: runs, by title; the first may be under way. */
+/** The runs that the page shows, by title; the first may be live. */
 export interface SessionFacts {
   runs: string[];
   live: boolean;
   version: string;
 }
 
-/** A body at a step of a running simulation [lattice], and the way ahead: time [us], x, y. */
+/** A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y. */
 export interface LiveBody {
   name: string;
   x: number;
@@ -191,7 +191,7 @@ export interface LiveFrame {
   message: string;
 }
 
-/** What the page asks a running simulation to do; `x` and `y` in metres. */
+/** A command of the page to a running simulation; `x` and `y` in metres. */
 export interface LiveOrder {
   action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "call" | "replan" | "end";
   target: string;

@@ -1,4 +1,4 @@
-/** What the page shows at present: signals that every part reads, and few functions that change them. */
+/** The state of the page: signals that all parts read, and the few functions that change them. */
 
 import { batch, computed, signal } from "@preact/signals";
 import type { Run } from "./data/run";
@@ -48,8 +48,8 @@ export function goTo(us: number): void {
 
 export function setRange(from: number, to: number): void {
   const [begin, end] = [beginUs.value, endUs.value];
-  const whole = end - begin;
-  const length = Math.max(Math.min(SHORTEST_US, whole), Math.min(whole, to - from));
+  const total = end - begin;
+  const length = Math.max(Math.min(SHORTEST_US, total), Math.min(total, to - from));
   const start = Math.max(begin, Math.min(end - length, from));
   range.value = [start, start + length];
 }
@@ -66,9 +66,9 @@ export function pan(us: number): void {
 }
 
 export function toggle(name: Switch): void {
-  const now = new Set(shown.value);
-  if (!now.delete(name)) now.add(name);
-  shown.value = now;
+  const switches = new Set(shown.value);
+  if (!switches.delete(name)) switches.add(name);
+  shown.value = switches;
 }
 
 export function faster(by: 1 | -1): void {

@@ -13,8 +13,8 @@ import pytest
 import fleet2d
 from fleet2d.viewer.export import export_html
 from fleet2d.viewer.live import LiveRun
+from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.serve import PageServer
-from fleet2d.viewer.shown_run import ShownRun
 
 from .browser import chromium, page_at
 
@@ -227,7 +227,7 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
 def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
     people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
     run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=4, users=people)
-    server = PageServer([ShownRun(run)])
+    server = PageServer([PageData(run)])
     stop = server.start()
     with page_at(browser, server.address) as page:
         page.keyboard.press("End")
@@ -251,7 +251,7 @@ def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
             "robots": {"astro": {"camera": {}, "behaviors": [{"type": "patrol"}]}},
         }
     )
-    server = PageServer([ShownRun(run)])
+    server = PageServer([PageData(run)])
     stop = server.start()
     with page_at(browser, server.address) as page:
         page.keyboard.press("End")
@@ -320,10 +320,10 @@ def test_axe_finds_nothing_serious(browser: Any, address: str, scheme: str, pane
     with page_at(browser, f"{address}#panel={panel}&select=ana", color_scheme=scheme) as page:
         page.wait_for_timeout(200)
         page.evaluate(AXE.read_text(encoding="utf-8"))
-        found = page.evaluate("axe.run()")
+        result = page.evaluate("axe.run()")
         serious = [
             f"{entry['id']}: {entry['nodes'][0]['html'][:120]}"
-            for entry in found["violations"]
+            for entry in result["violations"]
             if entry["impact"] in ("serious", "critical")
         ]
         assert [] == serious

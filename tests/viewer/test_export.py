@@ -13,24 +13,24 @@ import pytest
 import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.viewer.export import embedded_run, export_html, html_of
-from fleet2d.viewer.shown_run import ShownRun
+from fleet2d.viewer.page_data import PageData
 
 DATA = re.compile(r'<script type="application/json" id="fleet2d-runs">(.*?)</script>', re.DOTALL)
 
 
 def runs_in(path: Path) -> list[dict[str, Any]]:
-    found = DATA.search(path.read_text(encoding="utf-8"))
-    assert found
-    runs: list[dict[str, Any]] = json.loads(found[1])
+    match = DATA.search(path.read_text(encoding="utf-8"))
+    assert match
+    runs: list[dict[str, Any]] = json.loads(match[1])
     return runs
 
 
 def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> None:
     target = tmp_path / "run.html"
     export_html(fleet2d.open_run(run_dir), target)
-    (held,) = runs_in(target)
-    assert fleet2d.open_run(run_dir).digest == held["facts"]["digest"]
-    assert b"PAR1" == base64.b64decode(held["tables"]["events"])[:4]
+    (embedded,) = runs_in(target)
+    assert fleet2d.open_run(run_dir).digest == embedded["facts"]["digest"]
+    assert b"PAR1" == base64.b64decode(embedded["tables"]["events"])[:4]
     outside = re.sub(
         r"<script.*?</script>|<style>.*?</style>", "", target.read_text(), flags=re.DOTALL
     )
@@ -39,22 +39,22 @@ def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> 
 
 
 def test_part_of_a_run_keeps_poses_within_it_and_drops_the_rest(run_dir: Path) -> None:
-    shown = ShownRun(fleet2d.open_run(run_dir))
-    whole, part = embedded_run(shown, 0, 9 * 3600), embedded_run(shown, 3600, 7200)
+    data = PageData(fleet2d.open_run(run_dir))
+    complete, part = embedded_run(data, 0, 9 * 3600), embedded_run(data, 3600, 7200)
     assert (3600, 7200) == (part["facts"]["first_step"], part["facts"]["end_step"])
-    assert len(part["tables"]["key_frames"]) < len(whole["tables"]["key_frames"]) / 2
+    assert len(part["tables"]["key_frames"]) < len(complete["tables"]["key_frames"]) / 2
     rows = pq.read_table(io.BytesIO(base64.b64decode(part["tables"]["key_frames"])))
     for name in ("ana", "astro"):
-        mine = rows.filter(rows["entity"].cast("string").to_numpy(False) == name)[
+        steps = rows.filter(rows["entity"].cast("string").to_numpy(False) == name)[
             "step"
         ].to_pylist()
-        assert min(mine) <= 3600
+        assert min(steps) <= 3600
 
 
 def test_text_of_a_run_can_not_end_its_element(run_dir: Path) -> None:
-    held = embedded_run(ShownRun(fleet2d.open_run(run_dir)), 0, 3600)
-    held["facts"]["title"] = "</script><script>alert(1)</script>"
-    assert "<script>alert" not in html_of([held])
+    embedded = embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 3600)
+    embedded["facts"]["title"] = "</script><script>alert(1)</script>"
+    assert "<script>alert" not in html_of([embedded])
 
 
 @pytest.mark.parametrize(("first", "end"), [(5, 5), (-1, 9), (0, 10**9)])

@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 
 from fleet2d.viewer.guard import new_token
 from fleet2d.viewer.serve import PageServer
-from fleet2d.viewer.server import Shelf, page_app
+from fleet2d.viewer.server import ServedRuns, page_app
 
 TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
 PORT = 8765
@@ -18,7 +18,7 @@ FACTS = f"/{TOKEN}/run/0/facts.json"
 
 @pytest.fixture
 def client(run_dir: Path) -> Iterator[TestClient]:
-    app = page_app(Shelf([run_dir]), TOKEN, PORT)
+    app = page_app(ServedRuns([run_dir]), TOKEN, PORT)
     with TestClient(app, base_url=OWN) as client:
         yield client
 

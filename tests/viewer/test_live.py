@@ -12,8 +12,8 @@ import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.viewer.contract import LiveOrder
 from fleet2d.viewer.live import LiveRun, read_order
-from fleet2d.viewer.server import Shelf, page_app
-from fleet2d.viewer.shown_run import ShownRun
+from fleet2d.viewer.page_data import PageData
+from fleet2d.viewer.server import ServedRuns, page_app
 
 PORT = 8765
 OWN = f"http://127.0.0.1:{PORT}"
@@ -74,10 +74,10 @@ def test_frames_have_every_event_once() -> None:
 def test_frames_have_every_intervention_once(live: LiveRun) -> None:
     frames = live.frames()
     next(frames)
-    live.ask(order("step", value=300))
-    for wish in (order("door", "bath_door", value=0), order("replan", "astro")):
-        assert "" == live.ask(wish)
-    live.ask(order("step", value=5))
+    live.submit(order("step", value=300))
+    for command in (order("door", "bath_door", value=0), order("replan", "astro")):
+        assert "" == live.submit(command)
+    live.submit(order("step", value=5))
     marks = [mark for frame in next(frames) for mark in frame["marks"]]
     assert [(300, "shut bath_door"), (300, "replan astro")] == [
         (mark["step"], mark["label"]) for mark in marks
@@ -85,17 +85,17 @@ def test_frames_have_every_intervention_once(live: LiveRun) -> None:
 
 
 def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
-    assert "" == live.ask(order("step", value=1))
-    assert "" == live.ask(order("step", value=60))
+    assert "" == live.submit(order("step", value=1))
+    assert "" == live.submit(order("step", value=60))
     assert 61 == live.engine.step
 
 
 def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
-    live.ask(order("step", value=600))
+    live.submit(order("step", value=600))
     home = live.engine.simulation.home
     x, y = home.plan.room("living_room_0").anchor_xy
-    assert "" == live.ask(order("place", "ana", x=x, y=y))
-    live.ask(order("step", value=1))
+    assert "" == live.submit(order("place", "ana", x=x, y=y))
+    live.submit(order("step", value=1))
     state = live.engine.simulation.state["ana"]
     assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)
     live.end()
@@ -106,18 +106,18 @@ def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
 
 
 def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
-    live.ask(order("step", value=60))
+    live.submit(order("step", value=60))
     x, y = live.engine.simulation.home.plan.room("kitchen_0").anchor_xy
-    assert "" == live.ask(order("call", "astro", x=x, y=y))
-    live.ask(order("step", value=120))
+    assert "" == live.submit(order("call", "astro", x=x, y=y))
+    live.submit(order("step", value=120))
     state = live.engine.simulation.state["astro"]
     assert "kitchen_0" == state["room"]
-    assert "" == live.ask(order("call", "astro", x=x + 0.5, y=y))
-    live.ask(order("step", value=1))
+    assert "" == live.submit(order("call", "astro", x=x + 0.5, y=y))
+    live.submit(order("step", value=1))
     live.end()
     assert live.run is not None
-    done = [entry["do"] for entry in live.run.manifest["interventions"]]
-    assert ["drive", "decide", "decide"] == done
+    actions = [entry["do"] for entry in live.run.manifest["interventions"]]
+    assert ["drive", "decide", "decide"] == actions
 
 
 def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
@@ -127,31 +127,31 @@ def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
         paused=True,
     )
     watched.start()
-    watched.ask(order("step", value=300))
-    for wish in (order("door", "bath_door", value=0), order("replan", "astro")):
-        assert "" == watched.ask(wish)
-    watched.ask(order("resume"))
+    watched.submit(order("step", value=300))
+    for command in (order("door", "bath_door", value=0), order("replan", "astro")):
+        assert "" == watched.submit(command)
+    watched.submit(order("resume"))
     for batch in watched.frames():
         if batch and batch[-1]["done"]:
             break
     watched.end()
     assert fleet2d.reproduce(run_dir).same
-    marks = ShownRun(fleet2d.open_run(run_dir)).facts["marks"]
+    marks = PageData(fleet2d.open_run(run_dir)).facts["marks"]
     assert [(300, "shut bath_door"), (300, "replan astro")] == [
         (mark["step"], mark["label"]) for mark in marks
     ]
 
 
 def test_door_is_shut_from_the_next_step_on(live: LiveRun) -> None:
-    before = live.engine.walls()
-    assert "" == live.ask(order("door", "bath_door", value=0))
-    live.ask(order("step", value=2))
+    walls = live.engine.walls()
+    assert "" == live.submit(order("door", "bath_door", value=0))
+    live.submit(order("step", value=2))
     assert {"bath_door": False} == live.engine.doors()
-    assert before != live.engine.walls()
+    assert walls != live.engine.walls()
 
 
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("command", "words"),
     [
         (order("place", "zoe"), "nobody named"),
         (order("replan", "zoe"), "nobody named"),
@@ -160,9 +160,9 @@ def test_door_is_shut_from_the_next_step_on(live: LiveRun) -> None:
     ],
 )
 def test_impossible_order_is_refused_with_a_reason(
-    live: LiveRun, wish: LiveOrder, words: str
+    live: LiveRun, command: LiveOrder, words: str
 ) -> None:
-    assert words in live.ask(wish)
+    assert words in live.submit(command)
 
 
 @pytest.mark.parametrize(
@@ -178,12 +178,12 @@ def test_impossible_order_is_refused_with_a_reason(
     ],
 )
 def test_what_is_no_order_is_refused(body: bytes) -> None:
-    with pytest.raises(InputError, match="no order"):
+    with pytest.raises(InputError, match="no valid order"):
         read_order(body)
 
 
 def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
-    client = TestClient(page_app(Shelf([]), "token", PORT, live), base_url=OWN)
+    client = TestClient(page_app(ServedRuns([]), "token", PORT, live), base_url=OWN)
     body = json.dumps(order("step", value=1))
     own = {"Origin": OWN, "Content-Type": "application/json"}
     for wrong in (
@@ -202,7 +202,7 @@ def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
 
 
 def test_facts_of_a_run_under_way_name_home_and_bodies(live: LiveRun) -> None:
-    client = TestClient(page_app(Shelf([]), "token", PORT, live), base_url=OWN)
+    client = TestClient(page_app(ServedRuns([]), "token", PORT, live), base_url=OWN)
     facts = client.get("/token/live/facts.json").json()
     assert ["ana", "astro"] == [body["name"] for body in facts["bodies"]]
     assert ["bath_door"] == [door["name"] for door in facts["home"]["doors"]]

@@ -19,7 +19,7 @@ def test_stretches_of_an_expectation_tile_the_run(starts: list[tuple[int, int]])
     marks = expectation_marks("quiet", {"holds": not violations}, violations, STEPS)
     assert 0 == marks[0]["step"]
     assert STEPS == marks[-1]["end"]
-    assert all(one["end"] == other["step"] for one, other in itertools.pairwise(marks))
+    assert all(mark["end"] == following["step"] for mark, following in itertools.pairwise(marks))
     violated = {
         step
         for mark in marks

@@ -38,7 +38,7 @@ def test_run_is_a_widget(run_dir: Path) -> None:
 
 
 def test_missing_library_is_named(run_dir: Path) -> None:
-    shown = views()
+    registered = views()
 
     def load() -> Views:
         raise ModuleNotFoundError("No module named 'nothing'", name="nothing")
@@ -48,7 +48,7 @@ def test_missing_library_is_named(run_dir: Path) -> None:
         with pytest.raises(InputError, match="nothing, which is not installed"):
             fleet2d.open_run(run_dir).draw()
     finally:
-        register_views(lambda: shown)
+        register_views(lambda: registered)
 
 
 def test_dark_figure_has_a_dark_ground_and_bright_words(run_dir: Path) -> None:
@@ -59,7 +59,7 @@ def test_dark_figure_has_a_dark_ground_and_bright_words(run_dir: Path) -> None:
         run.plan.draw(theme="dark"),
     ):
         assert max(figure.get_facecolor()[:3]) < 0.15
-        words = [text for axes in figure.axes for text in axes.texts if text.get_text()]
-        assert all(max(to_rgb(text.get_color())) > 0.4 for text in words)
+        texts = [text for axes in figure.axes for text in axes.texts if text.get_text()]
+        assert all(max(to_rgb(text.get_color())) > 0.4 for text in texts)
     with pytest.raises(InputError, match="no theme 'blue'"):
         run.draw(theme="blue")

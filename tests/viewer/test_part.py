@@ -19,9 +19,9 @@ def test_poses_of_a_part_are_those_of_the_run(run_dir: Path, first: int, end: in
     run = fleet2d.open_run(run_dir)
     part = part_of_run(run, first, end)
     for name in ("ana", "astro"):
-        whole, cut = run.path(name, SECOND), part.path(name, SECOND)
+        complete, cut = run.path(name, SECOND), part.path(name, SECOND)
         for values in ("x", "y", "heading", "away", "room", "time"):
-            assert np.array_equal(getattr(whole, values)[first:end], getattr(cut, values))
+            assert np.array_equal(getattr(complete, values)[first:end], getattr(cut, values))
 
 
 def test_random_walk_can_be_cut() -> None:

@@ -1,4 +1,4 @@
-"""Pictures of moments and stretches, films, reports: written whole, of the kind that is asked for."""
+"""Pictures of moments and stretches, films, reports: written completely, in the requested format."""
 
 import subprocess
 import sys
@@ -55,8 +55,8 @@ def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
     stage = Stage(run, 0, 32_400, figure=Figure())
     stage.show(25_321)
     path = run.path("astro", timedelta(seconds=1))
-    astro = next(player for player in stage.players if player.facts["name"] == "astro")
-    assert (path.x[25_321], path.y[25_321]) == astro.spot.center
+    astro = next(body for body in stage.bodies if body.facts["name"] == "astro")
+    assert (path.x[25_321], path.y[25_321]) == astro.disc.center
 
 
 @pytest.mark.parametrize("ending", [".gif", ".webp"])
@@ -121,6 +121,6 @@ def test_report_escapes_what_a_scenario_names(run_dir: Path) -> None:
 )
 def test_show_refuses_what_is_no_picture(run_dir: Path, words: list[str], message: str) -> None:
     command = [sys.executable, "-m", "fleet2d.cli", "show", str(run_dir), *words]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert 2 == done.returncode
-    assert message in done.stderr
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert 2 == process.returncode
+    assert message in process.stderr

@@ -11,15 +11,15 @@ import pytest
 from starlette.testclient import TestClient
 
 import fleet2d
-from fleet2d.viewer.server import Shelf, page_app
-from fleet2d.viewer.shown_run import ShownRun
+from fleet2d.viewer.page_data import PageData
+from fleet2d.viewer.server import ServedRuns, page_app
 
 PORT = 8765
 BASE = f"http://127.0.0.1:{PORT}"
 
 
-def client_of(*sources: Path | ShownRun) -> TestClient:
-    return TestClient(page_app(Shelf(sources), "token", PORT), base_url=f"{BASE}/token/")
+def client_of(*sources: Path | PageData) -> TestClient:
+    return TestClient(page_app(ServedRuns(sources), "token", PORT), base_url=f"{BASE}/token/")
 
 
 @pytest.fixture
@@ -64,19 +64,19 @@ def test_part_of_a_table_is_served_by_range(run_dir: Path) -> None:
 
 
 def test_walls_change_when_a_door_moves(run_dir: Path) -> None:
-    shown = ShownRun(fleet2d.open_run(run_dir))
-    changes = shown.facts["walls"]
+    data = PageData(fleet2d.open_run(run_dir))
+    changes = data.facts["walls"]
     assert len(changes) > 3
     assert 0 == changes[0]["step"]
     assert [c["step"] for c in changes] == sorted({c["step"] for c in changes})
-    assert shown.arrangements <= 4
-    walls = [sum(n < 0 for n in shown.walls(i)["neighbors"]) for i in range(shown.arrangements)]
+    assert data.arrangements <= 4
+    walls = [sum(n < 0 for n in data.walls(i)["neighbors"]) for i in range(data.arrangements)]
     assert len(set(walls)) > 1
 
 
 def test_sightings_cover_the_observations(run_dir: Path) -> None:
     run = fleet2d.open_run(run_dir)
-    lane = ShownRun(run).sightings[0]
+    lane = PageData(run).sightings[0]
     steps = run.tables["observations"]["step"].to_pylist()
     inside = [
         any(a <= s <= b for a, b in zip(lane["first"], lane["last"], strict=True)) for s in steps
@@ -92,13 +92,13 @@ def test_false_sightings_are_marked() -> None:
         "robots.astro.camera.perception={false_positives: {per_hour: 30}}",
         seed=3,
     )
-    lanes = ShownRun(run).sightings
+    lanes = PageData(run).sightings
     assert any(any(lane["false"]) for lane in lanes)
 
 
 def test_run_in_memory_is_served_like_a_stored_one() -> None:
     run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=3)
-    client = client_of(ShownRun(run))
+    client = client_of(PageData(run))
     assert "base" == client.get("run/0/facts.json").json()["title"]
     assert b"PAR1" == client.get("run/0/tables/key_frames.parquet").content[:4]
 
@@ -111,9 +111,9 @@ def test_random_walks_are_sent_as_positions(tmp_path: Path) -> None:
             "users": {"ana": {"type": "meander"}},
         }
     )
-    shown = ShownRun(run)
-    assert 1.0 == shown.facts["walks_every_s"]
-    poses = pq.read_table(shown.table_path("poses"))
+    data = PageData(run)
+    assert 1.0 == data.facts["walks_every_s"]
+    poses = pq.read_table(data.table_path("poses"))
     assert run.path("ana", timedelta(seconds=1)).x.tolist() == poses["x"].to_pylist()
 
 

@@ -4,7 +4,7 @@ import type { Home } from "./home";
 import type { Table } from "./parquet";
 import { lastAtMost } from "./search";
 
-/** Tables with these columns say in which share of time, or how probably, somebody is in a room. */
+/** Columns of tables with the share of time, or the probability, of a user in a room. */
 const SHARE_COLUMNS = ["share", "probability", "p"];
 
 export interface Belief {
@@ -25,10 +25,10 @@ export class Beliefs {
 
   /** What was believed of a user at a moment; null before the first output. */
   at(user: string, us: number): Belief | null {
-    const mine = this.series.get(user);
-    if (!mine) return null;
-    const i = lastAtMost(mine.us, us);
-    return i < 0 ? null : { us: mine.us[i]!, shares: mine.shares[i]! };
+    const ofUser = this.series.get(user);
+    if (!ofUser) return null;
+    const i = lastAtMost(ofUser.us, us);
+    return i < 0 ? null : { us: ofUser.us[i]!, shares: ofUser.shares[i]! };
   }
 
   /** Moments of all outputs, in order. */
@@ -51,24 +51,24 @@ export async function readBeliefs(
   const room = await table.words("room");
   const user = table.has("user") ? await table.words("user") : null;
   const index = room.words.map((word) => {
-    const found = home.roomIndex(word);
-    return found >= 0 ? found : home.facts.rooms.length;
+    const room = home.roomIndex(word);
+    return room >= 0 ? room : home.facts.rooms.length;
   });
   const series = new Map<string, { us: number[]; shares: Float64Array[] }>();
   for (let i = 0; i < steps.length; i++) {
     const key = user ? (user.words[user.codes[i]!] ?? "") : "";
-    let mine = series.get(key);
-    if (!mine) {
-      mine = { us: [], shares: [] };
-      series.set(key, mine);
+    let ofUser = series.get(key);
+    if (!ofUser) {
+      ofUser = { us: [], shares: [] };
+      series.set(key, ofUser);
     }
     const us = steps[i]! * stepUs;
-    if (mine.us[mine.us.length - 1] !== us) {
-      mine.us.push(us);
-      mine.shares.push(new Float64Array(home.facts.rooms.length + 1));
+    if (ofUser.us[ofUser.us.length - 1] !== us) {
+      ofUser.us.push(us);
+      ofUser.shares.push(new Float64Array(home.facts.rooms.length + 1));
     }
     const place = room.codes[i]! >= 0 ? index[room.codes[i]!]! : home.facts.rooms.length;
-    mine.shares[mine.shares.length - 1]![place]! += shares[i]!;
+    ofUser.shares[ofUser.shares.length - 1]![place]! += shares[i]!;
   }
   return new Beliefs(name, series);
 }

@@ -23,8 +23,8 @@ export class Events {
     const index = this.rows.length;
     this.us.push(us);
     this.rows.push({ index, us, step, entity, event, user, detail });
-    const mine = this.byKind.get(event);
-    if (mine) mine.push(index);
+    const indices = this.byKind.get(event);
+    if (indices) indices.push(index);
     else this.byKind.set(event, [index]);
   }
 

@@ -123,8 +123,8 @@ function observation(part: Part, i: number): Observation {
   };
 }
 
-/** Whether nobody was there, or somebody else than was thought. */
-export function isFalse(seen: Observation): boolean {
-  if (seen.trueUser === null) return false;
-  return seen.trueUser === "" || (seen.user !== "" && seen.trueUser !== seen.user);
+/** Whether nobody was there, or another user than the robot noticed. */
+export function isFalse(sighting: Observation): boolean {
+  if (sighting.trueUser === null) return false;
+  return sighting.trueUser === "" || (sighting.user !== "" && sighting.trueUser !== sighting.user);
 }

@@ -72,16 +72,16 @@ export class Table {
   async words(column: string, from = 0, to = this.rows): Promise<Words> {
     const codes = new Int32Array(to - from).fill(-1);
     const words: string[] = [];
-    const known = new Map<string, number>();
+    const codeOfText = new Map<string, number>();
     await this.read(column, from, to, (data, first) => {
       for (let i = 0; i < data.length; i++) {
         const at = first + i - from;
         const value = data[i] as string | null | undefined;
         if (at < 0 || at >= codes.length || value === null || value === undefined) continue;
-        let code = known.get(value);
+        let code = codeOfText.get(value);
         if (code === undefined) {
           code = words.length;
-          known.set(value, code);
+          codeOfText.set(value, code);
           words.push(value);
         }
         codes[at] = code;

@@ -31,7 +31,7 @@ export class Run {
   readonly version = signal(0);
   /** What could not be read, in plain words. */
   readonly problems = signal<string[]>([]);
-  /** Ways ahead of bodies in a live run [lattice]; a stored run knows them from its tracks. */
+  /** Paths ahead of bodies in a live run [lattice]; those of a stored run follow from its tracks. */
   ahead = new Map<string, number[]>();
   /** What behaviors of a live run say of themselves. */
   behaviorNotes = new Map<string, string>();
@@ -149,8 +149,8 @@ export class Run {
   }
 
   wallsOf(number: number): Walls | null {
-    const known = this.walls.get(number);
-    if (known !== undefined) return known;
+    const cached = this.walls.get(number);
+    if (cached !== undefined) return cached;
     this.walls.set(number, null);
     void this.attempt(async () => {
       this.walls.set(number, new Walls(await this.source.walls(number)));
@@ -184,12 +184,12 @@ export class Run {
   private doorEvents(name: string): { us: number[]; open: boolean[] } {
     let rows = this.doorRows.get(name);
     if (!rows || rows.seen !== this.events.rows.length) {
-      const mine = this.events.rows.filter(
+      const doorEvents = this.events.rows.filter(
         (row) => row.entity === name && (row.event === "opened" || row.event === "shut"),
       );
       rows = {
-        us: mine.map((row) => row.us),
-        open: mine.map((row) => row.event === "opened"),
+        us: doorEvents.map((row) => row.us),
+        open: doorEvents.map((row) => row.event === "opened"),
         seen: this.events.rows.length,
       };
       this.doorRows.set(name, rows);

@@ -40,8 +40,8 @@ export class Walls {
     for (let column = Math.min(...xs); column <= Math.max(...xs); column++) {
       for (let row = Math.min(...ys); row <= Math.max(...ys); row++) {
         const key = column * 65_536 + row;
-        const mine = this.buckets.get(key);
-        if (mine) mine.push(triangle);
+        const bucket = this.buckets.get(key);
+        if (bucket) bucket.push(triangle);
         else this.buckets.set(key, [triangle]);
       }
     }
@@ -106,31 +106,31 @@ export class Walls {
     while (stack.length > 0) {
       let coneLeft = stack.pop()!;
       const coneRight = stack.pop()!;
-      let seen = stack.pop()!;
-      let here = Math.floor(seen / 3);
-      let beyond = this.neighbors[seen]!;
+      let crossedEdge = stack.pop()!;
+      let current = Math.floor(crossedEdge / 3);
+      let beyond = this.neighbors[crossedEdge]!;
       const [rx, ry] = [this.x(coneRight) - px, this.y(coneRight) - py];
       let [lx, ly] = [this.x(coneLeft) - px, this.y(coneLeft) - py];
       while (beyond !== WALL) {
-        const entry = this.entryEdge(beyond, here);
+        const entry = this.entryEdge(beyond, current);
         const leftEdge = (entry + 2) % 3;
         const apex = this.corner(beyond, leftEdge);
         const [ox, oy] = [this.x(apex) - px, this.y(apex) - py];
-        here = beyond;
+        current = beyond;
         let following = leftEdge;
         if (rx * oy - ry * ox > 0) {
           following = (entry + 1) % 3;
           if (lx * oy - ly * ox < 0) {
-            stack.push(3 * here + leftEdge, apex, coneLeft);
+            stack.push(3 * current + leftEdge, apex, coneLeft);
             coneLeft = apex;
             [lx, ly] = [ox, oy];
           }
         }
-        seen = 3 * here + following;
-        beyond = this.neighbors[seen]!;
+        crossedEdge = 3 * current + following;
+        beyond = this.neighbors[crossedEdge]!;
       }
       right.push(coneRight);
-      wall.push(seen);
+      wall.push(crossedEdge);
     }
   }
 }

@@ -20,8 +20,8 @@ export function turnBetween(start: number, end: number): number {
   return ((end - start + TURN / 2) & (TURN - 1)) - TURN / 2;
 }
 
-function interpolate(start: number, change: number, elapsed: number, whole: number): number {
-  return start + Math.floor((2 * change * elapsed + whole) / (2 * whole));
+function interpolate(start: number, change: number, elapsed: number, duration: number): number {
+  return start + Math.floor((2 * change * elapsed + duration) / (2 * duration));
 }
 
 /** Key frames of one body; arrays grow as a live run goes on. */
@@ -72,11 +72,11 @@ export class Track {
     let heading = this.heading[i]!;
     if (this.time[i]! <= us && i < end - 1) {
       const elapsed = us - this.time[i]!;
-      const whole = this.time[i + 1]! - this.time[i]!;
+      const duration = this.time[i + 1]! - this.time[i]!;
       const turn = turnBetween(heading, this.heading[i + 1]!);
-      x = interpolate(x, this.x[i + 1]! - x, elapsed, whole);
-      y = interpolate(y, this.y[i + 1]! - y, elapsed, whole);
-      heading = interpolate(heading, turn, elapsed, whole) & (TURN - 1);
+      x = interpolate(x, this.x[i + 1]! - x, elapsed, duration);
+      y = interpolate(y, this.y[i + 1]! - y, elapsed, duration);
+      heading = interpolate(heading, turn, elapsed, duration) & (TURN - 1);
     }
     return { x, y, heading, away: this.away[i] === 1 };
   }
@@ -194,10 +194,10 @@ export async function readTracks(
   const planned = kind.words.indexOf("planned");
   const tracks = new Map<string, Track>();
   for (const name of names) {
-    const mine = rows.get(name) ?? new Int32Array(0);
+    const rowsOfBody = rows.get(name) ?? new Int32Array(0);
     const pick = <T>(make: (length: number) => T & { [index: number]: number }, of: (row: number) => number): T => {
-      const values = make(mine.length);
-      for (let i = 0; i < mine.length; i++) values[i] = of(mine[i]!);
+      const values = make(rowsOfBody.length);
+      for (let i = 0; i < rowsOfBody.length; i++) values[i] = of(rowsOfBody[i]!);
       return values;
     };
     const [originX, originY] = scale.originUnits;

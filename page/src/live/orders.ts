@@ -11,11 +11,11 @@ export const calling = signal("");
 export const refusal = signal("");
 
 export async function order(wish: Partial<LiveOrder> & Pick<LiveOrder, "action">): Promise<void> {
-  const whole: LiveOrder = { target: "", value: 0, x: 0, y: 0, ...wish };
+  const complete: LiveOrder = { target: "", value: 0, x: 0, y: 0, ...wish };
   const response = await fetch("live/order", {
     method: "POST",
     headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(whole),
+    body: JSON.stringify(complete),
   });
   const problem = response.ok ? null : ((await response.json().catch(() => null)) as Problem | null);
   refusal.value = response.ok ? "" : (problem?.message ?? `refused: ${response.status}`);

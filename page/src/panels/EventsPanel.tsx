@@ -22,7 +22,7 @@ export function EventsPanel() {
   }).value;
   const us = slowMoment.value;
   const at = lastAtMost(rows.map((row) => row.us), us) + 1;
-  const shown = rows.slice(Math.max(0, at - BEFORE), at + AFTER);
+  const visibleRows = rows.slice(Math.max(0, at - BEFORE), at + AFTER);
   return (
     <div>
       <div class="row">
@@ -43,7 +43,7 @@ export function EventsPanel() {
         {state.search.value || state.eventKind.value ? ` of ${run.events.rows.length}` : ""}
       </p>
       <ol class="events">
-        {shown.map((row) => (
+        {visibleRows.map((row) => (
           <li key={row.index} class={row.us > us ? "later" : ""}>
             <button type="button" class="link" onClick={() => state.goTo(row.us)}>
               <time>{run.clock.text(row.us)}</time> <b>{row.entity}</b> {row.event.replaceAll("_", " ")} {row.user} {row.detail}

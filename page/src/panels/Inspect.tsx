@@ -93,17 +93,17 @@ function nextPlace(run: Run, name: string, us: number): string {
 
 export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]; us: number }) {
   const at = lastAtMost(rows.map((row) => row.us), us) + 1;
-  const shown = rows.slice(Math.max(0, at - SHOWN_EVENTS), at + 3);
+  const visibleRows = rows.slice(Math.max(0, at - SHOWN_EVENTS), at + 3);
   return (
     <ol class="events">
-      {shown.map((row) => (
+      {visibleRows.map((row) => (
         <li key={row.index} class={row.us > us ? "later" : ""}>
           <button type="button" class="link" onClick={() => state.goTo(row.us)}>
             <time>{run.clock.text(row.us)}</time> {row.event.replaceAll("_", " ")} {row.user} {row.detail}
           </button>
         </li>
       ))}
-      {shown.length === 0 && <li>no events</li>}
+      {visibleRows.length === 0 && <li>no events</li>}
     </ol>
   );
 }
@@ -126,7 +126,7 @@ function RoomView({ run, name }: { run: Run; name: string }) {
   const us = slowMoment.value;
   const index = run.home.roomIndex(name);
   const room = run.facts.home.rooms[index]!;
-  const here = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);
+  const occupants = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);
   return (
     <div data-inspected={name}>
       <h3>{name.replaceAll("_", " ")}</h3>
@@ -134,7 +134,7 @@ function RoomView({ run, name }: { run: Run; name: string }) {
         rows={[
           ["kind", room.type.replaceAll("_", " ")],
           ["area", `${room.area_m2.toFixed(1)} m²`],
-          ["here now", here.map((body) => body.name).join(", ") || "nobody"],
+          ["here now", occupants.map((body) => body.name).join(", ") || "nobody"],
         ]}
       />
     </div>

@@ -105,11 +105,11 @@ function Results({ runs }: { runs: readonly Run[] }) {
       </thead>
       <tbody>
         {names.map((name) => (
-          <tr key={name} class={differs(values.map((mine) => mine.get(name))) ? "differs" : ""}>
+          <tr key={name} class={differs(values.map((ofRun) => ofRun.get(name))) ? "differs" : ""}>
             <th scope="row">{name}</th>
-            {values.map((mine, i) => (
+            {values.map((ofRun, i) => (
               <td key={i} class="number">
-                {written(mine.get(name))}
+                {asText(ofRun.get(name))}
               </td>
             ))}
           </tr>
@@ -123,7 +123,7 @@ function differs(values: readonly unknown[]): boolean {
   return values.some((value) => value !== values[0]);
 }
 
-function written(value: unknown): string {
+function asText(value: unknown): string {
   if (typeof value !== "number") return value === undefined || value === null ? "–" : String(value);
   return Number.isInteger(value) ? String(value) : value.toPrecision(4);
 }

@@ -24,7 +24,7 @@ export function bodyState(run: Run, name: string, us: number): BodyState | null 
   if (!track || track.empty) return null;
   const pose = track.poseAt(us);
   const room = roomOf(track, run.home, us);
-  const seen = run.observations?.at(run.clock.stepAt(us)) ?? [];
+  const sightings = run.observations?.at(run.clock.stepAt(us)) ?? [];
   return {
     name,
     room: room === AWAY ? "away" : run.home.roomName(room),
@@ -33,7 +33,7 @@ export function bodyState(run: Run, name: string, us: number): BodyState | null 
     headingDeg: (pose.heading * 360) / TURN,
     away: pose.away,
     activity: run.events.last(name, "activity", us)?.detail ?? "",
-    sees: seen.filter((row) => row.robot === name).map((row) => `${row.user || "somebody"}${isFalse(row) ? " (false)" : ""}`),
+    sees: sightings.filter((row) => row.robot === name).map((row) => `${row.user || "somebody"}${isFalse(row) ? " (false)" : ""}`),
   };
 }
 

@@ -219,7 +219,7 @@ function followPointer(canvas: HTMLCanvasElement, painter: PlanPainter, repaint:
     painter.zoom = next;
     repaint();
   };
-  const whole = (): void => {
+  const showWholePlan = (): void => {
     painter.zoom = 1;
     painter.shift = [0, 0];
     repaint();
@@ -228,12 +228,12 @@ function followPointer(canvas: HTMLCanvasElement, painter: PlanPainter, repaint:
   canvas.addEventListener("pointermove", move);
   canvas.addEventListener("pointerup", up);
   canvas.addEventListener("wheel", wheel, { passive: false });
-  canvas.addEventListener("dblclick", whole);
+  canvas.addEventListener("dblclick", showWholePlan);
   return () => {
     canvas.removeEventListener("pointerdown", down);
     canvas.removeEventListener("pointermove", move);
     canvas.removeEventListener("pointerup", up);
     canvas.removeEventListener("wheel", wheel);
-    canvas.removeEventListener("dblclick", whole);
+    canvas.removeEventListener("dblclick", showWholePlan);
   };
 }

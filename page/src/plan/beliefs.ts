@@ -38,9 +38,9 @@ export function comparisonAt(run: Run, us: number): Comparison | null {
   const total = atHome + time[rooms]!;
   // Rooms that sum up to one beside a share of being away are shares of the time at home.
   const inRooms = believed?.shares.subarray(0, rooms).reduce((sum, part) => sum + part, 0) ?? 1;
-  const whole = inRooms > 0.98 ? atHome : total;
+  const roomTotal = inRooms > 0.98 ? atHome : total;
   const truth = time.map((part, i) => {
-    const of = i < rooms ? whole : total;
+    const of = i < rooms ? roomTotal : total;
     return of > 0 ? part / of : 0;
   });
   const now = valueAt(lane, us);

@@ -175,12 +175,12 @@ function drawName(context: Context, colors: Colors, name: string, color: string,
 
 function drawObservations(context: Context, scene: Scene, poses: ReadonlyMap<string, Pose>): void {
   const { run, us, frame, colors } = scene;
-  for (const seen of run.observations?.at(run.clock.stepAt(us)) ?? []) {
-    const robot = poses.get(seen.robot);
-    const [x, y] = [frame.x(seen.x), frame.y(seen.y)];
-    const wrong = isFalse(seen);
-    context.strokeStyle = wrong ? colors.alarm : colors.viewEdge;
-    context.lineWidth = wrong ? 2 : 1.5;
+  for (const sighting of run.observations?.at(run.clock.stepAt(us)) ?? []) {
+    const robot = poses.get(sighting.robot);
+    const [x, y] = [frame.x(sighting.x), frame.y(sighting.y)];
+    const isWrong = isFalse(sighting);
+    context.strokeStyle = isWrong ? colors.alarm : colors.viewEdge;
+    context.lineWidth = isWrong ? 2 : 1.5;
     if (robot && !robot.away) {
       context.setLineDash([3, 3]);
       context.beginPath();
@@ -192,14 +192,14 @@ function drawObservations(context: Context, scene: Scene, poses: ReadonlyMap<str
     context.beginPath();
     context.arc(x, y, 11, 0, 2 * Math.PI);
     context.stroke();
-    if (wrong) {
+    if (isWrong) {
       context.beginPath();
       context.moveTo(x - 7, y - 7);
       context.lineTo(x + 7, y + 7);
       context.moveTo(x + 7, y - 7);
       context.lineTo(x - 7, y + 7);
       context.stroke();
-      drawName(context, colors, `${seen.user || "somebody"}?`, colors.alarm, x, y - 18);
+      drawName(context, colors, `${sighting.user || "somebody"}?`, colors.alarm, x, y - 18);
     }
   }
 }
@@ -209,11 +209,11 @@ function drawGhosts(context: Context, scene: Scene, poses: ReadonlyMap<string, P
   const { run, other, us, frame, colors } = scene;
   for (const body of run.bodies) {
     const pose = poses.get(body.name);
-    const there = other?.tracks.get(body.name)?.poseAt(us);
-    if (!pose || !there || there.away) continue;
-    const far = Math.hypot(there.x - pose.x, there.y - pose.y) / run.facts.home.units_per_m;
+    const otherPose = other?.tracks.get(body.name)?.poseAt(us);
+    if (!pose || !otherPose || otherPose.away) continue;
+    const far = Math.hypot(otherPose.x - pose.x, otherPose.y - pose.y) / run.facts.home.units_per_m;
     if (!pose.away && far < 0.1) continue;
-    const [x, y] = [frame.ux(there.x), frame.uy(there.y)];
+    const [x, y] = [frame.ux(otherPose.x), frame.uy(otherPose.y)];
     context.strokeStyle = colors.alarm;
     context.lineWidth = 1.5;
     context.setLineDash([5, 4]);

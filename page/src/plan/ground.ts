@@ -88,14 +88,14 @@ export function drawCells(context: Context, home: Home, frame: Frame, image: HTM
 const images = new WeakMap<Home, Map<boolean, HTMLCanvasElement>>();
 
 function roomImage(home: Home, dark: boolean): HTMLCanvasElement {
-  let mine = images.get(home);
-  if (!mine) images.set(home, (mine = new Map()));
-  let image = mine.get(dark);
+  let byTheme = images.get(home);
+  if (!byTheme) images.set(home, (byTheme = new Map()));
+  let image = byTheme.get(dark);
   if (!image) {
     const table = home.facts.rooms.map((room) => [...rgb(roomColor(room.color, room.deep_color, dark)), 255] as const);
     const spread = spreadCells(home);
     image = cellImage(home, (cell) => (table[spread[cell]!] as [number, number, number, number] | undefined) ?? null);
-    mine.set(dark, image);
+    byTheme.set(dark, image);
   }
   return image;
 }

@@ -138,8 +138,8 @@ function followPointer(box: HTMLElement, lanes: () => Lane[], words: { value: st
       lastX = event.clientX;
     }
     const lane = laneAt(lanes(), event.clientY - box.getBoundingClientRect().top);
-    const said = lane?.words(us(event)) ?? "";
-    words.value = said ? `${lane!.label}: ${said}` : "";
+    const word = lane?.words(us(event)) ?? "";
+    words.value = word ? `${lane!.label}: ${word}` : "";
   };
   const up = (): void => {
     mode = null;
@@ -157,17 +157,17 @@ function followPointer(box: HTMLElement, lanes: () => Lane[], words: { value: st
     }
     event.preventDefault();
   };
-  const whole = (): void => state.setRange(state.beginUs.value, state.endUs.value);
+  const showWholeRun = (): void => state.setRange(state.beginUs.value, state.endUs.value);
   box.addEventListener("pointerdown", down);
   box.addEventListener("pointermove", move);
   box.addEventListener("pointerup", up);
   box.addEventListener("wheel", wheel, { passive: false });
-  box.addEventListener("dblclick", whole);
+  box.addEventListener("dblclick", showWholeRun);
   return () => {
     box.removeEventListener("pointerdown", down);
     box.removeEventListener("pointermove", move);
     box.removeEventListener("pointerup", up);
     box.removeEventListener("wheel", wheel);
-    box.removeEventListener("dblclick", whole);
+    box.removeEventListener("dblclick", showWholeRun);
   };
 }

@@ -108,8 +108,8 @@ function paintLine(
   top: number,
   height: number,
 ): void {
-  const known = series.values.filter((value) => !Number.isNaN(value));
-  const [low, high] = [Math.min(0, ...known), Math.max(...known, 1e-12)];
+  const numbers = series.values.filter((value) => !Number.isNaN(value));
+  const [low, high] = [Math.min(0, ...numbers), Math.max(...numbers, 1e-12)];
   context.strokeStyle = color;
   context.lineWidth = 1.2;
   context.beginPath();
@@ -126,8 +126,8 @@ const STEPS = [1, 5, 15, 30, 60, 300, 900, 1800, 3600, 7200, 10_800, 21_600, 43_
 
 /** Distance between two ticks of the axis [us], so that about so many fit. */
 export function tickStep(scale: Scale, pixels = 84): number {
-  const wanted = ((scale.to - scale.from) / scale.width) * pixels;
-  return (STEPS.find((seconds) => seconds * SECOND >= wanted) ?? STEPS[STEPS.length - 1]!) * SECOND;
+  const leastStep = ((scale.to - scale.from) / scale.width) * pixels;
+  return (STEPS.find((seconds) => seconds * SECOND >= leastStep) ?? STEPS[STEPS.length - 1]!) * SECOND;
 }
 
 function drawAxis(context: Context, scale: Scale, clock: Clock, colors: Colors, height: number): void {

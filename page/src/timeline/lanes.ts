@@ -22,16 +22,16 @@ export type LanePaint =
   | { kind: "ticks"; us: readonly number[]; color: string }
   | { kind: "line"; series: Series; color: string };
 
-/** Told apart with any kind of colour blindness (Paul Tol's muted scheme). */
+/** Distinct colours with any kind of colour blindness (Paul Tol's muted scheme). */
 const WORD_COLORS = ["#88ccee", "#ddcc77", "#cc6677", "#44aa99", "#aa4499", "#999933", "#332288", "#117733", "#882255"];
 /** Every word keeps its colour, in all lanes of all runs. */
-const known = new Map<string, string>();
+const colorOfWord = new Map<string, string>();
 
 function wordColor(word: string): string {
-  let color = known.get(word);
+  let color = colorOfWord.get(word);
   if (!color) {
-    color = WORD_COLORS[known.size % WORD_COLORS.length]!;
-    known.set(word, color);
+    color = WORD_COLORS[colorOfWord.size % WORD_COLORS.length]!;
+    colorOfWord.set(word, color);
   }
   return color;
 }

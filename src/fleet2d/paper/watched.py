@@ -128,26 +128,19 @@ class LiveView:
         """Return the outline of the largest visible part, float64 (n, 2) [m]."""
         import shapely
 
-        from fleet2d.view.life import field_of_view
+        from fleet2d.view.life import SightWalls, field_of_view
 
         home = self.simulation.home
         camera = self.simulation.scenario.robots[name].camera
         assert camera is not None
         lens = {"range": camera.range, "angle_deg": camera.angle_deg}
-        region = field_of_view(_SightHome(home), np.array([x, y]), heading, lens)
+        region = field_of_view(SightWalls.of(home), np.array([x, y]), heading, lens)
         parts = shapely.get_parts(region).tolist()
         if not parts:
             return np.zeros((3, 2))
         largest = max(parts, key=lambda part: float(part.area))
         outline: NDArray[np.float64] = shapely.get_coordinates(largest.exterior)
         return outline
-
-
-class _SightHome:
-    """The walls that block sight in a home, with shut doors and tall furniture."""
-
-    def __init__(self, home: Any) -> None:
-        self.mesh, self.lattice = home.walls, home.plan.lattice
 
 
 def time_frames(series: FrameSeries) -> dict[str, float]:

@@ -28,7 +28,7 @@ from fleet2d.view.floorplan import (
     save_figure,
 )
 from fleet2d.view.layers import layer_on_axes
-from fleet2d.view.life import field_of_view
+from fleet2d.view.life import SightWalls, field_of_view
 
 ROBOT_COLOR = "#22344f"
 RADIUS_M = 0.17
@@ -96,7 +96,7 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
         InputError: The name ends otherwise, or the file can't be written.
     """
     check_picture(path)
-    VisibleRegion(_Standing(Home(plan)), pose.x, pose.y)  # or says what is wrong with the place
+    VisibleRegion(SightWalls.of(Home(plan)), pose.x, pose.y)  # or says what is wrong with the place
     with drawing_style():
         width, height = figure_size(plan)
         figure = Figure(figsize=(2 * width, height), dpi=DPI)
@@ -118,7 +118,7 @@ def region_panel(plan: FloorPlan, pose: Pose, axes: Axes, title: str) -> None:
     axes.add_patch(sector)
     camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
     heading = float(np.deg2rad(pose.heading_deg))
-    seen = field_of_view(_Standing(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
+    seen = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
     for part in shapely.get_parts(seen):
         outline = shapely.get_coordinates(part.exterior)
         axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.5, ec="none", zorder=2.2))
@@ -134,13 +134,6 @@ def cells_panel(plan: FloorPlan, pose: Pose, axes: Axes, method: FieldOfView, ti
     mask = method.cells(Home(plan), x, y, heading, pose.reach(plan))
     layer_on_axes(plan, mask, axes)
     _robot(pose, axes)
-
-
-class _Standing:
-    """A home as sight meets it: tall furniture counts as walls."""
-
-    def __init__(self, home: Home) -> None:
-        self.mesh, self.lattice = home.walls, home.plan.lattice
 
 
 def _ground(plan: FloorPlan, axes: Axes, title: str) -> None:

@@ -15,7 +15,10 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.mesh import Mesh
 from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
 from fleet2d.sight.region import VisibleRegion, WallPlan
 from fleet2d.view.traces import Trace
@@ -34,6 +37,19 @@ FAR_ENOUGH_M = 2.0
 RIM_COLOR = "#ffffffb0"  # around names
 
 F64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SightWalls:
+    """The walls that block sight, with shut doors and tall furniture; see `field_of_view`."""
+
+    mesh: Mesh
+    lattice: Lattice
+
+    @classmethod
+    def of(cls, home: Home) -> "SightWalls":
+        """Return those of a home as it is now."""
+        return cls(home.walls, home.plan.lattice)
 
 
 @dataclass(frozen=True)

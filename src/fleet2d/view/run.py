@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fleet2d.palette import ACCENT_COLOR
+from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
 from fleet2d.view.actogram import (
     MARKS,
@@ -40,7 +41,7 @@ from fleet2d.view.life import (
     telling_view,
 )
 from fleet2d.view.page import LINE_IN, QUIET_COLOR, Chip, Page
-from fleet2d.view.traces import Trace, categories, trace_of
+from fleet2d.view.traces import Trace, trace_of
 
 SHOWN = 4  # users that have an actogram, and robots that are drawn
 

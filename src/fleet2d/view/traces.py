@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import body_color
+from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 
@@ -150,13 +151,6 @@ def _rows(
     code, names = categories(whole[words])
     rows[words] = np.array([*names, ""])[code[mine]]
     return rows
-
-
-def categories(column: Any) -> tuple[I64, list[str]]:
-    """Return a column of categories as numbers, -1 for nothing, and what they stand for."""
-    encoded = column.cast("string").combine_chunks().dictionary_encode()
-    code = encoded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
-    return code, encoded.dictionary.to_pylist()
 
 
 def _joined(xy: F64, away: NDArray[np.bool_]) -> F64:

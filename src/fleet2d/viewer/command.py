@@ -1,4 +1,4 @@
-"""Commands to watch runs with: view, and the HTML file of `export`."""
+"""Commands that show runs: view, film, report."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +11,7 @@ from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 
 def view(
-    what: Annotated[
+    arguments: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="RUN_DIR...|SCENARIO.yaml [KEY.PATH=VALUE]...",
@@ -25,8 +25,8 @@ def view(
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Show runs in the browser, on this machine only; end it with Ctrl-C."""
-    names = list(what or [])
+    """Show runs in the browser, on this machine only; Ctrl-C ends it."""
+    names = list(arguments or [])
     directories = [Path(name) for name in names]
     if names and all(path.is_dir() for path in directories):
         if seed is not None or out is not None:
@@ -68,7 +68,7 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
 
 
 def _import_code(directories: list[Path]) -> None:
-    """Import what is trusted of some runs now: the threads of the server trust nothing."""
+    """Import the trusted code of runs; later, in the threads of the server, no code is trusted."""
     from fleet2d.runs.run import open_run
     from fleet2d.scenario.model import load_scenario
 

@@ -1,7 +1,7 @@
-"""What the page is sent: the types that Python and TypeScript share.
+"""The data that the page receives, as types that Python and TypeScript share.
 
-The TypeScript side, ``page/src/contract.ts``, is written from these by
-`fleet2d.viewer.typescript`; a test compares both.
+`fleet2d.viewer.typescript` generates the TypeScript side, ``page/src/contract.ts``, from them; a
+test compares both.
 """
 
 from typing import Any, Literal, TypedDict
@@ -10,7 +10,7 @@ Point = tuple[float, float]
 
 
 class RoomFacts(TypedDict):
-    """A room: its colours on the plan and in lanes, and where its name is written [m]."""
+    """A room: its colours on the plan and in lanes, and the anchor of its name [m]."""
 
     name: str
     type: str
@@ -31,7 +31,7 @@ class DoorFacts(TypedDict):
 
 
 class ObjectFacts(TypedDict):
-    """A piece of furniture: its outline [m], and whom it stops: nothing, path or sight."""
+    """A piece of furniture: its outline [m], and what it blocks: nothing, path or sight."""
 
     name: str
     type: str
@@ -101,7 +101,7 @@ class ColumnFacts(TypedDict):
 
 
 class TableFacts(TypedDict):
-    """A table of the run, and what put it out."""
+    """A table of the run, and the kind of component that wrote it."""
 
     name: str
     rows: int
@@ -111,14 +111,14 @@ class TableFacts(TypedDict):
 
 
 class WallsChange(TypedDict):
-    """From this step on, sight ends at the walls of this number."""
+    """The number of the walls that block sight from this step on."""
 
     step: int
     walls: int
 
 
 class WallsFacts(TypedDict):
-    """What ends sight, as a mesh [lattice]: flat lists of x and y, and of three per triangle."""
+    """Walls that block sight, as a mesh [lattice]: x and y of vertices, indices of triangles."""
 
     vertices: list[int]
     triangles: list[int]
@@ -126,9 +126,9 @@ class WallsFacts(TypedDict):
 
 
 class MarkFacts(TypedDict):
-    """Something to mark on the timeline: an intervention, or how an expectation came out.
+    """A mark on the timeline: an intervention, or a stretch in which an expectation held or not.
 
-    It lasts from `step` to before `end`; those of a `lane` don't overlap but for interventions.
+    It lasts from `step` to before `end`. Marks of a `lane` don't overlap, except interventions.
     """
 
     lane: str
@@ -141,7 +141,7 @@ class MarkFacts(TypedDict):
 class SightingFacts(TypedDict):
     """Stretches in which a robot noticed a user: steps `first` to `last`, both included.
 
-    `false` marks stretches in which what was noticed was not that user.
+    `false` marks stretches in which the robot took something else for that user.
     """
 
     robot: str
@@ -176,13 +176,13 @@ class RunFacts(TypedDict):
 
 
 class Problem(TypedDict):
-    """Why something can't be shown."""
+    """The reason why something can't be shown."""
 
     message: str
 
 
 class SessionFacts(TypedDict):
-    """What the page shows: runs, by title; the first may be under way."""
+    """The runs that the page shows, by title; the first may be live."""
 
     runs: list[str]
     live: bool
@@ -190,7 +190,7 @@ class SessionFacts(TypedDict):
 
 
 class LiveBody(TypedDict):
-    """A body at a step of a running simulation [lattice], and the way ahead: time [us], x, y."""
+    """A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y."""
 
     name: str
     x: int
@@ -230,7 +230,7 @@ class LiveFrame(TypedDict):
 
 
 class LiveOrder(TypedDict):
-    """What the page asks a running simulation to do; `x` and `y` in metres."""
+    """A command of the page to a running simulation; `x` and `y` in metres."""
 
     action: Literal["pause", "resume", "step", "speed", "door", "place", "call", "replan", "end"]
     target: str

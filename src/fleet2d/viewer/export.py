@@ -11,9 +11,9 @@ import numpy as np
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import RunFacts, SightingFacts
-from fleet2d.viewer.files import write_whole
+from fleet2d.viewer.files import write_file
+from fleet2d.viewer.page_data import POSES, PageData, write_table
 from fleet2d.viewer.part import KEY_FRAMES, key_frame_rows
-from fleet2d.viewer.shown_run import POSES, ShownRun, write_table
 
 PAGE = Path(__file__).parent / "page"
 POLICY = (
@@ -26,45 +26,45 @@ def export_html(run: Run, path: Path, first: int = 0, end: int | None = None) ->
 
     Args:
         run: The run.
-        path: The file; one that is there is replaced.
+        path: The file; an existing file is replaced.
         first: The first step to show.
-        end: The step before which to end; None for the end of the run.
+        end: The step after the last; None for the end of the run.
 
     Raises:
         InputError: The part is empty, or the file can't be written.
         ArtifactError: The run has no floor plan, or is damaged.
     """
-    shown = ShownRun(run)
+    data = PageData(run)
     steps = run.manifest["steps"]
     end = steps if end is None else end
     if not 0 <= first < end <= steps:
         raise InputError(
             f"from step {first} to {end} there is nothing to show: the run has {steps}"
         )
-    write_whole(path, html_of([embedded_run(shown, first, end)]).encode())
+    write_file(path, html_of([embedded_run(data, first, end)]).encode())
 
 
-def embedded_run(shown: ShownRun, first: int, end: int) -> dict[str, Any]:
-    """Return all that the page needs of a run; ``EmbeddedRun`` of the page."""
-    facts: RunFacts = {**shown.facts, "first_step": first, "end_step": end}
-    whole = first == 0 and end == facts["steps"]
+def embedded_run(data: PageData, first: int, end: int) -> dict[str, Any]:
+    """Return all data of a run that the page needs, as its type ``EmbeddedRun``."""
+    facts: RunFacts = {**data.facts, "first_step": first, "end_step": end}
+    is_whole = first == 0 and end == facts["steps"]
     tables = {}
     for table in facts["tables"]:
         name = table["name"]
         if name == KEY_FRAMES and facts["walks_every_s"] > 0:
             name = POSES
-        tables[name] = _packed(shown, name, None if whole else (first, end))
+        tables[name] = _base64_table(data, name, None if is_whole else (first, end))
     return {
         "facts": facts,
-        "sightings": [_cut(lane, first, end) for lane in shown.sightings],
-        "walls": [shown.walls(number) for number in range(shown.arrangements)],
+        "sightings": [_cut(lane, first, end) for lane in data.sightings],
+        "walls": [data.walls(number) for number in range(data.arrangements)],
         "tables": tables,
     }
 
 
 def html_of(runs: list[dict[str, Any]]) -> str:
-    """Return the page with its script, its style and its data inside."""
-    # No text of a run may end the element that it stands in.
+    """Return the page with its script, its style and its data in one document."""
+    # Escaped, so that no text of a run can end the element around it.
     data = json.dumps(runs, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     script = (PAGE / "page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     style = (PAGE / "page.css").read_text(encoding="utf-8")
@@ -85,22 +85,22 @@ def html_of(runs: list[dict[str, Any]]) -> str:
     )
 
 
-def _packed(shown: ShownRun, name: str, part: tuple[int, int] | None) -> str:
+def _base64_table(data: PageData, name: str, part: tuple[int, int] | None) -> str:
     """Return a table as a Parquet file in base64."""
-    path = shown.table_path(name)
+    path = data.table_path(name)
     if part is None:
         return base64.b64encode(path.read_bytes()).decode()
     import pyarrow.parquet as pq
 
     table = pq.read_table(path)
     rows = _rows(table, name, *part)
-    packed = io.BytesIO()
-    write_table(table.take(rows), packed)
-    return base64.b64encode(packed.getvalue()).decode()
+    content = io.BytesIO()
+    write_table(table.take(rows), content)
+    return base64.b64encode(content.getvalue()).decode()
 
 
 def _rows(table: Any, name: str, first: int, end: int) -> Any:
-    """Return which rows of a table matter between two steps."""
+    """Return the indices of the rows of a table that matter between two steps."""
     step = table["step"].to_numpy()
     if name in (KEY_FRAMES, POSES):
         return key_frame_rows(table, first, end)
@@ -108,12 +108,12 @@ def _rows(table: Any, name: str, first: int, end: int) -> Any:
         return np.arange(len(step))
     if name == "observations":
         return np.flatnonzero((step >= first) & (step < end))
-    return np.flatnonzero(step < end)  # what was so before still holds: doors, beliefs, activities
+    return np.flatnonzero(step < end)  # earlier rows still hold: doors, beliefs, activities
 
 
 def _cut(lane: SightingFacts, first: int, end: int) -> SightingFacts:
     """Return the stretches of a lane that lie between two steps."""
-    kept = [
+    rows = [
         i
         for i, (low, high) in enumerate(zip(lane["first"], lane["last"], strict=True))
         if high >= first and low < end
@@ -121,7 +121,7 @@ def _cut(lane: SightingFacts, first: int, end: int) -> SightingFacts:
     return SightingFacts(
         robot=lane["robot"],
         user=lane["user"],
-        first=[lane["first"][i] for i in kept],
-        last=[lane["last"][i] for i in kept],
-        false=[lane["false"][i] for i in kept],
+        first=[lane["first"][i] for i in rows],
+        last=[lane["last"][i] for i in rows],
+        false=[lane["false"][i] for i in rows],
     )

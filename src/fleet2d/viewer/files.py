@@ -1,22 +1,18 @@
-"""Write files whole, or not at all."""
+"""Write the files of the viewer."""
 
-from contextlib import suppress
 from pathlib import Path
 
+from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file under another name, and give it its own once it is whole.
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file; readers see all of it, or none.
 
     Raises:
         InputError: It can't be written.
     """
-    unfinished = path.with_name(f".{path.name}.unfinished")
     try:
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
+        write_atomically(path, content)
     except OSError as error:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
         raise InputError(f"{path} can't be written: {error.strerror}") from error

@@ -1,6 +1,6 @@
 """A stretch of a run as a film: MP4, GIF or WebP.
 
-A frame is drawn only where something changed, and shown until the next: most of a day nobody moves.
+Only frames that differ from the one before are drawn: most of a day nobody moves.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,13 +22,13 @@ from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import drawing_style, figure_size
 from fleet2d.view.theme import finished
 from fleet2d.viewer.stage import Stage
-from fleet2d.viewer.words import Words
+from fleet2d.viewer.stamps import TextStamps
 
 ENDINGS = (".mp4", ".gif", ".webp")
 MOST_FRAMES_A_S = 25
 HEIGHT_PX = 720
 HEIGHT_IN = 7.2
-# Pictures of a whole film are held in memory while a GIF or WebP is written.
+# A GIF or WebP is written from pictures that are all in memory.
 MOST_PICTURES = 3_000
 
 Pixels = NDArray[np.uint8]
@@ -48,26 +48,26 @@ def write_film(
 
     Args:
         run: The run.
-        path: The file: .mp4, .gif or .webp. One that is there is replaced.
+        path: The file: .mp4, .gif or .webp. An existing file is replaced.
         first: First step.
         end: The step before which to end.
-        speed: How many times as fast as real time.
-        height: Of the film [pixels].
-        on_progress: Called now and then with the frames that are done, and all.
+        speed: Simulated time over the time of the film.
+        height: The height of the film [pixels].
+        on_progress: Called now and then with the number of finished frames, and of all frames.
 
     Raises:
-        InputError: The file's name ends otherwise, a number is out of range, or the file can't be
+        InputError: The file name has another suffix, a number is out of range, or the file can't be
             written.
         ArtifactError: The run stored no key frames or no floor plan.
     """
     _check(path, speed, height)
-    # Steps from frame to frame, so that a second of film has at most so many.
+    # Steps between two frames: a second of film has at most MOST_FRAMES_A_S frames.
     stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MOST_FRAMES_A_S))
     rate = Fraction(speed).limit_denominator(1000) * 1_000_000
     rate /= run.manifest["step_us"] * stride
     with drawing_style():
         figure = _figure(run, height)
-        stage = Stage(run, first, end, figure=figure, every=stride)
+        stage = Stage(run, first, end, figure=figure, stride=stride)
         finished(figure)
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
@@ -77,7 +77,7 @@ def write_film(
 
 
 def _store(path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction) -> None:
-    """Write a film under another name, and give it its own once it is whole."""
+    """Write a film under another name, and rename it when it is complete."""
     unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
     write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
     try:
@@ -103,11 +103,12 @@ def _check(path: Path, speed: float, height: int) -> None:
 
 
 def _figure(run: Run, height: int) -> Figure:
-    """Return an empty figure whose width and height are even, as encoders want them."""
-    wide, high = figure_size(run.plan)
+    """Return an empty figure whose width and height are even, as encoders require."""
+    plan_width, plan_height = figure_size(run.plan)
     rows = height - height % 2
-    columns = min(2 * round(rows * min(max(wide / high, 1.0), 1.9) / 2), 3840)
-    dpi = rows / HEIGHT_IN  # words grow with the film
+    aspect = min(max(plan_width / plan_height, 1.0), 1.9)
+    columns = min(2 * round(rows * aspect / 2), 3840)
+    dpi = rows / HEIGHT_IN  # text grows with the film
     figure = Figure(figsize=(columns / dpi, rows / dpi), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -119,34 +120,34 @@ def _frames(
     moments: NDArray[np.int64],
     on_progress: Callable[[int, int], None] | None,
 ) -> Iterator[tuple[int, Pixels]]:
-    """Yield the number and the picture of each frame that differs from the one before."""
+    """Yield the number and the pixels of each frame that differs from the one before."""
     canvas: Any = stage.figure.canvas
-    for _, artist in (*stage.moving, *stage.ticking):
+    for _, artist in (*stage.body_artists, *stage.clock_artists):
         artist.set_animated(True)
     canvas.draw()
-    ground = canvas.copy_from_bbox(stage.figure.bbox)
-    scene = ground
+    background = canvas.copy_from_bbox(stage.figure.bbox)
+    scene = background
     width, height = canvas.get_width_height()
-    words = Words(width, height, stage.figure.dpi)
+    stamps = TextStamps(width, height, stage.figure.dpi)
 
     def draw(artists: Sequence[tuple[Axes | None, Artist]]) -> None:
         pixels = np.asarray(canvas.buffer_rgba())
         for axes, artist in artists:
             if isinstance(artist, Text):
-                words.paste(artist, pixels)
+                stamps.paste(artist, pixels)
             elif axes is not None:
                 axes.draw_artist(artist)
 
-    for done, moment in enumerate(moments.tolist()):
-        if stage.show(first + moment * stage.every):
-            canvas.restore_region(ground)
-            draw(stage.moving)
+    for number, moment in enumerate(moments.tolist()):
+        if stage.show(first + moment * stage.stride):
+            canvas.restore_region(background)
+            draw(stage.body_artists)
             scene = canvas.copy_from_bbox(stage.figure.bbox)
         else:
             canvas.restore_region(scene)
-        draw(stage.ticking)
-        if on_progress and done % 50 == 0:
-            on_progress(done, len(moments))
+        draw(stage.clock_artists)
+        if on_progress and number % 50 == 0:
+            on_progress(number, len(moments))
         yield moment, np.asarray(canvas.buffer_rgba())
 
 
@@ -159,7 +160,7 @@ def _write_mp4(
         raise InputError('an MP4 film needs PyAV: pip install "fleet2d[film]"') from None
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream: Any = None
-        last: Any = None
+        frame: Any = None
         for number, pixels in frames:
             frame = av.VideoFrame.from_ndarray(pixels, format="rgba")
             if stream is None:
@@ -170,10 +171,9 @@ def _write_mp4(
                 stream.options = {"preset": "veryfast", "crf": "20", "tune": "animation"}
             frame.pts, frame.time_base = number, 1 / rate
             container.mux(stream.encode(frame))
-            last = frame
-        if last is not None and last.pts < total - 1:  # the last picture stays to the end
-            last.pts = total - 1
-            container.mux(stream.encode(last))
+        if frame is not None and frame.pts < total - 1:  # the last picture stays to the end
+            frame.pts = total - 1
+            container.mux(stream.encode(frame))
         if stream is not None:
             container.mux(stream.encode(None))
 
@@ -181,7 +181,7 @@ def _write_mp4(
 def _write_pictures(
     path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction
 ) -> None:
-    """Write a GIF or WebP, in which every picture says how long it is shown."""
+    """Write a GIF or WebP, whose pictures have durations of their own."""
     from PIL import Image
 
     numbers: list[int] = []
@@ -194,11 +194,11 @@ def _write_pictures(
             )
         picture = Image.fromarray(pixels).convert("RGB")
         numbers.append(number)
-        gif = path.suffix.lower() == ".gif"
-        pictures.append(picture.quantize(128, dither=Image.Dither.NONE) if gif else picture)
+        is_gif = path.suffix.lower() == ".gif"
+        pictures.append(picture.quantize(128, dither=Image.Dither.NONE) if is_gif else picture)
     lengths = np.diff([*numbers, total]) * float(1000 / rate)
     durations = [max(20, round(length)) for length in lengths.tolist()]
-    rest = {"append_images": pictures[1:], "duration": durations, "loop": 0, "save_all": True}
+    options = {"append_images": pictures[1:], "duration": durations, "loop": 0, "save_all": True}
     if path.suffix.lower() == ".webp":
-        rest |= {"quality": 80, "method": 2}
-    pictures[0].save(path, **rest)
+        options |= {"quality": 80, "method": 2}
+    pictures[0].save(path, **options)

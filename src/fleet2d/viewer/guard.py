@@ -1,4 +1,4 @@
-"""Who may ask the server for anything: only the page that the address with the token opened."""
+"""Access control of the server: only the page that was opened with the token is served."""
 
 import secrets
 from collections.abc import Mapping
@@ -38,20 +38,20 @@ def new_token() -> str:
 
 
 class Guard:
-    """Refuse requests of other web pages, of other machines' names, and without the token.
+    """Refuses requests of other web pages, for other host names, and without the token.
 
-    A page of another site can make a browser send requests here, but it can't know the token, and
-    the browser adds where the request comes from (`Origin`, `Sec-Fetch-Site`). A name that somebody
-    points at this machine shows in `Host`.
+    Another web page can make a browser send requests here, but it doesn't know the token, and the
+    browser adds the origin of the request (`Origin`, `Sec-Fetch-Site`). A foreign name that points
+    at this machine is visible in `Host`.
     """
 
     def __init__(self, app: ASGIApp, token: str, port: int) -> None:
         """Guard an application.
 
         Args:
-            app: What serves allowed requests.
-            token: First part of every allowed path.
-            port: The port that it is served at.
+            app: The application that serves allowed requests.
+            token: The first part of every allowed path.
+            port: The port of the server.
         """
         self._app, self._token = app, token
         self._hosts = {f"{host}:{port}" for host in HOSTS}
@@ -72,7 +72,7 @@ class Guard:
         await self._app(scope, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope) -> str:
-        """Return why a request isn't allowed; empty where it is."""
+        """Return why a request is refused; empty if it is allowed."""
         headers = Headers(scope=scope)
         if headers.get("host", "") not in self._hosts:
             return "this server answers under 127.0.0.1 and localhost only"
@@ -81,21 +81,21 @@ class Guard:
             return "this request comes from another web page"
         if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
             return "this request comes from another web page"
-        changes = scope["method"] not in ("GET", "HEAD")
-        if changes and origin is None:
+        is_change = scope["method"] not in ("GET", "HEAD")
+        if is_change and origin is None:
             return "this request does not say which page it comes from"
-        first = scope["path"].lstrip("/").split("/", 1)[0]
-        if not secrets.compare_digest(first.encode(), self._token.encode()):
+        token = scope["path"].lstrip("/").split("/", 1)[0]
+        if not secrets.compare_digest(token.encode(), self._token.encode()):
             return "the address lacks its token: open the address that fleet2d view printed"
         return ""
 
 
 def _with_headers(send: Send) -> Send:
-    async def sent(message: Message) -> None:
+    async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in HEADERS.items():
                 headers[name] = value
         await send(message)
 
-    return sent
+    return send_with_headers

@@ -1,4 +1,4 @@
-"""A home as the page draws it."""
+"""The facts of a home that the page draws."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,11 +25,11 @@ DIGITS = 4  # tenths of a millimetre
 
 
 def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
-    """Return a floor plan as the page draws it.
+    """Return the facts of a floor plan.
 
     Args:
         plan: The floor plan.
-        doors: The doors that hang in its doorways.
+        doors: The doors in its doorways.
     """
     lattice = plan.lattice
     origin = np.rint(np.asarray(lattice.origin) / lattice.cell).astype(int) * UNITS_PER_CELL
@@ -51,22 +51,20 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         place_cells=runs_of(plan.room_of_place),
         doorways=[(d.start, d.end) for d in plan.doorways],
         doors=list(doors),
-        objects=[object_facts(thing) for thing in plan.objects],
+        objects=[object_facts(item) for item in plan.objects],
         no_go=[points(shapely.get_coordinates(area.exterior)[:-1]) for area in plan.no_go],
         entrance=plan.entrance,
     )
 
 
-def object_facts(thing: PlacedObject) -> ObjectFacts:
-    """Return a piece of furniture as the page draws it."""
-    outline = shapely.get_coordinates(thing.footprint.exterior)[:-1]
-    return ObjectFacts(
-        name=thing.name, type=thing.type, outline=points(outline), blocks=thing.blocks
-    )
+def object_facts(item: PlacedObject) -> ObjectFacts:
+    """Return the facts of a piece of furniture."""
+    outline = shapely.get_coordinates(item.footprint.exterior)[:-1]
+    return ObjectFacts(name=item.name, type=item.type, outline=points(outline), blocks=item.blocks)
 
 
 def walls_facts(mesh: Mesh) -> WallsFacts:
-    """Return what ends sight as the page computes with it."""
+    """Return the walls that block sight."""
     return WallsFacts(
         vertices=mesh.vertices.ravel().tolist(),
         triangles=mesh.triangles.ravel().tolist(),
@@ -88,7 +86,7 @@ def runs_of(cells: NDArray[np.int16]) -> list[int]:
 
 
 def points(coordinates: NDArray[Any]) -> list[Point]:
-    """Return corners (n, 2) [m] as pairs, to a tenth of a millimetre."""
+    """Return points, float64 (n, 2) [m], as pairs rounded to 0.1 mm."""
     return [(x, y) for x, y in np.round(coordinates, DIGITS).tolist()]
 
 

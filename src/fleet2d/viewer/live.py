@@ -1,4 +1,4 @@
-"""A running simulation on the page: it goes on in a thread, and sends what it comes to."""
+"""A running simulation on the page: it runs in a thread, and sends frames to the page."""
 
 import json
 import queue
@@ -20,14 +20,14 @@ from fleet2d.viewer.contract import LiveFrame, LiveOrder
 from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.live_engine import LiveEngine
 from fleet2d.viewer.live_facts import live_facts
+from fleet2d.viewer.page_data import compact_json
 from fleet2d.viewer.responses import json_answer, problem
 from fleet2d.viewer.serve import PageServer
-from fleet2d.viewer.shown_run import compact_json
 
-FRAME_US = 60_000_000  # simulated time from frame to frame where it is run fast
-FRAMES_A_S = 30  # shown at most
+FRAME_US = 60_000_000  # the most simulated time between two frames
+FRAMES_A_S = 30  # at a chosen speed
 BATCHES_A_S = 30
-MOST_WAITING = 4_000  # frames that wait for a page that doesn't take them
+MOST_WAITING = 4_000  # frames in the queue of a page
 MOST_BODY = 4_096  # bytes of an order
 ORDER_WAIT_S = 10.0
 IDLE_S = 0.1
@@ -35,20 +35,21 @@ ACTIONS = get_args(get_type_hints(LiveOrder)["action"])
 
 
 class LiveRun:
-    """A simulation that goes on in a thread of its own while pages watch it.
+    """A simulation that runs in a thread of its own while pages watch and control it.
 
     Attributes:
-        engine: The simulation as it is watched and steered.
+        engine: The simulation.
         run: The run once it is finished.
+        failure: The exception that ended the simulation; None if there is none.
     """
 
     def __init__(self, simulation: Simulation, *, paused: bool = False, speed: float = 0.0) -> None:
-        """Prepare; `start` lets it run.
+        """Prepare the thread; `start` starts it.
 
         Args:
             simulation: The simulation.
-            paused: Whether it waits for the page to let it go on.
-            speed: Times real time; 0 is as fast as it goes.
+            paused: Whether it waits for the page to resume it.
+            speed: Simulated time over wall time; 0: as fast as possible.
         """
         self.engine = LiveEngine(simulation)
         self.run: Run | None = None
@@ -59,25 +60,25 @@ class LiveRun:
         self._orders: queue.Queue[tuple[LiveOrder, queue.Queue[str]]] = queue.Queue()
         self._watchers: list[queue.Queue[LiveFrame]] = []
         self._lock = threading.Lock()
-        self._ending = False
+        self._is_ending = False
         self._frame = self._state()
-        self._thread = threading.Thread(target=self._go, daemon=True, name="fleet2d-live")
+        self._thread = threading.Thread(target=self._run_loop, daemon=True, name="fleet2d-live")
 
     def start(self) -> None:
-        """Let the simulation run."""
+        """Start the simulation."""
         self._thread.start()
 
     def end(self) -> None:
-        """Stop the simulation where it is, and close the run."""
-        self._ending = True
+        """Stop the simulation at its current step, and close the run."""
+        self._is_ending = True
         self._thread.join(timeout=60)
 
     def wait(self) -> None:
         """Wait until the simulation is over."""
         self._thread.join()
 
-    def ask(self, order: LiveOrder) -> str:
-        """Hand an order to the simulation; return why it is refused, empty if it is not."""
+    def submit(self, order: LiveOrder) -> str:
+        """Apply an order in the thread of the simulation; return why it is refused, or nothing."""
         answer: queue.Queue[str] = queue.Queue()
         self._orders.put((order, answer))
         try:
@@ -85,66 +86,65 @@ class LiveRun:
         except queue.Empty:
             return "the simulation is over" if self.run else "the simulation does not answer"
 
-    # The thread of the simulation
-
-    def _go(self) -> None:
+    def _run_loop(self) -> None:
+        """Advance the simulation and apply orders until the end; this is the thread."""
         try:
-            while not self._ending:
-                idle = self._paused or self.engine.done
-                self._take_orders(IDLE_S if idle else 0.0)
+            while not self._is_ending:
+                is_idle = self._paused or self.engine.done
+                self._apply_orders(IDLE_S if is_idle else 0.0)
                 if not self._paused and not self.engine.done:
                     self._advance()
-        except BaseException as error:  # noqa: BLE001 - is shown on the page and raised by the command
+        except BaseException as error:  # noqa: BLE001 - shown on the page and raised by the command
             self.failure = error
             self._send({**self._frame, "message": f"the simulation failed: {error}"})
         finally:
             self.run = self.engine.finish()
 
     def _advance(self) -> None:
-        began, before = time.perf_counter(), self.engine.step
-        self.engine.advance(self._slice())
+        """Advance the simulation by a frame, send the frame, and wait as the speed requires."""
+        start_s, step = time.perf_counter(), self.engine.step
+        self.engine.advance(self._steps_per_frame())
         self._send(self._state())
-        passed = (self.engine.step - before) * self._clock.step_us / 1e6
+        simulated_s = (self.engine.step - step) * self._clock.step_us / 1e6
         if self._speed:
-            rest = passed / self._speed - (time.perf_counter() - began)
-            if rest > 0:
-                self._take_orders(rest)
-        took = max(time.perf_counter() - began, 1e-9)
-        self._achieved = 0.9 * self._achieved + 0.1 * passed / took
+            wait_s = simulated_s / self._speed - (time.perf_counter() - start_s)
+            if wait_s > 0:
+                self._apply_orders(wait_s)
+        wall_s = max(time.perf_counter() - start_s, 1e-9)
+        self._achieved = 0.9 * self._achieved + 0.1 * simulated_s / wall_s
 
-    def _slice(self) -> int:
-        """Return how many steps to go on by until the next frame."""
+    def _steps_per_frame(self) -> int:
         us = FRAME_US
         if self._speed:
             us = min(us, round(self._speed * 1e6 / FRAMES_A_S))
         return max(1, us // self._clock.step_us)
 
-    def _take_orders(self, seconds: float) -> None:
-        """Do what pages asked for, and go on waiting for more for so long."""
-        until = time.perf_counter() + seconds
-        while not self._ending:
-            rest = until - time.perf_counter()
+    def _apply_orders(self, seconds: float) -> None:
+        """Apply the orders of pages; wait for more for some wall time [s]."""
+        deadline = time.perf_counter() + seconds
+        while not self._is_ending:
+            wait_s = deadline - time.perf_counter()
             try:
                 order, answer = (
-                    self._orders.get(timeout=rest) if rest > 0 else self._orders.get_nowait()
+                    self._orders.get(timeout=wait_s) if wait_s > 0 else self._orders.get_nowait()
                 )
             except queue.Empty:
                 return
             try:
-                self._obey(order)
+                self._apply(order)
                 answer.put("")
             except (Fleet2DError, ValueError) as error:
                 answer.put(str(error))
             self._send(self._state())
 
-    def _obey(self, order: LiveOrder) -> None:
+    def _apply(self, order: LiveOrder) -> None:
         action = order["action"]
         if action == "pause":
             self._paused = True
         elif action == "resume":
             self._paused = False
         elif action == "end":
-            self._ending = True
+            self._is_ending = True
         elif action == "speed":
             if not 0 <= order["value"] <= 1e6:
                 raise InputError("a speed is 0 (as fast as it goes) to 1,000,000 times real time")
@@ -154,13 +154,12 @@ class LiveRun:
             if not self.engine.done:
                 self.engine.advance(max(1, min(86_400, round(order["value"]))))
         elif self.engine.done:
-            raise InputError("the run is over: nothing can be done to it any more")
+            raise InputError("the run is over: it can't be changed any more")
         else:
             self.engine.apply(order)
 
-    # Frames
-
     def _state(self) -> LiveFrame:
+        """Return the frame of the current step; events and marks since the last one."""
         engine = self.engine
         self._frame = LiveFrame(
             step=engine.step,
@@ -169,7 +168,7 @@ class LiveRun:
             speed=self._speed,
             achieved=self._achieved,
             bodies=engine.bodies(),
-            seen=engine.seen(),
+            seen=engine.in_view(),
             doors=engine.doors(),
             beliefs=engine.beliefs(),
             events=engine.events(),
@@ -186,13 +185,13 @@ class LiveRun:
                     watcher.put(frame)
 
     def frames(self) -> Iterator[list[LiveFrame]]:
-        """Yield the frames of the run from now on, those of a moment together."""
+        """Yield the frames of the run from now on, in batches; an empty batch after a second."""
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)
             watcher.put({**self._frame, "events": [], "marks": []})
         try:
-            while not self._ending:
+            while not self._is_ending:
                 frames = []
                 try:
                     frames.append(watcher.get(timeout=1.0))
@@ -207,10 +206,8 @@ class LiveRun:
             with self._lock:
                 self._watchers.remove(watcher)
 
-    # Routes
-
     def routes(self) -> list[Route]:
-        """Return what the page asks of a running simulation."""
+        """Return the routes of a running simulation."""
         return [
             Route("/live/facts.json", self._facts),
             Route("/live/frames", self._stream),
@@ -239,31 +236,31 @@ class LiveRun:
 
     async def _order(self, request: Request) -> Response:
         if request.headers.get("content-type", "").split(";")[0] != "application/json":
-            return problem("an order is JSON", 415)
+            return problem("an order must be JSON", 415)
         body = await request.body()
         try:
             order = read_order(body)
         except InputError as error:
             return problem(str(error))
-        refusal = await run_in_threadpool(self.ask, order)
+        refusal = await run_in_threadpool(self.submit, order)
         return problem(refusal) if refusal else json_answer(b"{}")
 
 
 def read_order(body: bytes) -> LiveOrder:
-    """Return the order that a page sent.
+    """Return the order in the body of a request.
 
     Raises:
-        InputError: It is none.
+        InputError: The body is no order.
     """
-    refusal = InputError("this is no order that a run can follow")
+    refusal = InputError("the request is no valid order")
     try:
         content: Any = json.loads(body) if len(body) <= MOST_BODY else None
         value, x, y = (float(content[key]) for key in ("value", "x", "y"))
         action, target = content["action"], content["target"]
     except (ValueError, KeyError, TypeError):
         raise refusal from None
-    finite = all(abs(number) < 1e9 for number in (value, x, y))
-    if action not in ACTIONS or not isinstance(target, str) or not finite:
+    is_finite = all(abs(number) < 1e9 for number in (value, x, y))
+    if action not in ACTIONS or not isinstance(target, str) or not is_finite:
         raise refusal
     return LiveOrder(action=action, target=target, value=value, x=x, y=y)
 
@@ -282,12 +279,12 @@ def watch_scenario(
 
     Args:
         scenario: As for ``fleet2d.run``.
-        overrides: Changes to it.
+        overrides: Changes of the scenario.
         seed: Its seed.
-        out: Directory of the run; None keeps it in memory.
-        port: Of the page; 0 takes a free one.
+        out: The directory of the run; None: the run stays in memory.
+        port: The port of the page; 0: a free one.
         open_browser: Whether to open the page.
-        announce: Is given the page's address.
+        announce: Called with the address of the page.
 
     Raises:
         InputError: The scenario is wrong, or the port is in use.

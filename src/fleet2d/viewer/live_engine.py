@@ -1,6 +1,6 @@
-"""A running simulation as the page watches and steers it.
+"""A running simulation as the page watches and controls it.
 
-The only module of the viewer that knows how a simulation is asked and told things.
+This is the only module of the viewer that reads and changes the state of a simulation.
 """
 
 from collections.abc import Iterator
@@ -23,19 +23,19 @@ MOST_CORNERS = 60
 
 
 class LiveEngine:
-    """A simulation under way.
+    """A running simulation.
 
-    Watching asks only what has no effect, so that the run's artifacts are the same, watched or not.
+    Watching has no effect on the run: its artifacts are the same, watched or not.
     """
 
     def __init__(self, simulation: Simulation) -> None:
-        """Watch a simulation; it is advanced by nobody else."""
+        """Take over a simulation: nothing else may advance it."""
         self.simulation = simulation
-        self._heard_until = simulation.step
+        self._events_until = simulation.step
         self._meshes: dict[int, int] = {}
         self._walls: list[Mesh] = []
-        self._driven: set[str] = set()
-        self._marked = 0
+        self._called: set[str] = set()
+        self._marks = 0
 
     @property
     def step(self) -> int:
@@ -48,7 +48,7 @@ class LiveEngine:
         return self.simulation.done
 
     def advance(self, steps: int) -> None:
-        """Simulate so many steps."""
+        """Simulate a number of steps."""
         self.simulation.advance(steps)
 
     def finish(self) -> Run:
@@ -56,7 +56,7 @@ class LiveEngine:
         return self.simulation.finish()
 
     def bodies(self) -> list[LiveBody]:
-        """Return where everybody is, and the ways ahead."""
+        """Return the poses of all users and robots, and their paths ahead."""
         return [
             LiveBody(
                 name=name,
@@ -71,20 +71,20 @@ class LiveEngine:
         ]
 
     def _ahead(self, actor: Any) -> Iterator[tuple[int, int, int]]:
-        """Yield the corners of the way ahead: time [us], x and y [lattice]."""
+        """Yield the corners of the path ahead: time [us], x and y [lattice]."""
         if not isinstance(actor.motion, Track):
             return
-        now = self.step * self.simulation.clock.step_us
+        now_us = self.step * self.simulation.clock.step_us
         track = actor.motion.breakpoints
         time = np.asarray(track.time)
-        first = int(np.searchsorted(time, now, side="right"))
+        first = int(np.searchsorted(time, now_us, side="right"))
         for i in range(first, min(len(time), first + MOST_CORNERS)):
-            if time[i] > now + AHEAD_US:
+            if time[i] > now_us + AHEAD_US:
                 return
             yield int(time[i]), int(track.x[i]), int(track.y[i])
 
-    def seen(self) -> list[tuple[str, str]]:
-        """Return which robot has which user in view."""
+    def in_view(self) -> list[tuple[str, str]]:
+        """Return (robot, user) pairs: the users that each robot has in view."""
         robots = self.simulation.scenario.robots
         return [
             (name, user)
@@ -94,12 +94,12 @@ class LiveEngine:
         ]
 
     def doors(self) -> dict[str, bool]:
-        """Return of each door whether it is open."""
+        """Return whether each door is open, by name."""
         state = self.simulation.state
         return {name: bool(entry["open"]) for name, entry in state.items() if "open" in entry}
 
     def beliefs(self) -> dict[str, list[float]]:
-        """Return the newest shares per room of each algorithm that puts out some."""
+        """Return the newest shares of rooms of each algorithm whose output has shares."""
         shares = {}
         for name, output in self.simulation.outputs.items():
             share = getattr(output, "share", None)
@@ -108,10 +108,10 @@ class LiveEngine:
         return shares
 
     def events(self) -> list[LiveEvent]:
-        """Return the events since this was asked last."""
+        """Return the events since the last call."""
         users = self.simulation.scenario.users
-        recorded = self.simulation.events(self._heard_until)
-        self._heard_until = self.step
+        recorded = self.simulation.events(self._events_until)
+        self._events_until = self.step
         return [
             LiveEvent(
                 step=event.step,
@@ -121,26 +121,26 @@ class LiveEngine:
                 detail="" if event.detail in users else event.detail,
             )
             for event in recorded
-            if event.step < self._heard_until
+            if event.step < self._events_until
         ]
 
     def marks(self) -> list[MarkFacts]:
-        """Return what was done to the run since this was last asked."""
-        done = self.simulation.interventions[self._marked :]
-        self._marked += len(done)
-        return intervention_marks(done)
+        """Return the marks of the interventions since the last call."""
+        records = self.simulation.interventions[self._marks :]
+        self._marks += len(records)
+        return intervention_marks(records)
 
     def walls(self) -> int:
-        """Return the number of what ends sight at present, for `mesh`."""
+        """Return the number of the walls that block sight now, for `mesh`."""
         mesh = self.simulation.home.walls
         key = id(mesh)
         if key not in self._meshes:
             self._meshes[key] = len(self._walls)
-            self._walls.append(mesh)  # kept, so that no other gets its id
+            self._walls.append(mesh)  # referenced, so that its id stays unique
         return self._meshes[key]
 
     def mesh(self, number: int) -> Mesh:
-        """Return what ended sight.
+        """Return walls by their number.
 
         Raises:
             InputError: There is no such number.
@@ -150,10 +150,10 @@ class LiveEngine:
         return self._walls[number]
 
     def apply(self, order: LiveOrder) -> None:
-        """Intervene as the page asks; the run's manifest keeps it, and `reproduce` does it again.
+        """Apply an intervention; the manifest records it, and `reproduce` repeats it.
 
         Raises:
-            InputError: There is nothing of that name, or nobody can be there.
+            InputError: There is nothing of that name, or the place isn't free.
             ComponentError: The same, of doors.
         """
         name, place = order["target"], (order["x"], order["y"])
@@ -168,23 +168,23 @@ class LiveEngine:
         elif order["action"] == "replan":
             self.simulation.replan(name)
         else:
-            raise InputError(f"{order['action']} is nothing that can be done to a run")
+            raise InputError(f"there is no intervention {order['action']!r}")
 
     def _call(self, name: str, place: tuple[float, float]) -> None:
-        """Let a body go somewhere and stay; from then on it goes only where it is called."""
+        """Send a body to a place, where it stays; from then on it moves only by such calls."""
         near = self._near(name, place)
-        if name not in self._driven:
+        if name not in self._called:
             self.simulation.drive(name)
-            self._driven.add(name)
+            self._called.add(name)
         plan = self.simulation.plan(name).go_to(near).stay()
         self.simulation.decide(name, plan)
 
     def _near(self, name: str, place: tuple[float, float]) -> tuple[float, float]:
-        """Return the place nearest to a point where a body fits [m].
+        """Return the free place for a body that is nearest to a point [m].
 
         Raises:
             InputError: There is nobody of that name.
-            PlacementError: It fits nowhere near.
+            PlacementError: There is no free place nearby.
         """
         actors = self.simulation.actors
         if name not in actors:
@@ -202,10 +202,10 @@ class LiveEngine:
 
 
 def _note(actor: Any) -> str:
-    """Return why a body does what it does: the behavior that has its way, and what it noted."""
+    """Return the active behavior of a body, and the last note of its plan."""
     active = actor.arbiter.active
     behaviors = actor.behaviors
     kind = behaviors[active].type_name if active is not None and active < len(behaviors) else ""
     notes = getattr(actor.plan, "notes", ())
-    said = f"{notes[-1].event} {notes[-1].detail}".strip() if notes else ""
-    return ": ".join(part for part in (str(kind), said) if part)
+    note = f"{notes[-1].event} {notes[-1].detail}".strip() if notes else ""
+    return ": ".join(filter(None, (str(kind), note)))

@@ -1,4 +1,4 @@
-"""What the page is told about a running simulation before its first frame."""
+"""The facts of a running simulation that the page receives before the first frame."""
 
 from fleet2d.artifacts.manifest import plain
 from fleet2d.engine.simulation import Simulation
@@ -7,10 +7,11 @@ from fleet2d.version import __version__
 from fleet2d.viewer.contract import DoorFacts, RunFacts, WallsChange
 from fleet2d.viewer.home_facts import home_facts
 from fleet2d.viewer.run_facts import bodies_of
+from fleet2d.viewer.walls import door_facts
 
 
 def live_facts(simulation: Simulation) -> RunFacts:
-    """Return the facts of a run that is under way: no tables yet."""
+    """Return the facts of a running simulation, which has no tables yet."""
     scenario = plain(simulation.scenario.resolved())
     clock = simulation.clock
     entities = {
@@ -41,17 +42,8 @@ def live_facts(simulation: Simulation) -> RunFacts:
 
 
 def _doors(simulation: Simulation) -> list[DoorFacts]:
-    doors = []
-    for name, thing in simulation.scenario.objects.items():
-        if isinstance(thing, Door):
-            doorway = thing.find(simulation.home.plan)
-            doors.append(
-                DoorFacts(
-                    name=name,
-                    start=doorway.start,
-                    end=doorway.end,
-                    open=thing.open,
-                    locked=thing.locked,
-                )
-            )
-    return doors
+    return [
+        door_facts(name, door, door.find(simulation.home.plan))
+        for name, door in simulation.scenario.objects.items()
+        if isinstance(door, Door)
+    ]

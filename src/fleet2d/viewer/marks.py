@@ -1,4 +1,4 @@
-"""What the timeline marks: what was done to a run from outside, and what was expected of it."""
+"""The marks of the timeline: interventions, and stretches in which expectations held or not."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
@@ -7,11 +7,11 @@ from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import MarkFacts
 
 INTERVENTIONS = "interventions"
-VIOLATIONS = "violations"  # the table
+VIOLATIONS = "violations"  # name of the table
 
 
 def marks_of(run: Run) -> list[MarkFacts]:
-    """Return the interventions of a run, and the stretches in which each expectation held or not.
+    """Return the marks of a run's interventions and expectations.
 
     Raises:
         ArtifactError: The table of violations is damaged.
@@ -26,7 +26,7 @@ def marks_of(run: Run) -> list[MarkFacts]:
 
 
 def intervention_marks(records: Iterable[Mapping[str, Any]]) -> list[MarkFacts]:
-    """Return interventions, as a manifest keeps them."""
+    """Return the marks of interventions, from the records of a manifest."""
     return [
         MarkFacts(
             lane=INTERVENTIONS,
@@ -40,7 +40,7 @@ def intervention_marks(records: Iterable[Mapping[str, Any]]) -> list[MarkFacts]:
 
 
 def intervention_label(record: Mapping[str, Any]) -> str:
-    """Return an intervention in few words.
+    """Return a short label of an intervention.
 
     >>> intervention_label({"do": "change", "step": 4, "change": {"shut": "bath_door", "at": None}})
     'shut bath_door'
@@ -49,11 +49,11 @@ def intervention_label(record: Mapping[str, Any]) -> str:
     """
     change = record.get("change")
     fields = change if isinstance(change, Mapping) else record
-    words = [value for key, value in fields.items() if isinstance(value, str) and key != "by"]
+    parts = [value for key, value in fields.items() if isinstance(value, str) and key != "by"]
     if isinstance(change, Mapping):
-        words = next(([key, value] for key, value in change.items() if value), ["change"])
+        parts = next(([key, value] for key, value in change.items() if value), ["change"])
     by = f" ({record['by']})" if record.get("by") else ""
-    return " ".join(str(word) for word in words[:3]) + by
+    return " ".join(str(part) for part in parts[:3]) + by
 
 
 def expectation_marks(
@@ -62,10 +62,10 @@ def expectation_marks(
     """Return the stretches of a run in which an expectation held, or was violated.
 
     Args:
-        name: Of the expectation.
-        verdict: What the manifest says of it.
-        violations: First and last step of each violation, in order.
-        steps: Of the run.
+        name: The name of the expectation.
+        verdict: The verdict of the manifest.
+        violations: The first and last step of each violation, in order.
+        steps: The number of steps of the run.
 
     Example:
         >>> marks = expectation_marks("quiet", {"holds": False}, [(10, 19)], 100)
@@ -79,18 +79,18 @@ def expectation_marks(
         if end > step:
             marks.append(MarkFacts(lane=name, step=step, end=end, kind=kind, label=label))
 
-    at, decided = 0, verdict.get("decided", True)
+    end_of_last, is_decided = 0, verdict.get("decided", True)
     for first, last in violations:
-        add(at, first, "held")
-        add(max(at, first), last + 1, "violated")
-        at = max(at, last + 1)
-    none_known = not marks and not verdict.get("holds", True)
-    add(at, steps, "violated" if none_known else "held" if decided else "open")
+        add(end_of_last, first, "held")
+        add(max(end_of_last, first), last + 1, "violated")
+        end_of_last = max(end_of_last, last + 1)
+    is_violated = not marks and not verdict.get("holds", True)
+    add(end_of_last, steps, "violated" if is_violated else "held" if is_decided else "open")
     return marks
 
 
 def _violations(run: Run) -> dict[str, list[tuple[int, int]]]:
-    """Return first and last step of each expectation's violations, in order."""
+    """Return the first and last steps of violations in order, by name of the expectation."""
     if VIOLATIONS not in run.tables:
         return {}
     table = run.tables[VIOLATIONS]

@@ -15,13 +15,13 @@ _STEP = re.compile(r"step (\d+)", re.IGNORECASE)
 
 
 def step_of(text: str, clock: Clock, option: str = "--at") -> int:
-    """Return the step that a text names; the number of steps stands for the end of the run.
+    """Return the step that a text names; the end of the run is the number of its steps.
 
     Args:
         text: ``day 3 18:30`` (day 1 is the date of the start), a local time, a time since the
             start, or ``step 5000``.
-        clock: Of the run.
-        option: Where the text was given, for the message.
+        clock: The clock of the run.
+        option: The option that has the text as its value, for messages.
 
     Raises:
         InputError: The text names no moment, or one outside the run.
@@ -60,17 +60,17 @@ def steps_of(run: Run, begin: str | None, end: str | None) -> tuple[int, int]:
 
     Args:
         run: The run.
-        begin: As for `step_of`; None for the beginning of the run.
-        end: As for `step_of`; None for its end.
+        begin: A text as for `step_of`; None for the start of the run.
+        end: A text as for `step_of`; None for the end of the run.
 
     Raises:
-        InputError: One names no moment of the run, or the part is empty.
+        InputError: A text names no moment of the run, or the part is empty.
     """
     clock = clock_of(run)
     first = 0 if begin is None else step_of(begin, clock, "--from")
     last = clock.steps if end is None else step_of(end, clock, "--to")
     if first >= last:
-        raise InputError(f"--from {begin} is not before --to {end}: nothing is left to show")
+        raise InputError(f"--from {begin} is not before --to {end}: there is nothing to show")
     return first, last
 
 

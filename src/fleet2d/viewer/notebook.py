@@ -1,4 +1,4 @@
-"""How runs and homes show themselves in notebooks."""
+"""Runs and homes in notebooks: figures, pictures and the widget."""
 
 import base64
 import html
@@ -47,7 +47,7 @@ def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
 
 
 def plan_png(plan: FloorPlan) -> bytes | None:
-    """Return a picture of a floor plan; None where matplotlib is not installed."""
+    """Return a PNG of a floor plan; None if matplotlib is not installed."""
     with suppress(Fleet2DError, ImportError):
         return _png(draw_plan(plan, None))
     return None
@@ -61,7 +61,7 @@ def run_widget(run: Run, height: int) -> Any:
 
 
 def run_html(run: Run) -> str:
-    """Return a run as a notebook shows it: what ran, and its picture."""
+    """Return a run as HTML for notebooks: its facts and its picture."""
     clock, entities = clock_of(run), run.manifest["entities"]
     facts = [
         run.status,
@@ -70,13 +70,13 @@ def run_html(run: Run) -> str:
         f"seed {run.manifest['seed']}",
         f"digest {run.digest[:12]}" if run.digest else "no digest",
     ]
-    words = html.escape(" · ".join(facts))
+    text = html.escape(" · ".join(facts))
     picture = ""
-    with suppress(Fleet2DError, ImportError):  # without matplotlib or a plan, there are words
+    with suppress(Fleet2DError, ImportError):  # no matplotlib or no floor plan
         content = base64.b64encode(_png(draw_run(run, None, None))).decode()
         image = f"data:image/png;base64,{content}"
         picture = f'<img alt="The run in its home" style="max-width:100%" src="{image}">'
-    return f"<div><b>{html.escape(run_title(run))}</b><p>{words}</p>{picture}</div>"
+    return f"<div><b>{html.escape(run_title(run))}</b><p>{text}</p>{picture}</div>"
 
 
 def _png(figure: Any) -> bytes:

@@ -1,4 +1,4 @@
-"""A part of a run as a run of its own, so that whatever shows a run shows a part of one."""
+"""A part of a run as a run of its own, so that all that shows runs can show parts."""
 
 from collections.abc import Mapping
 from datetime import timedelta
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.errors import ArtifactError
+from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
 from fleet2d.viewer.moments import clock_of
 
@@ -18,8 +19,8 @@ KEY_FRAMES = "key_frames"
 def part_of_run(run: Run, first: int, end: int) -> Run:
     """Return the part of a run from step `first` to before step `end`, in memory.
 
-    Its steps count from 0, its metrics are left out, and it can't be reproduced. Random walks are
-    kept as the positions they led to.
+    Its steps count from 0, it has no metrics, and it can't be reproduced. Random walks become
+    positions.
 
     Args:
         run: The run.
@@ -43,40 +44,38 @@ def part_of_run(run: Run, first: int, end: int) -> Run:
     }
     names = [name for name in run.tables if not name.startswith("layer.")]
     tables = {name: _cut(run, name, first, end) for name in names}
-    part = Run(None, Manifest(**_known(content)), names, tables.__getitem__)
+    part = Run(None, Manifest(**_fields(content)), names, tables.__getitem__)
     part.plan = run.plan
     return part
 
 
 def key_frame_rows(table: Any, first: int, end: int) -> NDArray[np.int64]:
-    """Return the rows of a table of key frames that poses between two steps follow from."""
+    """Return the rows of a table of key frames that define the poses between two steps."""
     step = table["step"].to_numpy()
-    encoded = table["entity"].cast("string").combine_chunks().dictionary_encode()
-    entity = encoded.indices.to_numpy()
-    kinds = table["kind"].cast("string").combine_chunks().dictionary_encode()
-    planned = [code for code, word in enumerate(kinds.dictionary.to_pylist()) if word == "planned"]
-    reached = ~np.isin(kinds.indices.to_numpy(), planned)
-    kept = np.zeros(len(step), np.bool_)
-    for code in range(len(encoded.dictionary)):
-        mine = np.flatnonzero(entity == code)
-        before = mine[(step[mine] <= first) & reached[mine]]
-        after = mine[step[mine] >= end]
-        low = before[-1] if len(before) else mine[0]
-        high = after[0] if len(after) else mine[-1]
-        kept[mine[(mine >= low) & (mine <= high)]] = True
-    return np.flatnonzero(kept)
+    entity, names = categories(table["entity"])
+    kind, kinds = categories(table["kind"])
+    reached = kind != (kinds.index("planned") if "planned" in kinds else len(kinds))
+    selected = np.zeros(len(step), np.bool_)
+    for code in range(len(names)):
+        rows = np.flatnonzero(entity == code)
+        before = rows[(step[rows] <= first) & reached[rows]]
+        after = rows[step[rows] >= end]
+        low = before[-1] if len(before) else rows[0]
+        high = after[0] if len(after) else rows[-1]
+        selected[rows[(rows >= low) & (rows <= high)]] = True
+    return np.flatnonzero(selected)
 
 
-def _known(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a manifest that this version knows."""
+def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a manifest that exist in this version."""
     return {name: value for name, value in content.items() if name in Manifest.model_fields}
 
 
 def _cut(run: Run, name: str, first: int, end: int) -> Any:
-    """Return the rows of a table in a part of a run, their steps counted from its first."""
+    """Return the rows of a table within a part of a run, with steps relative to its first step."""
     table = run.tables[name]
     if name == KEY_FRAMES:
-        table = without_walks(run)
+        table = expand_walks(run)
         table = table.take(key_frame_rows(table, first, end))
     else:
         step = table["step"].to_numpy()
@@ -88,11 +87,11 @@ def _cut(run: Run, name: str, first: int, end: int) -> Any:
     return table.set_column(index, table.schema.field(index), pa.array(step))
 
 
-def without_walks(run: Run) -> Any:
-    """Return the key frames of a run, random walks step by step.
+def expand_walks(run: Run) -> Any:
+    """Return the key frames of a run with random walks replaced by a position for each step.
 
     Raises:
-        ArtifactError: A walk can't be walked again.
+        ArtifactError: A walk can't be rebuilt.
     """
     import pyarrow as pa
 
@@ -108,18 +107,18 @@ def without_walks(run: Run) -> Any:
 
 
 def plain_schema(table: Any) -> Any:
-    """Return the schema of a table of key frames, without metadata and with texts as they are."""
+    """Return the schema of a table of key frames, with plain strings and without metadata."""
     import pyarrow as pa
 
-    words = {"entity": pa.string(), "kind": pa.string()}
-    return pa.schema([(field.name, words.get(field.name, field.type)) for field in table.schema])
+    texts = {"entity": pa.string(), "kind": pa.string()}
+    return pa.schema([(field.name, texts.get(field.name, field.type)) for field in table.schema])
 
 
 def positions(run: Run, name: str, every: timedelta) -> Any:
-    """Return where a body was, every so often, in the columns of key_frames.
+    """Return the positions of a body at equal intervals, in the columns of key_frames.
 
     Raises:
-        ArtifactError: The run stored no key frames, or they can't be followed.
+        ArtifactError: The run stored no key frames, or the path can't be rebuilt.
     """
     import pyarrow as pa
 

@@ -1,4 +1,4 @@
-"""Pictures of a run: a moment, a stretch, where time was spent, a strip of time, presence."""
+"""Pictures of a run: a moment, a stretch, heat maps, a strip of time."""
 
 from datetime import timedelta
 from pathlib import Path
@@ -42,12 +42,12 @@ HEIGHT_IN = 7.0
 
 
 def draw_moment(run: Run, step: int, path: Path) -> None:
-    """Draw a moment: who is where, what is in view and noticed, the minute before.
+    """Draw a moment: positions, what is in view and noticed, and the paths of the last minute.
 
     Args:
         run: The run.
         step: The step to show.
-        path: Where to: .png, .svg or .pdf. A file there is replaced.
+        path: The file: .png, .svg or .pdf. An existing file is replaced.
 
     Raises:
         InputError: The run has no such step, or the file can't be written.
@@ -88,8 +88,8 @@ def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = 
         run: The run.
         first: Its first step.
         end: The step before which it ends.
-        path: Where to: .png, .svg or .pdf. A file there is replaced.
-        kind: `life`: the home being lived in, and who was where by day. `heat`: where people and
+        path: The file: .png, .svg or .pdf. An existing file is replaced.
+        kind: `life`: paths and presence in the home, and rooms by day. `heat`: where people and
             robots spent their time. `strip`: a row per body, coloured by room.
 
     Raises:
@@ -134,32 +134,32 @@ def _heat_figure(part: Run) -> Figure:
     share = 1 / len(groups)
     for number, (bucket, names) in enumerate(groups):
         axes = figure.add_axes((number * share, 0, share * 0.9, 1))
-        scaled = draw_heat(part, names, axes)
-        words = {"users": "people", "robots": "robots"}[bucket]
-        axes.set_title(f"{words}: hours per day and m²", fontsize=10, color=TEXT_COLOR, y=0.94)
+        colors = draw_heat(part, names, axes)
+        label = "people" if bucket == "users" else "robots"
+        axes.set_title(f"{label}: hours per day and m²", fontsize=10, color=TEXT_COLOR, y=0.94)
         bar = figure.add_axes(((number + 0.91) * share, 0.2, 0.012, 0.6))
-        figure.colorbar(scaled, cax=bar).ax.tick_params(labelsize=7)
+        figure.colorbar(colors, cax=bar).ax.tick_params(labelsize=7)
     return figure
 
 
 def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
-    """Draw where bodies spent their time, together, over their home.
+    """Draw where some bodies together spent their time, over their home.
 
     Args:
         run: The run, or a part of one.
         names: The bodies.
-        axes: Where to draw, in metres.
+        axes: The axes to draw on, in metres.
 
     Returns:
-        What a scale of the colours is made from: hours per day and m².
+        The colours of hours per day and m², for a colour bar.
     """
     plan = run.plan
     floorplan_axes(plan, axes, title=False)
     hours = _hours_per_m2(run, plan, names)
     high = float(hours.max()) or 1.0
-    # A night in one bed would hide the rest: the scale follows the square root.
-    scaled = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
-    image = scaled.to_rgba(hours)
+    # The scale follows the square root: else hours in bed hide all other places.
+    colors = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
+    image = colors.to_rgba(hours)
     image[..., 3] = np.clip(np.sqrt(hours / high) * 3, 0, 0.85) * plan.free
     left, bottom = plan.lattice.origin
     right = left + plan.lattice.columns * plan.lattice.cell
@@ -168,16 +168,16 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
     axes.imshow(
         image, extent=extent, origin="lower", interpolation="bilinear", zorder=2.1, label=SCALE
     )
-    return scaled
+    return colors
 
 
 def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> NDArray[np.float64]:
     step_us, steps = run.manifest["step_us"], run.manifest["steps"]
-    every = timedelta(microseconds=int(step_us * -(-steps // SAMPLES)))
+    interval = timedelta(microseconds=int(step_us * -(-steps // SAMPLES)))
     lattice = plan.lattice
     time = np.zeros((lattice.rows, lattice.columns))
     for name in names:
-        path = run.path(name, every)
+        path = run.path(name, interval)
         xy = np.stack([path.x, path.y], axis=1)[~path.away]
         column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
         row, column = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
@@ -186,7 +186,7 @@ def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> NDArray[np.flo
 
 
 def _day_around(run: Run, step: int) -> tuple[int, int]:
-    """Return the steps between which the day of a step lies."""
+    """Return the first step of the day of a step, and the first step after that day."""
     clock = clock_of(run)
     midnight = clock.time(step).replace(hour=0, minute=0, second=0, microsecond=0)
     first = clock.step_at_or_after(clock.elapsed(midnight))

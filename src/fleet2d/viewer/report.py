@@ -16,14 +16,14 @@ from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.units import format_duration
 from fleet2d.viewer.export import POLICY, embedded_run, html_of
-from fleet2d.viewer.files import write_whole
+from fleet2d.viewer.files import write_file
 from fleet2d.viewer.moments import clock_of
+from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.run_facts import run_title
-from fleet2d.viewer.shown_run import ShownRun
 
 DAY = timedelta(days=1)
 MOST_TIMELINE = 20_000_000
-"""Characters of the page of a run that a report still holds."""
+"""The most characters of a page that is embedded in a report."""
 STYLE = """
 :root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
 body { max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
@@ -40,16 +40,16 @@ iframe { width: 100%; height: 48rem; border: 1px solid #8884; border-radius: 6px
 
 
 def write_report(run: Run, path: Path) -> None:
-    """Write a report of a run as one HTML page that loads nothing.
+    """Write a report of a run as one HTML page without references to other files.
 
     Args:
         run: The run.
-        path: The file; one that is there is replaced.
+        path: The file; an existing file is replaced.
 
     Raises:
         InputError: The file can't be written.
     """
-    write_whole(path, report_html(run).encode())
+    write_file(path, report_html(run).encode())
 
 
 def report_html(run: Run) -> str:
@@ -58,7 +58,7 @@ def report_html(run: Run) -> str:
     parts = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',  # the frame's, too
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',  # its frame's, too
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}: report</title><style>{STYLE}</style></head><body>",
         f"<h1>{title}</h1>",
@@ -101,7 +101,7 @@ def _notes(run: Run) -> str:
 
 
 def flat_metrics(value: Any, name: str = "") -> list[tuple[str, str]]:
-    """Return results of metrics as rows of a table.
+    """Return nested results of metrics as rows (name, value).
 
     >>> flat_metrics({"distance": {"ana": 334.25}})
     [('distance · ana', '334.2')]
@@ -123,7 +123,7 @@ def _table(rows: list[tuple[str, str]]) -> str:
 
 
 def _figures(run: Run) -> list[str]:
-    """Return the pictures of a run, inside the page."""
+    """Return the figures of the report as HTML."""
     from fleet2d.view.floorplan import drawing_style
     from fleet2d.view.run import run_figure
     from fleet2d.viewer.pictures import stretch_figure
@@ -136,25 +136,25 @@ def _figures(run: Run) -> list[str]:
         ("Where time was spent", partial(stretch_figure, run, 0, steps, "heat")),
     )
     figures = []
-    for words, draw in kinds:
+    for caption, draw in kinds:
         try:
             with drawing_style():
-                picture = _both_themes(draw(), words)
+                picture = _both_themes(draw(), caption)
         except (ArtifactError, InputError) as error:
-            figures.append(f"<p>{html.escape(words)}: {html.escape(str(error))}</p>")
+            figures.append(f"<p>{html.escape(caption)}: {html.escape(str(error))}</p>")
         else:
-            figures.append(f"<figure>{picture}<figcaption>{words}</figcaption></figure>")
+            figures.append(f"<figure>{picture}<figcaption>{caption}</figcaption></figure>")
     return figures
 
 
-def _both_themes(figure: Any, words: str) -> str:
-    """Return a figure as a picture that is dark where the page is; the figure is darkened."""
+def _both_themes(figure: Any, caption: str) -> str:
+    """Return a figure as HTML, light or dark as the page is; the figure itself is darkened."""
     from fleet2d.view.theme import darken
 
     light = _png(figure)
     darken(figure)
     dark = f'<source media="(prefers-color-scheme: dark)" srcset="{_png(figure)}">'
-    return f'<picture>{dark}<img alt="{words}" src="{light}"></picture>'
+    return f'<picture>{dark}<img alt="{caption}" src="{light}"></picture>'
 
 
 def _png(figure: Any) -> str:
@@ -164,26 +164,26 @@ def _png(figure: Any) -> str:
 
 
 def _timeline(run: Run) -> str:
-    """Return the page of a run in a frame that reaches nothing of the report."""
-    with suppress(ArtifactError):  # without a plan or key frames there is nothing to scrub
-        page = html_of([embedded_run(ShownRun(run), 0, run.manifest["steps"])])
+    """Return the page of a run in a frame that has no access to the report."""
+    with suppress(ArtifactError):  # no plan or no key frames
+        page = html_of([embedded_run(PageData(run), 0, run.manifest["steps"])])
         if len(page) <= MOST_TIMELINE:
-            held = html.escape(page)
-            return f'<iframe title="Timeline" sandbox="allow-scripts" srcdoc="{held}"></iframe>'
+            document = html.escape(page)
+            return f'<iframe title="Timeline" sandbox="allow-scripts" srcdoc="{document}"></iframe>'
         return "<p>Too large for a page: <code>fleet2d view</code> shows it.</p>"
-    return "<p>The run stored no plan, so that there is none to show.</p>"
+    return "<p>The run stored no floor plan or no key frames: there is no timeline.</p>"
 
 
 def _again(run: Run) -> str:
     scenario = yaml.safe_dump(run.manifest["scenario"], sort_keys=False, allow_unicode=True)
-    where = run.directory or "RUN_DIR"
+    directory = run.directory or "RUN_DIR"
     inputs = "".join(
         f"<li>{html.escape(record['path'])} (SHA-256 {record['sha256'][:16]}…)</li>"
         for record in run.manifest["inputs"]
     )
     files = f"<p>It read:</p><ul>{inputs}</ul>" if inputs else ""
     return (
-        f"<pre>fleet2d reproduce {html.escape(str(where))}</pre>"
+        f"<pre>fleet2d reproduce {html.escape(str(directory))}</pre>"
         f"<p>compares every table with a new run of this scenario:</p>"
         f"<pre>{html.escape(scenario)}</pre>{files}"
     )

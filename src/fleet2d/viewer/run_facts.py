@@ -1,4 +1,4 @@
-"""A stored run as the page is told about it: everything but its tables."""
+"""The facts of a stored run that the page receives: everything except its tables."""
 
 import math
 from collections.abc import Mapping
@@ -26,10 +26,10 @@ Role = Literal["log", "algorithm", "metric", "layer"]
 
 
 def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
-    """Return what the page is told about a run.
+    """Return the facts of a run.
 
     Raises:
-        ArtifactError: The run has no floor plan, or it can't be read.
+        ArtifactError: The run has no floor plan, or the plan can't be read.
     """
     manifest = run.manifest
     scenario = manifest["scenario"]
@@ -57,14 +57,14 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
 
 
 def run_title(run: Run) -> str:
-    """Return what a run is called: its directory, or the name of its scenario."""
+    """Return the title of a run: the name of its directory, else of its scenario."""
     if run.directory is not None:
         return Path(run.directory).resolve().name
     return str(run.manifest["scenario"].get("name") or "run")
 
 
 def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[BodyFacts]:
-    """Return users, then robots, as the page draws them."""
+    """Return the facts of users, then of robots."""
     bodies = []
     for bucket, robot in (("users", False), ("robots", True)):
         for number, name in enumerate(entities.get(bucket, ())):
@@ -113,13 +113,13 @@ def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
 
 
 def _table_facts(run: Run, name: str) -> TableFacts:
-    stored = run.manifest["tables"].get(name)
-    if stored is None:  # a run that was not closed: its tables say themselves what they hold
-        stored = {"rows": _rows_of(run, name), "columns": _columns_of(run, name)}
+    description = run.manifest["tables"].get(name)
+    if description is None:  # the manifest of an unfinished run doesn't list its tables
+        description = {"rows": _rows_of(run, name), "columns": _columns_of(run, name)}
     path = None if run.directory is None else run.directory / f"{name}.parquet"
     return TableFacts(
         name=name,
-        rows=int(stored["rows"]),
+        rows=int(description["rows"]),
         bytes=path.stat().st_size if path is not None and path.exists() else 0,
         role=_role(run.manifest["scenario"], name),
         columns=[
@@ -129,7 +129,7 @@ def _table_facts(run: Run, name: str) -> TableFacts:
                 unit=column.get("unit", ""),
                 description=column.get("description", ""),
             )
-            for column in stored["columns"]
+            for column in description["columns"]
         ],
     )
 

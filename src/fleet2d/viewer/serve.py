@@ -10,39 +10,39 @@ from pathlib import Path
 from fleet2d.errors import InputError
 
 try:
-    import starlette  # noqa: F401 - the server needs both
+    import starlette  # noqa: F401 - the server needs it, too
     import uvicorn
 except ImportError:
     raise InputError('watching needs a server: pip install "fleet2d[view]"') from None
 
 from fleet2d.viewer.guard import new_token
-from fleet2d.viewer.server import LiveRoutes, Shelf, page_app
-from fleet2d.viewer.shown_run import ShownRun
+from fleet2d.viewer.page_data import PageData
+from fleet2d.viewer.server import LiveRoutes, ServedRuns, page_app
 
 HOST = "127.0.0.1"
 MOST_RUNS = 4
 
 
 class PageServer:
-    """The server of a page, ready to be started.
+    """The server of the page, with its port.
 
     Attributes:
-        address: Where the page is, with its token.
+        address: The address of the page, with its token.
         listens_at: Host and port.
     """
 
     def __init__(
         self,
-        sources: Sequence[Path | ShownRun],
+        sources: Sequence[Path | PageData],
         *,
         port: int = 0,
         live: LiveRoutes | None = None,
     ) -> None:
-        """Take a port of this machine.
+        """Bind a port of this machine.
 
         Args:
-            sources: Run directories, or runs.
-            port: The port; 0 takes a free one.
+            sources: Run directories, or data of runs.
+            port: The port; 0: a free one.
             live: A running simulation.
 
         Raises:
@@ -59,8 +59,8 @@ class PageServer:
         self.listens_at: tuple[str, int] = (str(host), int(self._port))
         token = new_token()
         self.address = f"http://{HOST}:{self._port}/{token}/"
-        self._shelf = Shelf(sources)
-        app = page_app(self._shelf, token, self._port, live)
+        self._runs = ServedRuns(sources)
+        app = page_app(self._runs, token, self._port, live)
         config = uvicorn.Config(
             app, log_level="error", lifespan="off", ws="none", timeout_graceful_shutdown=1
         )
@@ -68,15 +68,15 @@ class PageServer:
 
     def run(self) -> None:
         """Serve until Ctrl-C."""
-        threading.Thread(target=self._shelf.warm, daemon=True, name="fleet2d-warm").start()
+        threading.Thread(target=self._runs.preload, daemon=True, name="fleet2d-preload").start()
         asyncio.run(self._server.serve(sockets=[self._socket]))
 
     def close(self) -> None:
-        """Give the port back; for a server that was never run."""
+        """Free the port of a server that was never run."""
         self._socket.close()
 
     def start(self) -> Callable[[], None]:
-        """Serve in a thread; return what ends it."""
+        """Serve in a thread; return a function that stops it."""
         thread = threading.Thread(target=self.run, daemon=True, name="fleet2d-view")
         thread.start()
 
@@ -88,7 +88,7 @@ class PageServer:
 
 
 def serve(
-    sources: Sequence[Path | ShownRun],
+    sources: Sequence[Path | PageData],
     *,
     port: int = 0,
     live: LiveRoutes | None = None,
@@ -98,11 +98,11 @@ def serve(
     """Serve runs until Ctrl-C.
 
     Args:
-        sources: Run directories, or runs.
-        port: The port; 0 takes a free one.
+        sources: Run directories, or data of runs.
+        port: The port; 0: a free one.
         live: A running simulation.
         open_browser: Whether to open the page.
-        announce: Is given the page's address.
+        announce: Called with the address of the page.
 
     Raises:
         InputError: The port is in use.

@@ -1,4 +1,4 @@
-"""The server of the page: this machine only, the runs that it was given, and nothing else."""
+"""The server of the page: it serves the page and some runs on this machine, and nothing else."""
 
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
@@ -17,8 +17,8 @@ from fleet2d.runs.run import open_run
 from fleet2d.version import __version__
 from fleet2d.viewer.contract import SessionFacts
 from fleet2d.viewer.guard import Guard
+from fleet2d.viewer.page_data import PageData, compact_json
 from fleet2d.viewer.responses import json_answer, problem
-from fleet2d.viewer.shown_run import ShownRun, compact_json
 
 PAGE = Path(__file__).parent / "page"
 MEDIA = {
@@ -28,34 +28,34 @@ MEDIA = {
     ".svg": "image/svg+xml",
 }
 
-Answer = Callable[[Request], Awaitable[Response]]
+Endpoint = Callable[[Request], Awaitable[Response]]
 
 
 class LiveRoutes(Protocol):
-    """What a running simulation adds to the server."""
+    """The routes that a running simulation adds to the server."""
 
     def routes(self) -> list[Route]:
         """Return its routes."""
 
 
-class Shelf:
-    """The runs that are served, each opened when it is first asked for."""
+class ServedRuns:
+    """The runs that are served; each is opened when it is first requested."""
 
-    def __init__(self, sources: Sequence[Path | ShownRun]) -> None:
-        """Open nothing yet."""
+    def __init__(self, sources: Sequence[Path | PageData]) -> None:
+        """Name run directories, or data of runs; nothing is opened."""
         self._sources = list(sources)
-        self._opened: dict[int, ShownRun] = {}
+        self._data: dict[int, PageData] = {}
 
     @property
     def titles(self) -> list[str]:
-        """What the runs are called."""
+        """The titles of the runs."""
         return [
-            source.title if isinstance(source, ShownRun) else source.resolve().name
+            source.title if isinstance(source, PageData) else source.resolve().name
             for source in self._sources
         ]
 
-    def run(self, number: int) -> ShownRun:
-        """Return a run.
+    def data(self, number: int) -> PageData:
+        """Return the data of a run.
 
         Raises:
             ArtifactError: There is no such run.
@@ -63,38 +63,38 @@ class Shelf:
         """
         if not 0 <= number < len(self._sources):
             raise ArtifactError(f"there is no run {number}")
-        if number not in self._opened:
+        if number not in self._data:
             source = self._sources[number]
-            self._opened[number] = (
-                source if isinstance(source, ShownRun) else ShownRun(open_run(source))
+            self._data[number] = (
+                source if isinstance(source, PageData) else PageData(open_run(source))
             )
-        return self._opened[number]
+        return self._data[number]
 
-    def warm(self) -> None:
-        """Work out what the page asks for first; what is wrong is said when it is asked for."""
+    def preload(self) -> None:
+        """Compute the data that the page requests first; errors are reported on its request."""
         for number in range(len(self._sources)):
             with suppress(Fleet2DError, OSError, ValueError, KeyError):
-                shown = self.run(number)
-                _ = shown.facts_json
-                shown.walls(0)
-                _ = shown.sightings
+                data = self.data(number)
+                _ = data.facts_json
+                data.walls(0)
+                _ = data.sightings
 
 
 def page_app(
-    shelf: Shelf, token: str, port: int, live: LiveRoutes | None = None, page: Path = PAGE
+    runs: ServedRuns, token: str, port: int, live: LiveRoutes | None = None, page: Path = PAGE
 ) -> ASGIApp:
     """Return the application that serves the page and some runs.
 
     Args:
-        shelf: The runs.
-        token: First part of every path.
-        port: The port that it is served at.
+        runs: The runs.
+        token: The first part of every path.
+        port: The port of the server.
         live: A running simulation, beside or instead of runs.
         page: The folder of the page's bundle.
     """
 
     async def session(_: Request) -> Response:
-        facts = SessionFacts(runs=shelf.titles, live=live is not None, version=__version__)
+        facts = SessionFacts(runs=runs.titles, live=live is not None, version=__version__)
         return json_answer(compact_json(facts))
 
     async def file(request: Request) -> Response:
@@ -107,58 +107,58 @@ def page_app(
     routes = [
         Route("/", file),
         Route("/session.json", session),
-        Route("/run/{number:int}/facts.json", _of_run(shelf, _facts)),
-        Route("/run/{number:int}/sightings.json", _of_run(shelf, _sightings)),
-        Route("/run/{number:int}/walls/{walls:int}.json", _of_run(shelf, _walls)),
-        Route("/run/{number:int}/tables/{table}.parquet", _of_run(shelf, _table)),
+        Route("/run/{number:int}/facts.json", _endpoint(runs, _facts)),
+        Route("/run/{number:int}/sightings.json", _endpoint(runs, _sightings)),
+        Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(runs, _walls)),
+        Route("/run/{number:int}/tables/{table}.parquet", _endpoint(runs, _table)),
         *(live.routes() if live else ()),
         Route("/{name}", file),
     ]
-    return Guard(_below(token, Starlette(routes=routes)), token, port)
+    return Guard(_strip_token(token, Starlette(routes=routes)), token, port)
 
 
-def _below(token: str, app: ASGIApp) -> ASGIApp:
-    """Serve an application below the token; the guard has compared it."""
+def _strip_token(token: str, app: ASGIApp) -> ASGIApp:
+    """Remove the token from paths; the guard has compared it."""
 
-    async def served(scope, receive, send) -> None:  # type: ignore[no-untyped-def]
+    async def serve(scope, receive, send) -> None:  # type: ignore[no-untyped-def]
         path = scope.get("path", "")
         if scope["type"] == "http":
-            rest = path.removeprefix(f"/{token}") or "/"
-            scope = {**scope, "path": rest, "raw_path": rest.encode(), "root_path": ""}
+            path = path.removeprefix(f"/{token}") or "/"
+            scope = {**scope, "path": path, "raw_path": path.encode(), "root_path": ""}
         await app(scope, receive, send)
 
-    return served
+    return serve
 
 
-def _of_run(shelf: Shelf, answer: Callable[[ShownRun, Request], Response]) -> Answer:
-    """Return a route that answers of a run, or says what is wrong with it."""
+def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:
+    """Return the endpoint of data of a run; its response to errors is their message."""
 
     def work(request: Request) -> Response:
         try:
-            return answer(shelf.run(request.path_params["number"]), request)
+            return respond(runs.data(request.path_params["number"]), request)
         except Fleet2DError as error:
             return problem(str(error))
         except (OSError, ValueError, KeyError) as error:
-            return problem(f"the run can't be read, its files are damaged ({error!r})")
+            return problem(f"the run can't be read: its files are damaged ({error!r})")
 
-    async def served(request: Request) -> Response:
+    async def endpoint(request: Request) -> Response:
         return await run_in_threadpool(work, request)
 
-    return served
+    return endpoint
 
 
-def _facts(shown: ShownRun, _: Request) -> Response:
-    return json_answer(shown.facts_json)
+def _facts(data: PageData, _: Request) -> Response:
+    return json_answer(data.facts_json)
 
 
-def _sightings(shown: ShownRun, _: Request) -> Response:
-    return json_answer(compact_json(shown.sightings))
+def _sightings(data: PageData, _: Request) -> Response:
+    return json_answer(compact_json(data.sightings))
 
 
-def _walls(shown: ShownRun, request: Request) -> Response:
-    return json_answer(compact_json(shown.walls(request.path_params["walls"])))
+def _walls(data: PageData, request: Request) -> Response:
+    return json_answer(compact_json(data.walls(request.path_params["walls"])))
 
 
-def _table(shown: ShownRun, request: Request) -> Response:
-    path = shown.table_path(request.path_params["table"])
+def _table(data: PageData, request: Request) -> Response:
+    path = data.table_path(request.path_params["table"])
     return FileResponse(path, media_type="application/vnd.apache.parquet")

@@ -17,13 +17,13 @@ from fleet2d.runs.run import Run
 from fleet2d.view.page import HATCH_COLOR, QUIET_COLOR
 from fleet2d.viewer.sightings import sightings_of
 
-SEEN_PART = 0.22  # of a row, at its foot, where somebody is marked as seen
+SEEN_PART = 0.22  # height of the marks of sightings at the foot of a row, as a share of it
 ROW_PART = 0.86
 MOST_SAMPLES = 100_000
-LABEL_PART = 0.05  # of the strip: a stretch at least so long has its room written in
+LABEL_PART = 0.05  # stretches longer than this share of the strip have the name of their room
 
 
-class Row(NamedTuple):
+class StripRow(NamedTuple):
     """A row of a strip: the rooms of a body at equal intervals, -1 while away."""
 
     name: str
@@ -32,49 +32,49 @@ class Row(NamedTuple):
     time: NDArray[np.datetime64]
 
 
-def strip_rows(run: Run, colors: Sequence[tuple[str, str]]) -> list[Row]:
+def strip_rows(run: Run, colors: Sequence[tuple[str, str]]) -> list[StripRow]:
     """Return the rows of some bodies.
 
     Args:
         run: The run, or a part of one.
-        colors: Names of bodies, and the colours of their names.
+        colors: (name of a body, colour of its name) pairs.
 
     Raises:
         ArtifactError: The run stored no key frames.
     """
     step_us, steps = run.manifest["step_us"], run.manifest["steps"]
-    every = timedelta(microseconds=int(step_us * -(-steps // MOST_SAMPLES)))
+    interval = timedelta(microseconds=int(step_us * -(-steps // MOST_SAMPLES)))
     rows = []
     for name, color in colors:
-        path = run.path(name, every)
-        rows.append(Row(name, color, path.room, path.time))
+        path = run.path(name, interval)
+        rows.append(StripRow(name, color, path.room, path.time))
     return rows
 
 
 def draw_strip(
-    run: Run, plan: FloorPlan, rows: Sequence[Row], axes: Axes, *, words: bool = True
+    run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes, *, names: bool = True
 ) -> None:
     """Draw a strip of a run, or of a part of one.
 
     Args:
-        run: The run, for what robots noticed.
+        run: The run, for its sightings.
         plan: Its home.
-        rows: Of `strip_rows`.
-        axes: Where to draw; its limits are set.
-        words: Whether to write rooms into long stretches.
+        rows: The rows that `strip_rows` returned.
+        axes: The axes to draw on; their limits are set.
+        names: Whether to write the names of rooms into long stretches.
     """
     begin, end = _limits(run)
     boxes: list[NDArray[np.float64]] = []
     faces: list[tuple[float, float, float]] = []
     for number, row in enumerate(rows):
-        for first, last, room in _stretches(row, end):
+        for start, stop, room in _stretches(row, end):
             low, high = number, number + ROW_PART
-            boxes.append(np.array([[first, low], [last, low], [last, high], [first, high]]))
+            boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
-            if words and room >= 0 and last - first > LABEL_PART * (end - begin):
+            if names and room >= 0 and stop - start > LABEL_PART * (end - begin):
                 name = plan.rooms[room].name.replace("_", " ")
                 axes.text(
-                    (first + last) / 2,
+                    (start + stop) / 2,
                     number + 0.42,
                     name,
                     clip_on=True,
@@ -96,16 +96,16 @@ def _limits(run: Run) -> tuple[float, float]:
     return begin, end
 
 
-def _stretches(row: Row, end: float) -> list[tuple[float, float, int]]:
-    """Return begin, end and room of the stretches in a row."""
+def _stretches(row: StripRow, end: float) -> list[tuple[float, float, int]]:
+    """Return start, end and room of the stretches in a row; times as matplotlib has them [days]."""
     cuts = np.append(0, np.flatnonzero(np.diff(row.room)) + 1)
     begins = mdates.date2num(row.time[cuts]).tolist()
     ends = [*begins[1:], end]
     return list(zip(begins, ends, row.room[cuts].tolist(), strict=True))
 
 
-def _mark_sightings(run: Run, rows: Sequence[Row], axes: Axes) -> None:
-    """Mark at the foot of a user's row when a robot noticed the user."""
+def _mark_sightings(run: Run, rows: Sequence[StripRow], axes: Axes) -> None:
+    """Mark at the foot of a user's row when robots noticed the user."""
     start = np.datetime64(run.manifest["start"], "us")
     step = np.timedelta64(run.manifest["step_us"], "us")
     names = [row.name for row in rows]
@@ -122,7 +122,7 @@ def _mark_sightings(run: Run, rows: Sequence[Row], axes: Axes) -> None:
     axes.add_collection(PolyCollection(boxes, facecolors=TEXT_COLOR, lw=0, zorder=2), autolim=False)
 
 
-def _label(axes: Axes, rows: Sequence[Row]) -> None:
+def _label(axes: Axes, rows: Sequence[StripRow]) -> None:
     locator = mdates.AutoDateLocator(minticks=3, maxticks=10)
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator))

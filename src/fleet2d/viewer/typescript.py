@@ -1,4 +1,4 @@
-"""Write the page's side of the contract: ``python -m fleet2d.viewer.typescript > contract.ts``."""
+"""Generate ``contract.ts`` of the page: ``python -m fleet2d.viewer.typescript > contract.ts``."""
 
 import sys
 import types
@@ -12,21 +12,21 @@ _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(N
 
 
 def contract_source() -> str:
-    """Return the TypeScript interfaces of everything that the page is sent."""
+    """Return the TypeScript interfaces of all types of the contract."""
     shapes = [value for value in vars(contract).values() if is_typeddict(value)]
     return "\n".join([HEADER, *map(_interface, shapes)])
 
 
 def _interface(shape: Any) -> str:
-    said = " ".join((shape.__doc__ or "").split())
+    comment = " ".join((shape.__doc__ or "").split())
     fields = typing.get_type_hints(shape)
-    lines = [f"  {name}: {_written(kind)};" for name, kind in fields.items()]
+    lines = [f"  {name}: {_typescript(kind)};" for name, kind in fields.items()]
     body = "\n".join(lines)
-    return f"/** {said} */\nexport interface {shape.__name__} {{\n{body}\n}}\n"
+    return f"/** {comment} */\nexport interface {shape.__name__} {{\n{body}\n}}\n"
 
 
-def _written(kind: Any) -> str:
-    """Return a type as TypeScript writes it."""
+def _typescript(kind: Any) -> str:
+    """Return a type in TypeScript."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if kind is Any:
         return "unknown"
@@ -37,15 +37,15 @@ def _written(kind: Any) -> str:
     if origin is Literal:
         return " | ".join(f'"{word}"' for word in arguments)
     if origin in (types.UnionType, typing.Union):
-        return " | ".join(map(_written, arguments))
+        return " | ".join(map(_typescript, arguments))
     if origin is list:
-        inner = _written(arguments[0])
-        return f"({inner})[]" if "|" in inner else f"{inner}[]"
+        item = _typescript(arguments[0])
+        return f"({item})[]" if "|" in item else f"{item}[]"
     if origin is tuple:
-        return f"[{', '.join(map(_written, arguments))}]"
+        return f"[{', '.join(map(_typescript, arguments))}]"
     if origin is dict:
-        return f"Record<{_written(arguments[0])}, {_written(arguments[1])}>"
-    raise TypeError(f"the page's contract has no word for {kind}")
+        return f"Record<{_typescript(arguments[0])}, {_typescript(arguments[1])}>"
+    raise TypeError(f"{kind} has no TypeScript type: add it to the generator")
 
 
 if __name__ == "__main__":

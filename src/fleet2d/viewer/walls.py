@@ -1,4 +1,4 @@
-"""What ended sight at each step of a stored run: doors that were shut, furniture that was moved."""
+"""The walls that block sight at each step of a stored run: doors shut, furniture moved."""
 
 import re
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from fleet2d.kernels.mesh import Mesh
 from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import DoorFacts, WallsChange
 
-_MOVED = re.compile(r"(.+) to \((\S+), (\S+)\)")
+_MOVE = re.compile(r"(.+) to \((\S+), (\S+)\)")
 MOST_ARRANGEMENTS = 500
 
 
@@ -27,7 +27,7 @@ class HomeDoors:
 
 
 def doors_of(run: Run) -> HomeDoors:
-    """Return the doors that a run's scenario hangs in its home."""
+    """Return the doors of a run's scenario."""
     doors = HomeDoors()
     for name, settings in run.manifest["scenario"].get("objects", {}).items():
         if settings.get("type") != "door":
@@ -36,27 +36,26 @@ def doors_of(run: Run) -> HomeDoors:
         doorway = door.find(run.plan)
         doors.names.append(name)
         doors.doorways.append(doorway)
-        doors.facts.append(
-            DoorFacts(
-                name=name,
-                start=doorway.start,
-                end=doorway.end,
-                open=door.open,
-                locked=door.locked,
-            )
-        )
+        doors.facts.append(door_facts(name, door, doorway))
     return doors
+
+
+def door_facts(name: str, door: Door, doorway: Doorway) -> DoorFacts:
+    """Return a door as it is when the run starts."""
+    return DoorFacts(
+        name=name, start=doorway.start, end=doorway.end, open=door.open, locked=door.locked
+    )
 
 
 class WallsHistory:
     """The walls of a run over time, each arrangement of doors and furniture once.
 
     Attributes:
-        changes: From which step on which walls hold, in order.
+        changes: The steps at which the walls change, with the number of the new walls, in order.
     """
 
     def __init__(self, run: Run, doors: HomeDoors) -> None:
-        """Go through the events of a run."""
+        """Replay the events of a run that change its home."""
         self._home = Home(run.plan, doors.doorways)
         self._doors = doors
         self._meshes: list[Mesh] = []
@@ -67,10 +66,10 @@ class WallsHistory:
         self.changes = [WallsChange(step=0, walls=self._number())]
         if doors.names or run.manifest["scenario"].get("changes"):
             for step, entity, event, detail in _home_events(run):
-                self._follow(step, entity, event, detail)
+                self._replay(step, entity, event, detail)
 
     def mesh(self, number: int) -> Mesh:
-        """Return what ends sight in an arrangement.
+        """Return the walls of an arrangement.
 
         Raises:
             ArtifactError: There is no such arrangement.
@@ -84,14 +83,14 @@ class WallsHistory:
         """Number of different arrangements."""
         return len(self._meshes)
 
-    def _follow(self, step: int, entity: str, event: str, detail: str) -> None:
+    def _replay(self, step: int, entity: str, event: str, detail: str) -> None:
         if event in ("opened", "shut") and entity in self._doors.names:
             self._home.set_door(self._doors.names.index(entity), is_open=event == "opened")
-        elif event == "moved" and (place := _MOVED.fullmatch(detail)):
-            thing = self._home.object(place[1])
+        elif event == "moved" and (place := _MOVE.fullmatch(detail)):
+            item = self._home.object(place[1])
             to = (float(place[2]), float(place[3]))
             try:
-                self._home.put(move_object(thing, self._home.plan.lattice, to, 0.0))
+                self._home.put(move_object(item, self._home.plan.lattice, to, 0.0))
             except Fleet2DError:
                 return
         else:
@@ -105,9 +104,9 @@ class WallsHistory:
             self.changes.append(WallsChange(step=step, walls=walls))
 
     def _number(self) -> int:
-        tall = tuple(thing for thing in self._home.objects if thing.blocks == "sight")
-        places = tuple((thing.name, thing.footprint.wkb) for thing in tall)
-        key = (self._home.shut, places)
+        """Return the number of the walls as they are now."""
+        tall = (item for item in self._home.objects if item.blocks == "sight")
+        key = (self._home.shut, tuple((item.name, item.footprint.wkb) for item in tall))
         if key not in self._numbers:
             self._numbers[key] = len(self._meshes)
             self._meshes.append(self._home.walls)
@@ -115,7 +114,7 @@ class WallsHistory:
 
 
 def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
-    """Return step, entity, event and detail of what changed in the home, in order."""
+    """Return step, entity, event and detail of the events that change the home, in order."""
     if "events" not in run.tables:
         return []
     from pyarrow import array, compute
@@ -124,8 +123,8 @@ def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
         table = run.tables["events"]
     except ArtifactError:  # the run's notes say that it is damaged
         return []
-    words = compute.cast(table["event"], "string")
-    rows = table.filter(compute.is_in(words, array(["opened", "shut", "moved"])))
+    events = compute.cast(table["event"], "string")
+    rows = table.filter(compute.is_in(events, array(["opened", "shut", "moved"])))
     columns: list[list[Any]] = [
         rows["step"].to_pylist(),
         *(rows[name].cast("string").to_pylist() for name in ("entity", "event", "detail")),

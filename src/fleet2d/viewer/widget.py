@@ -1,11 +1,11 @@
-"""The page of a run as a widget, for Jupyter, marimo and whatever else shows anywidgets."""
+"""The page of a run as an anywidget, for Jupyter, marimo and other notebooks."""
 
 from pathlib import Path
 
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.viewer.export import embedded_run, html_of
-from fleet2d.viewer.shown_run import ShownRun
+from fleet2d.viewer.page_data import PageData
 
 try:
     import anywidget
@@ -15,11 +15,11 @@ except ImportError:
 
 
 class RunWidget(anywidget.AnyWidget):  # type: ignore[misc]
-    """The page of a run in a frame of its own.
+    """The page of a run in a frame.
 
     Attributes:
-        content: The page, with the run in it.
-        height: Of the frame [pixels].
+        content: The HTML of the page, with the data of the run.
+        height: The height of the frame [pixels].
     """
 
     _esm = Path(__file__).parent / "widget.js"
@@ -29,5 +29,5 @@ class RunWidget(anywidget.AnyWidget):  # type: ignore[misc]
 
 def run_widget(run: Run, height: int) -> RunWidget:
     """Return the page of a run as a widget; see `Run.view`."""
-    held = embedded_run(ShownRun(run), 0, run.manifest["steps"])
-    return RunWidget(content=html_of([held]), height=height)
+    embedded = embedded_run(PageData(run), 0, run.manifest["steps"])
+    return RunWidget(content=html_of([embedded]), height=height)

@@ -1,4 +1,4 @@
-"""A run as it is served: what the page asks for, worked out when first asked for."""
+"""The data of a run for the page, computed when it is first requested."""
 
 import io
 import json
@@ -20,21 +20,21 @@ from fleet2d.viewer.sightings import sightings_of
 from fleet2d.viewer.walls import WallsHistory, doors_of
 
 POSES = "poses"
-"""A table that the page reads in place of `key_frames` where bodies walk at random."""
+"""A table that replaces `key_frames` for the page in runs with random walks."""
 MOST_POSES = 200_000
 MOST_ROWS = 1 << 17
 
 
-class ShownRun:
-    """A run, and what the page is sent of it.
+class PageData:
+    """The data of a run for the page.
 
     Attributes:
         run: The run.
-        title: What it is called.
+        title: Its title.
     """
 
     def __init__(self, run: Run) -> None:
-        """Work out nothing yet."""
+        """Take a run; nothing is computed."""
         self.run = run
         self.title = run_title(run)
         self._folder: Path | None = None
@@ -49,7 +49,7 @@ class ShownRun:
 
     @cached_property
     def facts(self) -> RunFacts:
-        """Everything about the run but its tables.
+        """Everything about the run except its tables.
 
         Raises:
             ArtifactError: The run has no floor plan, or is damaged.
@@ -60,11 +60,11 @@ class ShownRun:
 
     @cached_property
     def facts_json(self) -> bytes:
-        """The facts as they are sent."""
+        """The facts as JSON."""
         return compact_json(self.facts)
 
     def walls(self, number: int) -> WallsFacts:
-        """Return what ended sight in one of the run's arrangements.
+        """Return the walls that block sight in one of the run's arrangements.
 
         Raises:
             ArtifactError: There is no such arrangement.
@@ -73,7 +73,7 @@ class ShownRun:
 
     @property
     def arrangements(self) -> int:
-        """How many arrangements of doors and furniture the run went through."""
+        """The number of different arrangements of doors and furniture in the run."""
         return self._walls.count
 
     @cached_property
@@ -88,18 +88,18 @@ class ShownRun:
             ArtifactError: The run has no such table.
         """
         if name == POSES and self._walks_every_us:
-            return self._written(POSES, self._poses)
+            return self._temporary_file(POSES, self._poses)
         if name not in self.run.tables:
             raise ArtifactError(f"the run has no table {name!r}")
         if self.run.directory is not None:
             path = self.run.directory / f"{name}.parquet"
             if path.is_file():
                 return path
-        # A run in memory, or one that was never closed, whose rows stand in its journal.
-        return self._written(name, lambda: self.run.tables[name])
+        # A run in memory, or an unfinished one, whose rows are in its journal.
+        return self._temporary_file(name, lambda: self.run.tables[name])
 
-    def _written(self, name: str, table: Any) -> Path:
-        """Return a file of a table that lies in no run directory."""
+    def _temporary_file(self, name: str, table: Any) -> Path:
+        """Return a temporary file of a table that is no file of a run directory."""
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
@@ -110,7 +110,7 @@ class ShownRun:
 
     @cached_property
     def _walks_every_us(self) -> int:
-        """Time between two positions [us] where bodies walk at random; 0 where none does."""
+        """The interval of positions in `poses` [us]; 0 if the run has no random walks."""
         if "key_frames" not in self.run.tables:
             return 0
         kinds = self.run.tables["key_frames"]["kind"].cast("string")
@@ -124,9 +124,9 @@ class ShownRun:
         import pyarrow as pa
 
         entities = self.run.manifest["entities"]
-        every = timedelta(microseconds=self._walks_every_us)
+        interval = timedelta(microseconds=self._walks_every_us)
         names = (*entities["users"], *entities["robots"])
-        parts = [positions(self.run, name, every) for name in names]
+        parts = [positions(self.run, name, interval) for name in names]
         return pa.concat_tables(parts)
 
 
@@ -136,18 +136,18 @@ def compact_json(content: Any) -> bytes:
 
 
 def write_table(table: Any, target: Path | io.BytesIO) -> None:
-    """Write a table as Parquet, packed as the tables of a run directory are."""
+    """Write a table as Parquet, with the encodings of the tables of a run directory."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     names = {field.name: field.type for field in table.schema}
-    sorted_names = [n for n, t in names.items() if pa.types.is_int64(t) or pa.types.is_timestamp(t)]
-    words = [n for n, t in names.items() if pa.types.is_dictionary(t) or pa.types.is_string(t)]
+    delta_names = [n for n, t in names.items() if pa.types.is_int64(t) or pa.types.is_timestamp(t)]
+    texts = [n for n, t in names.items() if pa.types.is_dictionary(t) or pa.types.is_string(t)]
     pq.write_table(
         table,
         target,
         compression="zstd",
-        use_dictionary=words,
-        column_encoding=dict.fromkeys(sorted_names, "DELTA_BINARY_PACKED"),
+        use_dictionary=texts,
+        column_encoding=dict.fromkeys(delta_names, "DELTA_BINARY_PACKED"),
         row_group_size=MOST_ROWS,
     )

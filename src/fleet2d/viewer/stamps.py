@@ -1,4 +1,4 @@
-"""Words on the frames of a film: each is drawn once, and pasted wherever it comes again."""
+"""Text on the frames of a film: each piece is drawn once, then pasted as a picture."""
 
 import re
 from typing import Any, NamedTuple
@@ -9,19 +9,19 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 _NUMBERS = re.compile(r"\d+|\D+")
-EDGE = 2  # pixels around a word that its smoothed rim may reach
+EDGE = 2  # pixels around a text for its antialiased rim
 
 
 class Stamp(NamedTuple):
-    """A drawn word: float32 (rows, columns, 4) in 0 to 1, and where its corner lies [pixels]."""
+    """The picture of a text, RGBA in 0 to 1, float32 (rows, columns, 4); its corner [pixels]."""
 
     picture: NDArray[np.float32]
     left: int
     top: int
 
 
-class Words:
-    """Pastes texts on pictures of one size; drawing one anew takes a hundred times as long."""
+class TextStamps:
+    """Pastes texts on pictures of one size; drawing a text takes a hundred times as long."""
 
     def __init__(self, width: int, height: int, dpi: float) -> None:
         """Prepare for pictures of a size [pixels]."""
@@ -31,28 +31,29 @@ class Words:
         self._advances: dict[tuple[str, float], float] = {}
 
     def paste(self, text: Text, pixels: NDArray[np.uint8]) -> None:
-        """Paste a text where it is on a picture.
+        """Paste a text on a picture, at its position.
 
         Args:
-            text: The text; one that is not visible is left out.
+            text: The text; nothing is pasted if it is invisible.
             pixels: uint8 (rows, columns, 4), changed in place.
         """
         if not text.get_visible() or not text.get_text():
             return
         x, y = self._place(text)
-        words = text.get_text()
-        # A clock has more times than it has hours and minutes.
-        parts = _NUMBERS.findall(words) if text.get_horizontalalignment() == "left" else [words]
+        content = text.get_text()
+        # A clock shows many different times, but few different hours and minutes.
+        is_left = text.get_horizontalalignment() == "left"
+        parts = _NUMBERS.findall(content) if is_left else [content]
         for part in parts:
             text.set_text(part)
             self._paste_part(text, x, y, pixels)
             x += self._advance(text) if len(parts) > 1 else 0
-        text.set_text(words)
+        text.set_text(content)
 
     def _paste_part(self, text: Text, x: float, y: float, pixels: NDArray[np.uint8]) -> None:
         key = (text.get_text(), text.get_color(), float(text.get_fontsize()))
         if key not in self._stamps:
-            self._stamps[key] = self._drawn(text)
+            self._stamps[key] = self._stamp(text)
         stamp = self._stamps[key]
         if stamp is None:
             return
@@ -73,28 +74,28 @@ class Words:
         return x, y
 
     def _advance(self, text: Text) -> float:
-        """Return how far right of a text another goes on [pixels]."""
-        words, font = text.get_text(), text.get_fontproperties()
-        key = (words, float(text.get_fontsize()))
+        """Return the distance from the start of a text to the start of the next [pixels]."""
+        content, font = text.get_text(), text.get_fontproperties()
+        key = (content, float(text.get_fontsize()))
         if key not in self._advances:
-            # Between bars, for blanks at an end have no width of their own.
-            with_words, without = (
+            # Measured between bars: blanks at the end of a text have no width.
+            with_text, without = (
                 self._renderer.get_text_width_height_descent(f"|{part}|", font, False)[0]
-                for part in (words, "")
+                for part in (content, "")
             )
-            self._advances[key] = with_words - without
+            self._advances[key] = with_text - without
         return self._advances[key]
 
-    def _drawn(self, text: Text) -> Stamp | None:
-        """Draw a text alone, and cut out where it is."""
+    def _stamp(self, text: Text) -> Stamp | None:
+        """Draw a text alone; return its picture, None if it is empty."""
         x, y = self._place(text)
         self._renderer.clear()
         text.draw(self._renderer)
         box = text.get_window_extent(self._renderer)
         left, right = max(0, int(box.x0) - EDGE), int(box.x1) + EDGE
         top, bottom = max(0, int(self._height - box.y1) - EDGE), int(self._height - box.y0) + EDGE
-        cut = np.asarray(self._renderer.buffer_rgba())[top:bottom, left:right]
-        if not cut.any():
+        pixels = np.asarray(self._renderer.buffer_rgba())[top:bottom, left:right]
+        if not pixels.any():
             return None
-        drawn = (cut / 255).astype(np.float32)
-        return Stamp(drawn, left - round(x), top - round(self._height - y))
+        picture = (pixels / 255).astype(np.float32)
+        return Stamp(picture, left - round(x), top - round(self._height - y))
