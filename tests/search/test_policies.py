@@ -65,7 +65,7 @@ def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> N
 def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: SearchProblem) -> None:
     """Wherever the target is, and whichever looks would miss it: an account of its own."""
     order = exact(problem)
-    mean, found = 0.0, 0.0
+    mean, success = 0.0, 0.0
     for site, missed in product(range(len(order)), (False, True)):
         chance = problem.prior[site] * (
             1 - problem.detect[site] if missed else problem.detect[site]
@@ -76,10 +76,10 @@ def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: Sear
             seconds += problem.look[look]
             at = look
             if look == site and not missed:
-                mean, found = mean + chance * seconds, found + chance
+                mean, success = mean + chance * seconds, success + chance
                 break
     assert play(problem, order).cost == pytest.approx(mean, abs=1e-9)
-    assert play(problem, order).success == pytest.approx(found, abs=1e-12)
+    assert play(problem, order).success == pytest.approx(success, abs=1e-12)
 
 
 @given(problems(most=7))
@@ -165,17 +165,17 @@ def test_each_heuristic_goes_by_what_it_says() -> None:
 
 def test_looks_that_may_miss_can_be_repeated() -> None:
     problem = search_problem([0.8], [10], [[0]], look=5, detect=0.5)
-    found = play(problem, [0, 0, 0])
-    assert [15.0, 20.0, 25.0] == found.time.tolist()
-    assert [0.4, 0.2, 0.1] == pytest.approx(found.chance.tolist())
-    assert found.success == pytest.approx(0.7)
+    outcome = play(problem, [0, 0, 0])
+    assert [15.0, 20.0, 25.0] == outcome.time.tolist()
+    assert [0.4, 0.2, 0.1] == pytest.approx(outcome.chance.tolist())
+    assert outcome.success == pytest.approx(0.7)
 
 
 def test_restricted_mean_counts_what_is_not_found_as_the_deadline() -> None:
     problem = search_problem([0.5, 0.3], [4, 1], [[0, 5], [5, 0]], look=2)
-    found = play(problem, [1, 0])  # after 3 s with 0.3, after 10 s with 0.5, else never
-    assert found.restricted_mean(9) == pytest.approx(0.3 * 3 + 0.7 * 9)
-    assert found.restricted_mean(100) == pytest.approx(0.3 * 3 + 0.5 * 10 + 0.2 * 100)
+    outcome = play(problem, [1, 0])  # after 3 s with 0.3, after 10 s with 0.5, else never
+    assert outcome.restricted_mean(9) == pytest.approx(0.3 * 3 + 0.7 * 9)
+    assert outcome.restricted_mean(100) == pytest.approx(0.3 * 3 + 0.5 * 10 + 0.2 * 100)
 
 
 def test_sixteen_sites_are_solved_and_more_are_refused() -> None:

@@ -1,1 +1,1 @@
-"""In which order to look for somebody: pure functions of what is believed and how far it is."""
+"""Search: orders in which to look for a person, as functions of probabilities and distances."""

@@ -16,9 +16,9 @@ from fleet2d.streams import Draws
 Policy = Literal["random", "nearest", "likeliest", "greedy", "exact", "receding"]
 
 MOST_EXACT = 16
-"""Exact orders take time and memory by 2**sites: 0.3 s and 25 MB for so many."""
+"""The most sites for an exact order, whose cost grows as 2**sites: 0.3 s and 25 MB for so many."""
 HORIZON = 8
-"""Sites that a receding horizon plans exactly for."""
+"""The number of sites that a receding horizon orders exactly."""
 
 
 def random_order(problem: SearchProblem, draws: Draws) -> list[int]:
@@ -27,17 +27,20 @@ def random_order(problem: SearchProblem, draws: Draws) -> list[int]:
 
 
 def nearest_first(problem: SearchProblem) -> list[int]:
-    """Go on to whatever site is nearest, counting the look; blind to where the target may be."""
+    """Return the order that goes to the nearest site each time, whatever its probability.
+
+    The time of a look counts as part of the way to its site.
+    """
     return _step_by_step(problem, lambda way, _: -way)
 
 
 def likeliest_first(problem: SearchProblem) -> list[int]:
-    """Go on to whatever site the target is likeliest found at, however far it is."""
+    """Return the sites by the probability of finding the target there, the highest first."""
     return _step_by_step(problem, lambda _, gain: gain)
 
 
 def greedy(problem: SearchProblem) -> list[int]:
-    """Go on to whatever site has most chance per second of way and look."""
+    """Return the order that each time maximizes probability per second of way and look."""
     return _step_by_step(problem, lambda way, gain: gain / max(way, 1e-9))
 
 
@@ -45,8 +48,8 @@ def exact(problem: SearchProblem) -> list[int]:
     """Return the order of least expected time: dynamic programming over subsets of sites.
 
     Bellman 1962 and Held and Karp 1962, for the sum of detection times in place of a tour's length:
-    a second spent while the sites S are done counts by the chance that is still to come outside S.
-    So the best cost from (S, i) on is V(S, i) = min over j outside S of
+    a second after looks at the sites S costs the probability that the target is found outside S. So
+    the least cost from (S, i) on is V(S, i) = min over j outside S of
     (way(i, j) + look(j)) * gain(outside S) + V(S + j, j). Takes 2**n n**2 operations.
 
     Raises:
@@ -61,7 +64,7 @@ def exact(problem: SearchProblem) -> list[int]:
     count = len(problem.prior)
     if count > MOST_EXACT:
         raise ValueError(
-            f"an exact order of {count} sites takes too long: at most {MOST_EXACT} are worked out"
+            f"an exact order of {count} sites takes too long: give {MOST_EXACT} at most"
         )
     if not count:
         return []
@@ -75,21 +78,21 @@ def exact(problem: SearchProblem) -> list[int]:
 
 
 def receding(problem: SearchProblem, horizon: int = HORIZON) -> list[int]:
-    """Return the exact order of the most promising sites, and the others greedily behind them.
+    """Return the exact order of the first sites of :func:`greedy`, then the others as they are.
 
-    To be asked again after every look, with the belief as it is then: only its first site counts.
-    Promising is what :func:`greedy` would choose first.
+    Meant to be computed again after every look, with the probabilities after that look: only its
+    first site is used.
     """
     rough = greedy(problem)
-    kept = sorted(rough[:horizon])
+    sites = sorted(rough[:horizon])
     part = SearchProblem(
-        problem.prior[kept],
-        problem.reach[kept],
-        problem.travel[np.ix_(kept, kept)],
-        problem.look[kept],
-        problem.detect[kept],
+        problem.prior[sites],
+        problem.reach[sites],
+        problem.travel[np.ix_(sites, sites)],
+        problem.look[sites],
+        problem.detect[sites],
     )
-    return [kept[site] for site in exact(part)] + rough[horizon:]
+    return [sites[number] for number in exact(part)] + rough[horizon:]
 
 
 def order_by(policy: Policy, problem: SearchProblem, draws: Draws) -> list[int]:
@@ -114,57 +117,57 @@ def after_empty_looks(
     memory: float,
     detect: NDArray[np.float64] | float = 1.0,
 ) -> NDArray[np.float64]:
-    """Return what is believed after looks that found nobody, not divided by its sum.
+    """Return the probabilities of the sites after looks without success, not normalized.
 
-    A look that would have found the target with probability d takes d of what is believed of its
-    site (Bayes). People move, so it counts less the older it is: by d * memory / (memory + age).
-    With d = 1 it is the chance that another look, from the same place, finds somebody: who was
-    there and hidden stays hidden.
+    A look that finds the target with probability d reduces the probability of its site by the part
+    d (Bayes). As people move, it counts less the older it is: by d * memory / (memory + age). With
+    d = 1, the result is the probability that another look from the same place finds the target: a
+    target that was hidden there stays hidden.
 
     Args:
-        prior: float64 (n,), belief without the looks.
-        age: float64 (n,), seconds since the last look at each site; infinite if there was none.
-        memory: Age at which a look counts half [s]; 0: looks say nothing of later.
-        detect: d, for each site or for all.
+        prior: Probabilities without the looks, float64 (n,).
+        age: Time since the last look at each site [s], infinite without one, float64 (n,).
+        memory: Age at which a look counts half [s]; 0: looks have no effect later.
+        detect: The probability d, for each site or for all.
 
     Example:
         >>> after_empty_looks(np.array([0.6, 0.4]), np.array([60.0, np.inf]), memory=60.0).tolist()
         [0.3, 0.4]
     """
-    looked = np.isfinite(age)
-    lasting = np.where(looked, memory / np.maximum(memory + np.where(looked, age, 0.0), 1e-9), 0.0)
-    belief: NDArray[np.float64] = prior * (1 - detect * lasting)
+    has_look = np.isfinite(age)
+    weight = memory / np.maximum(memory + np.where(has_look, age, 0.0), 1e-9)
+    belief: NDArray[np.float64] = prior * (1 - detect * np.where(has_look, weight, 0.0))
     return belief
 
 
 def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]) -> list[int]:
-    """Go on to the site of most worth, a function of the seconds to it and its gain."""
+    """Return the order that each time has the most worth, a function of way [s] and gain."""
     gain, look = problem.gain.tolist(), problem.look.tolist()
-    left, order = list(range(len(gain))), list[int]()
-    while left:
+    remaining, order = list(range(len(gain))), list[int]()
+    while remaining:
         ways = problem.travel[order[-1]] if order else problem.reach
-        best = max(left, key=lambda j: (worth(float(ways[j]) + look[j], gain[j]), -j))
+        best = max(remaining, key=lambda j: (worth(float(ways[j]) + look[j], gain[j]), -j))
         order.append(best)
-        left.remove(best)
+        remaining.remove(best)
     return order
 
 
 def _solve(
     ways: NDArray[np.float64], reach: NDArray[np.float64], gain: NDArray[np.float64]
 ) -> tuple[NDArray[np.int8], int]:
-    """Return the best next site by (sites done, last), and the best first one.
+    """Return the best next site by (subset of sites done, last site), and the best first site.
 
     Args:
-        ways: float64 (n, n), seconds from the end of one look to the end of the next.
-        reach: float64 (n,), seconds to the end of a first look.
-        gain: float64 (n,), the chance of each first look.
+        ways: Time from the end of one look to the end of the next [s], float64 (n, n).
+        reach: Time to the end of a first look [s], float64 (n,).
+        gain: Probability that the first look at each site finds the target, float64 (n,).
     """
     count = len(gain)
     subsets = np.arange(1 << count, dtype=np.int64)
-    left = np.zeros(1 << count)  # the chance outside each subset
+    outside = np.zeros(1 << count)  # the gain of the sites outside each subset
     size = np.zeros(1 << count, np.int64)
     for j, chance in enumerate(gain.tolist()):
-        left += np.where(subsets >> j & 1, 0.0, chance)
+        outside += np.where(subsets >> j & 1, 0.0, chance)
         size += subsets >> j & 1
     cost = np.zeros((1 << count, count))
     choice = np.zeros((1 << count, count), np.int8)
@@ -172,9 +175,9 @@ def _solve(
     for done in range(count - 1, 0, -1):
         layer = subsets[size == done]
         ahead = np.where(layer[:, None] & bits, np.inf, cost[layer[:, None] | bits, last])
-        # By set, last site, and the one after it; of equal ones the first is chosen.
-        total = left[layer][:, None, None] * ways + ahead[:, None, :]
+        # Indexed by subset, last site and next site; of equal ones, the first is chosen.
+        total = outside[layer][:, None, None] * ways + ahead[:, None, :]
         choice[layer] = total.argmin(axis=2)
         cost[layer] = total.min(axis=2)
-    totals = left[0] * reach + cost[bits, last]
+    totals = outside[0] * reach + cost[bits, last]
     return choice, int(np.argmin(totals))

@@ -1,9 +1,9 @@
-"""The search problem: where somebody may be, what it takes to look there, and how an order does.
+"""The search problem: probabilities of sites, travel times, and the outcome of an order of looks.
 
-A target sits still at one of n sites, or is not there at all. A look at a site, once it is over,
-finds the target with a known probability if it is there. Minimising the expected time of detection
-is the graph search problem (Li and Chong 2009); with equal probabilities it is that of the
-traveling deliveryman, or minimum latency (Kulich and others, ECMR 2017).
+A target stays at one of n sites, or is at none of them. At its end, a look at the target's site
+finds it with a known probability. To minimize the expected time of detection is the graph search
+problem (Li and Chong 2009); with equal probabilities it is that of the traveling deliveryman, or
+minimum latency (Kulich and others, ECMR 2017).
 """
 
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ F64 = NDArray[np.float64]
 
 
 class SearchProblem(NamedTuple):
-    """What a search has to go by; made by :func:`search_problem`, which checks it.
+    """A search problem; made by :func:`search_problem`, which checks it.
 
     Attributes:
-        prior: float64 (n,), probability that the target is at each site; what they lack to one is
-            the probability that it is at none of them.
-        reach: float64 (n,), seconds from where the searcher is to each site.
-        travel: float64 (n, n), seconds from site to site; need not be symmetric.
-        look: float64 (n,), seconds that a look takes at each site.
-        detect: float64 (n,), probability that a look at its site finds the target.
+        prior: Probability that the target is at each site, float64 (n,); with the remaining
+            probability it is at none of them.
+        reach: Time from the searcher's position to each site [s], float64 (n,).
+        travel: Time from site to site [s], float64 (n, n); not necessarily symmetric.
+        look: Duration of a look at each site [s], float64 (n,).
+        detect: Probability that a look at the target's site finds it, float64 (n,).
     """
 
     prior: F64
@@ -35,16 +35,16 @@ class SearchProblem(NamedTuple):
 
     @property
     def gain(self) -> F64:
-        """Probability that the first look at each site finds the target: float64 (n,)."""
+        """Probability that the first look at each site finds the target, float64 (n,)."""
         return self.prior * self.detect
 
 
-class Found(NamedTuple):
-    """What an order of looks comes to, worked out exactly.
+class SearchOutcome(NamedTuple):
+    """The distribution of the time of detection for an order of looks.
 
     Attributes:
-        time: float64 (looks,), seconds after which each look is over.
-        chance: float64 (looks,), probability that the target is first found by each look.
+        time: When each look ends [s], float64 (looks,).
+        chance: Probability that the target is first found by each look, float64 (looks,).
     """
 
     time: F64
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
     @property
     def cost(self) -> float:
-        """Sum of time times chance [s]: what the orders of all sites are compared by."""
+        """Sum of time times chance [s], by which the orders of all sites are compared."""
         return float(
             sum(t * p for t, p in zip(self.time.tolist(), self.chance.tolist(), strict=True))
         )
@@ -68,11 +68,11 @@ class Found(NamedTuple):
         return self.cost / self.success if self.success > 0 else 0.0
 
     def restricted_mean(self, deadline: float) -> float:
-        """Return the expected time until the target is found or the deadline is over [s]."""
+        """Return the expected time until the target is found or the deadline is reached [s]."""
         inside = self.time <= deadline
         chances, times = self.chance[inside].tolist(), self.time[inside].tolist()
-        found = sum(t * p for t, p in zip(times, chances, strict=True))
-        return float(found + deadline * (1 - sum(chances)))
+        before_deadline = sum(t * p for t, p in zip(times, chances, strict=True))
+        return float(before_deadline + deadline * (1 - sum(chances)))
 
 
 def search_problem(
@@ -102,10 +102,10 @@ def search_problem(
         np.broadcast_to(np.asarray(detect, np.float64), (count,)).copy(),
     )
     shapes = {"reach": (count,), "travel": (count, count)}
-    for name, wanted in shapes.items():
-        found = getattr(problem, name).shape
-        if found != wanted:
-            raise ValueError(f"{name} has shape {found}; with {count} sites, {wanted} is wanted")
+    for name, expected in shapes.items():
+        shape = getattr(problem, name).shape
+        if shape != expected:
+            raise ValueError(f"{name} has shape {shape}; with {count} sites, {expected} is wanted")
     for name, values in problem._asdict().items():
         if not (np.isfinite(values).all() and (values >= 0).all()):
             raise ValueError(f"{name} has a value that is negative or not finite: {values}")
@@ -114,36 +114,37 @@ def search_problem(
     return problem
 
 
-def play(problem: SearchProblem, order: Sequence[int]) -> Found:
-    """Return when each look of an order is over, and the chance that it is the one that finds.
+def play(problem: SearchProblem, order: Sequence[int]) -> SearchOutcome:
+    """Return when each look of an order ends, and the probability that it finds the target.
 
-    A site may stand in the order several times: looks miss independently of each other.
+    A site may be in the order several times: the outcomes of looks are independent.
 
     Example:
         >>> flat = search_problem([0.5, 0.3], [4, 1], [[0, 5], [5, 0]], look=2)
-        >>> found = play(flat, [1, 0])
-        >>> found.time.tolist(), round(found.mean, 3), round(found.restricted_mean(9), 2)
+        >>> outcome = play(flat, [1, 0])
+        >>> outcome.time.tolist(), round(outcome.mean, 3), round(outcome.restricted_mean(9), 2)
         ([3.0, 10.0], 7.375, 7.2)
     """
-    left = problem.prior.copy()
+    undetected = problem.prior.copy()  # the target is at the site, and no look has found it
     now, at = 0.0, -1
     times, chances = [], []
     for site in order:
         way = problem.reach[site] if at < 0 else problem.travel[at, site]
         now += float(way + problem.look[site])
         times.append(now)
-        chances.append(float(left[site] * problem.detect[site]))
-        left[site] *= 1 - problem.detect[site]
+        chances.append(float(undetected[site] * problem.detect[site]))
+        undetected[site] *= 1 - problem.detect[site]
         at = site
-    return Found(np.array(times, np.float64), np.array(chances, np.float64))
+    return SearchOutcome(np.array(times, np.float64), np.array(chances, np.float64))
 
 
 def clairvoyant_time(problem: SearchProblem) -> float:
-    """Return the expected time of who knows the site and goes straight there [s], given it is one.
+    """Return the expected time of a searcher who knows the target's site [s].
 
-    No policy does better: it is what others are divided by.
+    The target is assumed to be at one of the sites. No policy is faster: times of policies are
+    compared with it by division.
     """
-    there = problem.reach + problem.look
+    direct = problem.reach + problem.look
     total = sum(problem.prior.tolist())
-    weighted = sum((problem.prior * there).tolist())
+    weighted = sum((problem.prior * direct).tolist())
     return float(weighted / total) if total > 0 else 0.0
