@@ -24,10 +24,10 @@ from fleet2d.sight.tables import Scene, error_tables
 def test_factors_without_effect_are_left_out_and_named() -> None:
     log = simulated(7, 4000)
     nothing = np.random.default_rng(8).uniform(0, 60, 4000)
-    found = calibrate(DetectionLog(log.path, log.distance, log.detected, bearing=nothing))
-    assert {"bearing"} == found.detection.left_out.keys()
-    assert {"top", "distance midpoint", "distance width"} == found.detection.estimates.keys()
-    assert any("bearing: left out" in line for line in report(found))
+    calibration = calibrate(DetectionLog(log.path, log.distance, log.detected, bearing=nothing))
+    assert {"bearing"} == calibration.detection.omitted.keys()
+    assert {"top", "distance midpoint", "distance width"} == calibration.detection.estimates.keys()
+    assert any("bearing: left out" in line for line in report(calibration))
 
 
 def test_a_model_that_fits_says_so_and_one_that_does_not_too() -> None:
@@ -35,9 +35,9 @@ def test_a_model_that_fits_says_so_and_one_that_does_not_too() -> None:
     assert calibrate(log).detection.p_value > 0.01
     gap = (log.distance > 1) & (log.distance < 2)  # blind at arm's length: no logistic
     odd = DetectionLog(log.path, log.distance, log.detected & ~gap)
-    found = calibrate(odd)
-    assert found.detection.p_value < 1e-6
-    assert any("the model misses something" in line for line in report(found))
+    calibration = calibrate(odd)
+    assert calibration.detection.p_value < 1e-6
+    assert any("the model misses something" in line for line in report(calibration))
 
 
 def test_the_goodness_of_fit_of_true_models_is_uniform() -> None:
@@ -54,19 +54,21 @@ def test_identities_are_fitted_by_distance_with_their_confusion() -> None:
     right = rng.random(rows) < 0.9 * falling(distance, 3.5, 0.5)
     mistaken = rng.random(rows) < 0.3
     other = np.where(true == "ana", np.where(rng.random(rows) < 0.8, "ben", "cleo"), "ana")
-    taken = np.where(right, true, np.where(mistaken, other, ""))
+    perceived = np.where(right, true, np.where(mistaken, other, ""))
     every = rng.random(rows) < 0.8
-    found = calibrate(
-        DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=taken)
+    calibration = calibrate(
+        DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=perceived)
     )
-    assert found.identity is not None
-    estimates = found.identity.right.estimates
+    assert calibration.identity is not None
+    estimates = calibration.identity.right.estimates
     for name, value in (("top", 0.9), ("distance midpoint", 3.5), ("distance width", 0.5)):
         assert value == pytest.approx(estimates[name].value, rel=0.05)
-    assert 0.3 == pytest.approx(found.identity.mistaken.value, abs=0.02)
-    assert found.identity.confusion["ana"] == pytest.approx({"ben": 0.8, "cleo": 0.2}, abs=0.03)
-    assert {"ana": 1.0} == found.identity.confusion["ben"]
-    section = Perception.model_validate(found.section())
+    assert 0.3 == pytest.approx(calibration.identity.mistaken.value, abs=0.02)
+    assert calibration.identity.confusion["ana"] == pytest.approx(
+        {"ben": 0.8, "cleo": 0.2}, abs=0.03
+    )
+    assert {"ana": 1.0} == calibration.identity.confusion["ben"]
+    section = Perception.model_validate(calibration.section())
     assert section.identity.right is not None
     for x in (0.5, 3.0, 5.5):
         assert section.identity.right.at(x) + section.identity.mistaken.at(x) <= 1
@@ -79,28 +81,28 @@ def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1(
     distance = rng.uniform(0.3, 6, rows)
     true = rng.choice(["ana", "ben"], rows)
     right = rng.random(rows) < 0.97 * falling(distance, 3.5, 0.3)
-    taken = np.where(right, true, np.where(true == "ana", "ben", "ana"))
+    perceived = np.where(right, true, np.where(true == "ana", "ben", "ana"))
     every = rng.random(rows) < 0.9
-    log = DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=taken)
-    found = calibrate(log)
-    identity = Perception.model_validate(found.section()).identity
-    assert found.identity is not None
+    log = DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=perceived)
+    calibration = calibrate(log)
+    identity = Perception.model_validate(calibration.section()).identity
+    assert calibration.identity is not None
     assert identity.right is not None
-    estimates = found.identity.right.estimates
+    estimates = calibration.identity.right.estimates
     values = (estimates[name].value for name in ("top", "distance midpoint", "distance width"))
     top, midpoint, width = values
     for x in np.linspace(0, 6, 601).tolist():
-        right_there, mistaken = identity.right.at(x), identity.mistaken.at(x)
-        assert top * falling(x, midpoint, width) == pytest.approx(right_there, abs=0.006)
-        assert 0.99 < right_there + mistaken <= 1 + 1e-12
+        right_share, mistaken = identity.right.at(x), identity.mistaken.at(x)
+        assert top * falling(x, midpoint, width) == pytest.approx(right_share, abs=0.006)
+        assert 0.99 < right_share + mistaken <= 1 + 1e-12
     error_tables(
-        [Camera().lens(1280, 10**6)], [Perception.model_validate(found.section())],
+        [Camera().lens(1280, 10**6)], [Perception.model_validate(calibration.section())],
         Scene(["ana", "ben"], [256.0] * 2, LATTICE, 10**6, "robots.r"),
     )  # fmt: skip
-    assert any("ana, ben" in note for note in found.notes)
+    assert any("ana, ben" in note for note in calibration.notes)
 
 
-def test_what_a_run_logs_calibrates_to_what_the_run_was_told() -> None:
+def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
     """The whole circle: a simulated camera, its log, and the parameters again."""
     rng = np.random.default_rng(12)
     n = 60_000
@@ -118,12 +120,14 @@ def test_what_a_run_logs_calibrates_to_what_the_run_was_told() -> None:
     detected = np.zeros(n, bool)
     detected[rows[rows[:, USER] == 0, STEP]] = True
     away = np.abs((facing - (bearing + 180) + 180) % 360 - 180)
-    found = calibrate(DetectionLog(Path("x.csv"), distance, detected, np.abs(bearing), away))
-    for name, estimate in found.detection.estimates.items():
+    calibration = calibrate(DetectionLog(Path("x.csv"), distance, detected, np.abs(bearing), away))
+    for name, estimate in calibration.detection.estimates.items():
         assert TRUE[name] == pytest.approx(estimate.value, rel=0.08), name
-    again = Watch(around(distance, bearing, facing), perception=found.section(), seed=2).look()
+    rerun = Watch(
+        around(distance, bearing, facing), perception=calibration.section(), seed=2
+    ).look()
     hits = np.zeros(n, bool)
-    hits[again[again[:, USER] == 0, STEP]] = True
+    hits[rerun[rerun[:, USER] == 0, STEP]] = True
     assert agree(hits, detected.mean())
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 calibrating = typer.Typer(help="Fit a model to a log of a real device.", no_args_is_help=True)
 
-# So that `fleet2d calibrate` keeps its subcommands when there is one of them only.
+# A callback, as typer would otherwise drop the name of the only subcommand.
 calibrating.callback()(lambda: None)
 
 UNITS = {"distance": " m", "bearing": " deg"}
@@ -37,7 +37,7 @@ def perception(
         str | None, typer.Option(help="A scenario that the fragment extends, to run it as it is.")
     ] = None,
 ) -> None:
-    """Fit when people are noticed, and recognized, to a log of a robot's detections."""
+    """Fit the probabilities of noticing and recognizing people to a log of a robot's detections."""
     for line in calibrate_perception(detections, out, picture, robot, extends):
         typer.echo(line)
 
@@ -49,17 +49,17 @@ def calibrate_perception(
     robot: str = "astro",
     extends: str | None = None,
 ) -> list[str]:
-    """Fit a perception to a log, write it as a scenario fragment, and return what to say about it.
+    """Fit a perception to a log, write it as a scenario fragment, and return a report in lines.
 
     Args:
         path: The log.
-        out: The fragment's file.
-        picture: Where to draw the fit; None: nowhere.
+        out: The file of the fragment.
+        picture: The file of a picture of the fit; None: no picture.
         robot: The robot's name in the scenario.
-        extends: A scenario that the fragment extends; None: it is for others to extend.
+        extends: A scenario that the fragment extends; None: other scenarios extend the fragment.
 
     Raises:
-        InputError: The log can't be read, or tells nothing; or a file can't be written.
+        InputError: The log can't be read or fitted, a file can't be written, or scipy is missing.
     """
     from fleet2d.calibrate.log import read_log
     from fleet2d.calibrate.perception import calibrate
@@ -69,61 +69,61 @@ def calibrate_perception(
         from fleet2d.view.floorplan import check_picture
 
         check_picture(picture)
-    found = calibrate(read_log(path))
+    calibration = calibrate(read_log(path))
     try:
-        out.write_text(fragment(found, robot, extends), encoding="utf-8")
+        out.write_text(fragment(calibration, robot, extends), encoding="utf-8")
         if picture is not None:
             from fleet2d.calibrate.picture import draw_fit
 
-            draw_fit(found, picture)
+            draw_fit(calibration, picture)
     except OSError as error:
         raise InputError(f"{error.filename} can't be written: {error.strerror}") from None
-    return [*report(found), f"wrote {out}", *([f"wrote {picture}"] if picture else [])]
+    return [*report(calibration), f"wrote {out}", *([f"wrote {picture}"] if picture else [])]
 
 
-def fragment(found: "Calibration", robot: str, extends: str | None) -> str:
-    """Return a scenario fragment: the robot's camera notices by the fit alone."""
+def fragment(calibration: "Calibration", robot: str, extends: str | None) -> str:
+    """Return a scenario fragment in which the robot notices people as fitted."""
     import yaml
 
     top: dict[str, Any] = {} if extends is None else {"extends": extends}
-    top["robots"] = {robot: {"camera": {"detection": 1}, "perception": found.section()}}
+    top["robots"] = {robot: {"camera": {"detection": 1}, "perception": calibration.section()}}
     text = yaml.safe_dump(top, sort_keys=False, default_flow_style=None, allow_unicode=True)
     return (
-        f"# Fitted to {len(found.log)} rows of {found.log.path.name} by"
+        f"# Fitted to {len(calibration.log)} rows of {calibration.log.path.name} by"
         f" `fleet2d calibrate perception`.\n{text}"
     )
 
 
-def report(found: "Calibration") -> list[str]:
-    """Return what to say about a fit."""
-    log = found.log
+def report(calibration: "Calibration") -> list[str]:
+    """Return a report of a fit in lines: estimates, omitted factors, and goodness of fit."""
+    log = calibration.log
     lines = [
         f"{log.path.name}: {int(log.detected.sum())} detections in {len(log)} times in view",
         "",
         "noticed (95 % intervals in brackets)",
-        *_curves(found.detection),
+        *_curve_lines(calibration.detection),
     ]
-    if found.identity is not None:
-        who = found.identity
-        lines += ["", "recognized, if noticed", *_curves(who.right)]
-        lines.append(f"  of the others, taken for somebody else: {who.mistaken}")
-        for user, others in who.confusion.items():
-            told = ", ".join(f"{name} {share:.2g}" for name, share in others.items())
-            lines.append(f"  {user} is taken for: {told}")
-    return [*lines, *found.notes, ""]
+    if calibration.identity is not None:
+        identity = calibration.identity
+        lines += ["", "recognized, if noticed", *_curve_lines(identity.right)]
+        lines.append(f"  of the others, taken for somebody else: {identity.mistaken}")
+        for user, others in identity.confusion.items():
+            shares = ", ".join(f"{name} {share:.2g}" for name, share in others.items())
+            lines.append(f"  {user} is taken for: {shares}")
+    return [*lines, *calibration.notes, ""]
 
 
-def _curves(curves: "Curves") -> list[str]:
+def _curve_lines(curves: "Curves") -> list[str]:
     lines = [
         f"  {name}: {estimate}{UNITS.get(name.split()[0], '')}"
         for name, estimate in curves.estimates.items()
     ]
-    lines += [f"  {name}: left out: {why}" for name, why in curves.left_out.items()]
+    lines += [f"  {name}: left out: {reason}" for name, reason in curves.omitted.items()]
     freedom = sum(group.rows for group in curves.groups) - len(curves.estimates)
-    fits = "the model fits" if curves.p_value > 0.05 else "the model misses something"
+    verdict = "the model fits" if curves.p_value > 0.05 else "the model misses something"
     lines.append(
         f"  fit: deviance {curves.fit.deviance:.1f} on {freedom} degrees of freedom; predicted"
-        f" against observed: chi2 {curves.chi_square:.1f}, p = {curves.p_value:.2g}: {fits}"
+        f" against observed: chi2 {curves.chi_square:.1f}, p = {curves.p_value:.2g}: {verdict}"
     )
     lines.append("    predicted  observed (95 %)")
     lines += [f"    {group.predicted:9.3f}  {group.observed}" for group in curves.groups]

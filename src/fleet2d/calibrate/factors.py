@@ -1,4 +1,4 @@
-"""The factors of a detection's probability, as the scenario's curves have them."""
+"""The factors of a detection's probability, of the same form as the curves of a scenario."""
 
 import math
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 
-SURE = 12.0  # a logit from which on a share is as good as 1
+SURE = 12.0  # logits from here on count as a share of 1
 
 
 def share_of(logit: float) -> float:
-    """Return the share of a logit; 1 where it is as good as that.
+    """Return the share of a logit, exactly 1 from SURE on.
 
     >>> share_of(0.0), share_of(SURE)
     (0.5, 1.0)
@@ -41,7 +41,7 @@ class Constant:
 
 
 class Falling:
-    """A logistic fall along a quantity: 1 / (1 + exp((x - midpoint) / width))."""
+    """A share that falls with a quantity x, logistically: 1 / (1 + exp((x - midpoint) / width))."""
 
     def __init__(self, name: str, values: F64) -> None:
         self.names = (f"{name} midpoint", f"{name} width")
@@ -54,27 +54,30 @@ class Falling:
     def shares(self, theta: F64) -> tuple[F64, F64]:
         """Return the share of each row, and its derivatives by midpoint and log of width."""
         midpoint, width = float(theta[0]), math.exp(float(theta[1]))
-        steps = np.clip((self._x - midpoint) / width, -700, 700)
-        share = 1 / (1 + np.exp(steps))
-        bend = share * (1 - share)
-        return share, np.stack([bend / width, bend * steps], axis=1)
+        scaled = np.clip((self._x - midpoint) / width, -700, 700)
+        share = 1 / (1 + np.exp(scaled))
+        slope = share * (1 - share)
+        return share, np.stack([slope / width, slope * scaled], axis=1)
 
     def natural(self, index: int, value: float) -> float:
         """Return midpoint or width in the quantity's unit."""
         return math.exp(value) if index else value
 
 
-class Turned:
-    """How much less is noticed from the side and from behind than of a face."""
+class Orientation:
+    """A share that falls with the angle by which a person is turned away, linear by parts.
+
+    It is 1 for a person who faces the camera, `side` at 90 degrees and `back` at 180 degrees.
+    """
 
     names = ("side", "back")
     least, most = (-SURE, -SURE), (SURE, SURE)
     starts = ((2.0, 1.0),)
 
     def __init__(self, degrees: F64) -> None:
-        part = degrees / 90
-        self._side = np.where(part < 1, part, 2 - part)
-        self._back = np.maximum(part - 1, 0)
+        quarters = degrees / 90
+        self._side = np.where(quarters < 1, quarters, 2 - quarters)
+        self._back = np.maximum(quarters - 1, 0)
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
         """Return the share of each row, and its derivatives by the two logits."""

@@ -1,63 +1,77 @@
 """Maximum likelihood for yes-or-no outcomes whose probability is a product of factors.
 
-Fisher scoring finds the maximum; intervals are of the profile likelihood: all values of a parameter
-with which the best of the others explain the log nearly as well (deviance up by at most 3.84, so
-that they cover the truth 95 times out of 100). Unlike a standard error they need no parameter to be
-bell-shaped, and say it when the log bounds a parameter on one side only.
+Fisher scoring finds the maximum. Intervals are those of the profile likelihood: all values of a
+parameter for which the deviance, minimized over the other parameters, is at most 3.84 above its
+minimum. They cover the true value with a probability of 95 %. Unlike standard errors, they don't
+assume normal distributions, and they are open where the log bounds a parameter on one side only.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.errors import InputError
+
+try:
+    from scipy.optimize import brentq
+    from scipy.stats import binomtest
+except ImportError:
+    raise InputError('calibration needs scipy: pip install "fleet2d[calibrate]"') from None
+
 F64 = NDArray[np.float64]
 
 CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
-NEVER = 1e-12  # probabilities are kept this far from 0 and 1
-ENOUGH = 1e-10  # gain of likelihood below which the maximum is found
+NEVER = 1e-12  # the least distance of probabilities from 0 and 1
+ENOUGH = 1e-10  # the search ends when a round gains less log-likelihood than this
 MOST_ROUNDS = 200
 
 
 class Factor(Protocol):
-    """A part of a probability, with parameters of its own that may have any value."""
+    """A factor of a probability, with parameters of its own."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What its parameters are called."""
+        """The names of its parameters."""
 
     @property
     def least(self) -> tuple[float, ...]:
-        """The least that each parameter may be."""
+        """The least value of each parameter."""
 
     @property
     def most(self) -> tuple[float, ...]:
-        """The most that each parameter may be."""
+        """The largest value of each parameter."""
 
     @property
     def starts(self) -> tuple[tuple[float, ...], ...]:
-        """Where the search for the most likely values begins."""
+        """Values of the parameters from which the search for the maximum starts."""
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
         """Return the factor of each row (n,), and its derivatives (n, parameters)."""
 
     def natural(self, index: int, value: float) -> float:
-        """Return a parameter as people read it."""
+        """Return the value of a parameter in the unit of a scenario."""
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A parameter: its most likely value, and its 95 % interval; None: not bounded by the log."""
+class ParameterEstimate:
+    """A parameter: its most likely value and its 95 % interval.
+
+    Attributes:
+        value: The most likely value.
+        low: The lower end of the interval; None: the log doesn't bound the parameter.
+        high: The upper end of the interval; None: likewise.
+    """
 
     value: float
     low: float | None
     high: float | None
 
     def __str__(self) -> str:
-        """Write it like '4.02 (3.95 to 4.09)'."""
+        """Return a text like '4.02 (3.95 to 4.09)'."""
         low = "?" if self.low is None else f"{self.low:.3g}"
         high = "?" if self.high is None else f"{self.high:.3g}"
         return f"{self.value:.3g} ({low} to {high})"
@@ -65,12 +79,12 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Fit:
-    """What explains the outcomes best.
+    """The parameters of a maximum of the likelihood.
 
     Attributes:
-        theta: The parameters of all factors, one behind the other.
-        log_likelihood: How well it explains them.
-        shares: The probability of each row.
+        theta: The parameters of all factors in order, (parameters,).
+        log_likelihood: The logarithm of the likelihood there.
+        shares: The probability of each row, (n,).
     """
 
     theta: F64
@@ -79,12 +93,12 @@ class Fit:
 
     @property
     def deviance(self) -> float:
-        """Twice what the log-likelihood lacks to that of knowing every outcome."""
+        """Twice the difference of the log-likelihood to that of a perfect model, which is 0."""
         return -2 * self.log_likelihood
 
 
-class Likelihood:
-    """How well a product of factors explains outcomes."""
+class ProductLikelihood:
+    """The likelihood of outcomes whose probability is a product of factors."""
 
     def __init__(self, factors: Sequence[Factor], outcomes: NDArray[np.bool_]) -> None:
         self.factors, self.outcomes = factors, outcomes
@@ -95,25 +109,25 @@ class Likelihood:
         """Return the best of the fits from all starting points."""
         starts: list[list[float]] = [[]]
         for factor in self.factors:
-            starts = [[*before, *start] for before in starts for start in factor.starts]
+            starts = [[*values, *start] for values in starts for start in factor.starts]
         free = np.ones(len(self.least), bool)
         return max(
             (self._climb(np.array(start, np.float64), free) for start in starts),
             key=lambda fit: fit.log_likelihood,
         )
 
-    def estimates(self, best: Fit) -> dict[str, Estimate]:
+    def estimates(self, best: Fit) -> dict[str, ParameterEstimate]:
         """Return every parameter with its interval, by name."""
-        found, index = {}, 0
+        estimates, index = {}, 0
         for factor in self.factors:
             for i, name in enumerate(factor.names):
-                ends = [self._end(best, index, way) for way in (-1, 1)]
-                found[name] = Estimate(
+                ends = [self._interval_end(best, index, side) for side in (-1, 1)]
+                estimates[name] = ParameterEstimate(
                     factor.natural(i, float(best.theta[index])),
                     *(None if end is None else factor.natural(i, end) for end in ends),
                 )
                 index += 1
-        return found
+        return estimates
 
     def _model(self, theta: F64) -> tuple[F64, F64]:
         """Return the probabilities, and the derivatives of their logarithms."""
@@ -128,11 +142,12 @@ class Likelihood:
         return np.clip(shares, NEVER, 1 - NEVER), np.concatenate(slopes, axis=1)
 
     def _value(self, shares: F64) -> float:
+        """Return the log-likelihood of the probabilities of the rows."""
         hit = self.outcomes
         return float(np.log(shares[hit]).sum() + np.log1p(-shares[~hit]).sum())
 
     def _climb(self, theta: F64, free: NDArray[np.bool_]) -> Fit:
-        """Climb to the maximum over the free parameters, by damped Fisher scoring."""
+        """Return the maximum over the free parameters, by damped Fisher scoring from `theta`."""
         theta = np.clip(theta, self.least, self.most)
         shares, slopes = self._model(theta)
         value, damping = self._value(shares), 1e-3
@@ -156,68 +171,43 @@ class Likelihood:
                 break
         return Fit(theta, value, shares)
 
-    def _end(self, best: Fit, index: int, way: int) -> float | None:
-        """Return where the profile likelihood of a parameter ends, to one side."""
-        limit = float((self.most if way > 0 else self.least)[index])
+    def _interval_end(self, best: Fit, index: int, side: int) -> float | None:
+        """Return the end of the interval of a parameter, on the side of -1 or 1; None: open."""
+        limit = float((self.most if side > 0 else self.least)[index])
         free = np.ones(len(best.theta), bool)
         free[index] = False
+        theta = best.theta  # of the last value tried, from which the next search starts
 
-        def excess(at: float, near: F64) -> tuple[float, F64]:
-            theta = near.copy()
-            theta[index] = at
-            fit = self._climb(theta, free)
-            return 2 * (best.log_likelihood - fit.log_likelihood) - CHI_SQUARE_95, fit.theta
+        @cache  # in small logs, another start may end at another maximum
+        def excess(value: float) -> float:
+            nonlocal theta
+            start = theta.copy()
+            start[index] = value
+            fit = self._climb(start, free)
+            theta = fit.theta
+            # The root of a deviance, which is nearly a parabola, is nearly linear.
+            rise = max(2 * (best.log_likelihood - fit.log_likelihood), 0.0)
+            return float(np.sqrt(rise) - np.sqrt(CHI_SQUARE_95))
 
-        inside, near = float(best.theta[index]), best.theta
-        below, step = -CHI_SQUARE_95, 0.05 * (1 + abs(inside))
+        inside = float(best.theta[index])
+        step = 0.05 * (1 + abs(inside))
+        excess(inside)
         while True:
-            outside = inside + way * step
-            if (outside - limit) * way >= 0:
+            outside = inside + side * step
+            if (outside - limit) * side >= 0:
                 outside = limit
-            above, theta = excess(outside, near)
-            if above > 0:
-                break
+            if excess(outside) > 0:
+                return float(brentq(excess, inside, outside, xtol=1e-6))
             if outside == limit:
                 return None
-            inside, near, below, step = outside, theta, above, 2 * step
-        # The deviance is nearly a parabola, so that its root is nearly straight.
-        for _ in range(30):
-            low, high = math.sqrt(below + CHI_SQUARE_95), math.sqrt(above + CHI_SQUARE_95)
-            part = (math.sqrt(CHI_SQUARE_95) - low) / (high - low)
-            middle = inside + min(max(part, 0.02), 0.98) * (outside - inside)
-            value, theta = excess(middle, near)
-            if abs(value) < 1e-4 or abs(outside - inside) < 1e-9:
-                return middle
-            if value > 0:
-                outside, above = middle, value
-            else:
-                inside, below, near = middle, value, theta
-        return inside
+            inside, step = outside, 2 * step
 
 
-def chi_square_tail(value: float, freedom: int) -> float:
-    """Return the probability that a chi-square variable of whole degrees of freedom exceeds it.
-
-    >>> round(chi_square_tail(3.841, 1), 4), round(chi_square_tail(15.507, 8), 4)
-    (0.05, 0.05)
-    """
-    half = max(value, 0.0) / 2
-    order, tail = (0.5, math.erfc(math.sqrt(half))) if freedom % 2 else (1.0, math.exp(-half))
-    while order < freedom / 2 and half > 0:
-        tail += math.exp(order * math.log(half) - half - math.lgamma(order + 1))
-        order += 1
-    return min(tail, 1.0)
-
-
-def wilson(hits: int, total: int) -> Estimate:
+def wilson(hits: int, total: int) -> ParameterEstimate:
     """Return a share with its 95 % interval (Wilson's).
 
     >>> print(wilson(8, 10))
     0.8 (0.49 to 0.943)
     """
-    z2 = CHI_SQUARE_95
-    share = hits / total
-    middle = (share + z2 / (2 * total)) / (1 + z2 / total)
-    half = math.sqrt(z2 * (share * (1 - share) / total + z2 / (4 * total * total)))
-    half /= 1 + z2 / total
-    return Estimate(share, max(0.0, middle - half), min(1.0, middle + half))
+    interval = binomtest(hits, total).proportion_ci(0.95, "wilson")
+    return ParameterEstimate(hits / total, float(interval.low), float(interval.high))

@@ -1,4 +1,4 @@
-"""Logs of detections: one row for each time that somebody was in a camera's view."""
+"""Logs of detections: one row for each time that a person was in view of a camera."""
 
 import csv
 import math
@@ -16,7 +16,7 @@ from fleet2d.errors import InputError
 F64 = NDArray[np.float64]
 
 LEAST_ROWS = 50
-MOST_METRES = 100.0  # farther away in a home means another unit
+MOST_METRES = 100.0  # a larger distance in a home is in another unit
 MOST_DEGREES = 360.0
 TRUE, FALSE = frozenset({"1", "true", "yes"}), frozenset({"0", "false", "no"})
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
@@ -24,16 +24,16 @@ UNKNOWN = frozenset({"", "unknown", "none", "null"})
 
 @dataclass(frozen=True)
 class DetectionLog:
-    """What a log tells; every array has an entry for each row.
+    """The columns of a log, each an array with an entry per row, (n,); None: not in the log.
 
     Attributes:
-        path: Its file.
-        distance: From the camera to the person [m].
+        path: The file of the log.
+        distance: Distance from the camera to the person [m].
         detected: Whether the person was noticed.
-        bearing: Angle off the optical axis, either side [deg]; None if the log doesn't tell.
-        orientation: Angle between where the person faced and the camera, 0 to 180 [deg].
-        true_identity: Who it was.
-        identity: For whom the person was taken; empty: for nobody known.
+        bearing: Angle off the optical axis, 0 to 180 [deg].
+        orientation: Angle between where the person faces and the camera, 0 to 180 [deg].
+        true_identity: The name of the person.
+        identity: The name as perceived; empty: not recognized.
     """
 
     path: Path
@@ -57,8 +57,8 @@ def read_log(path: Path) -> DetectionLog:
     Others are ignored.
 
     Raises:
-        InputError: The file can't be read, lacks a column, or holds something else than it should:
-            which line and column, what was found, what is wanted.
+        InputError: The file can't be read, lacks a column, or has a wrong value; the message names
+            the line and the column.
     """
     try:
         check_file(path, LOG_BYTES)
@@ -74,18 +74,18 @@ def read_log(path: Path) -> DetectionLog:
         why = getattr(error, "strerror", None) or error
         raise InputError(f"{path} can't be read: {why}") from None
     _check_columns(path, columns)
-    table = _Table(path, columns, rows)
+    table = _LogTable(path, columns, rows)
     if len(rows) < LEAST_ROWS:
         raise InputError(f"{path} has {len(rows)} rows: a fit needs {LEAST_ROWS} at the least")
-    who = table.has("identity") and table.has("true_identity")
+    has_identity = table.has("identity") and table.has("true_identity")
     log = DetectionLog(
         path,
         table.column("distance", _distance),
         table.column("detected", _flag).astype(bool),
         table.angle("bearing"),
         table.angle("orientation"),
-        table.words("true_identity") if who else None,
-        table.words("identity") if who else None,
+        table.names("true_identity") if has_identity else None,
+        table.names("identity") if has_identity else None,
     )
     if log.true_identity is not None and (log.true_identity == "").any():
         line = rows[int(np.argmax(log.true_identity == ""))][0]
@@ -100,7 +100,7 @@ def read_log(path: Path) -> DetectionLog:
 
 
 def recognized(log: DetectionLog) -> NDArray[np.bool_]:
-    """Return for each detection of a log with identities whether it was of the right person."""
+    """Return for each detection of a log with identities whether the person was recognized."""
     assert log.identity is not None
     assert log.true_identity is not None
     right: NDArray[np.bool_] = np.equal(log.true_identity, log.identity)[log.detected]
@@ -112,18 +112,19 @@ def _check_columns(path: Path, columns: list[str]) -> None:
     for name in columns:
         if columns.count(name) > 1:
             raise InputError(f"{path} names the column {one_line(name)!r} twice: name each once")
-    for wanted in ("distance", "detected"):
-        if wanted not in columns:
-            apart = any(mark in name for name in columns for mark in ";\t")
+    for required in ("distance", "detected"):
+        if required not in columns:
+            has_other_marks = any(mark in name for name in columns for mark in ";\t")
             known = one_line(", ".join(columns), 200) or "none"
             raise InputError(
-                f"{path} has no column {wanted!r}; it has: {known}. Wanted are"
+                f"{path} has no column {required!r}; it has: {known}. Wanted are"
                 " distance [m] and detected (0 or 1), and if known bearing_deg,"
-                f" orientation_deg, identity, true_identity{', with commas between' * apart}"
+                " orientation_deg, identity, true_identity"
+                f"{', with commas between' * has_other_marks}"
             )
 
 
-class _Table:
+class _LogTable:
     """The rows of a file, and which line each is on."""
 
     def __init__(
@@ -147,21 +148,27 @@ class _Table:
                 ) from None
         return values
 
-    def words(self, name: str) -> NDArray[np.str_]:
-        """Return a column of names; empty where nobody is named."""
+    def names(self, name: str) -> NDArray[np.str_]:
+        """Return a column of names of people; empty for unknown people."""
         texts = [_cell(row, name) for _, row in self.rows]
         return np.array(["" if text.lower() in UNKNOWN else text for text in texts])
 
     def angle(self, name: str) -> F64 | None:
-        """Return the size of an angle in degrees, 0 to 180, from the column that tells its unit."""
+        """Return the size of an angle, 0 to 180 [deg], from the column with its unit in the name.
+
+        Raises:
+            InputError: There is only a column without a unit.
+        """
         for unit, factor in (("deg", 1.0), ("rad", 180 / math.pi)):
             if self.has(f"{name}_{unit}"):
-                turned = self.column(f"{name}_{unit}", _within(MOST_DEGREES / factor)) * factor
-                size: F64 = np.abs((turned + 180) % 360 - 180)
+                degrees = (
+                    self.column(f"{name}_{unit}", _angle_up_to(MOST_DEGREES / factor)) * factor
+                )
+                size: F64 = np.abs((degrees + 180) % 360 - 180)
                 return size
         if self.has(name):
             raise InputError(
-                f"{self.path}: the column {name!r} doesn't tell its unit: call it {name}_deg or"
+                f"{self.path}: the unit of the column {name!r} is unknown: call it {name}_deg or"
                 f" {name}_rad"
             )
         return None
@@ -188,8 +195,8 @@ def _distance(text: str) -> float:
     return value
 
 
-def _within(most: float) -> Callable[[str], float]:
-    """Return what reads an angle of at most so much to either side."""
+def _angle_up_to(most: float) -> Callable[[str], float]:
+    """Return a function that reads an angle from -`most` to `most`."""
 
     def read(text: str) -> float:
         value = _number(text)

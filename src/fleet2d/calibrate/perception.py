@@ -1,4 +1,4 @@
-"""Perception fitted to a log of detections: the model, how well it fits, and its scenario."""
+"""Perception fitted to a log of detections: estimates, goodness of fit, and scenario section."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -6,31 +6,31 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
-from fleet2d.calibrate.factors import Constant, Falling, Turned
-from fleet2d.calibrate.likelihood import (
-    Estimate,
-    Factor,
-    Fit,
-    Likelihood,
-    chi_square_tail,
-    wilson,
-)
+from fleet2d.calibrate.factors import Constant, Falling, Orientation
+from fleet2d.calibrate.likelihood import Factor, Fit, ParameterEstimate, ProductLikelihood, wilson
 from fleet2d.calibrate.log import DetectionLog, recognized
 
 GROUPS = 10
-WORTH = 0.05  # a factor is kept if chance alone would improve the fit so much less often than this
-LEAST_KNOWN = 20  # detections with an identity that are needed to fit it
+SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
+LEAST_KNOWN = 20  # the fewest detections with an identity to fit recognition to
 MOST_ROWS = 60  # of a curve by distance
 
 
 @dataclass(frozen=True)
-class Group:
-    """Rows of about the same predicted probability, and what was observed."""
+class ProbabilityGroup:
+    """Rows of similar predicted probability.
+
+    Attributes:
+        rows: The number of rows.
+        predicted: Their mean predicted probability.
+        observed: The share of them that was observed.
+    """
 
     rows: int
     predicted: float
-    observed: Estimate
+    observed: ParameterEstimate
 
 
 @dataclass(frozen=True)
@@ -40,18 +40,18 @@ class Curves:
     Attributes:
         estimates: Its parameters, by name; `top` is the probability where nothing lowers it.
         fit: The fit.
-        left_out: Factors that the log says nothing of, and why.
-        groups: What was observed beside what is predicted.
+        omitted: Factors without an effect in the log, and the reason for each.
+        groups: Predicted and observed probabilities.
     """
 
-    estimates: dict[str, Estimate]
+    estimates: dict[str, ParameterEstimate]
     fit: Fit
-    left_out: dict[str, str]
-    groups: list[Group]
+    omitted: dict[str, str]
+    groups: list[ProbabilityGroup]
 
     @property
     def chi_square(self) -> float:
-        """How far observed and predicted are apart (Hosmer and Lemeshow)."""
+        """The statistic of Hosmer and Lemeshow: how far observed and predicted are apart."""
         return sum(
             group.rows * (group.observed.value - group.predicted) ** 2
             / max(group.predicted * (1 - group.predicted), 1e-12)
@@ -60,64 +60,71 @@ class Curves:
 
     @property
     def p_value(self) -> float:
-        """How often chance alone puts a true model that far apart."""
-        return chi_square_tail(self.chi_square, max(1, len(self.groups) - 2))
+        """The probability of such a statistic or a larger one, if the model is true."""
+        return float(chi2.sf(self.chi_square, max(1, len(self.groups) - 2)))
 
 
 @dataclass(frozen=True)
-class WhoIsWho:
+class Recognition:
     """How users are recognized.
 
     Attributes:
-        right: The probability to be recognized, by distance.
-        mistaken: Share of those not recognized who are taken for another user.
-        confusion: For whom, as shares of each user's mistakes.
+        right: The probability of being recognized, by distance.
+        mistaken: The share of detections without recognition that have another user's name.
+        confusion: For each user, the shares of the names in such mistakes.
     """
 
     right: Curves
-    mistaken: Estimate
+    mistaken: ParameterEstimate
     confusion: dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """All that a log tells of a perception."""
+    """A perception that was fitted to a log.
+
+    Attributes:
+        log: The log.
+        detection: The probability of being noticed.
+        identity: How users are recognized; None if the log doesn't show it.
+        notes: Remarks for the report.
+    """
 
     log: DetectionLog
     detection: Curves
-    identity: WhoIsWho | None
+    identity: Recognition | None
     notes: list[str] = field(default_factory=list)
 
     def section(self) -> dict[str, Any]:
         """Return the `perception` section of a scenario; the camera's `detection` is 1 then."""
-        found = self.detection.estimates
-        detection: dict[str, Any] = {"distance": _curve(found, "distance")}
-        if "bearing midpoint" in found:
-            detection["bearing"] = _curve(found, "bearing", top=1.0)
-        if "side" in found:
-            side, back = found["side"].value, found["back"].value
+        estimates = self.detection.estimates
+        detection: dict[str, Any] = {"distance": _curve(estimates, "distance")}
+        if "bearing midpoint" in estimates:
+            detection["bearing"] = _curve(estimates, "bearing", top=1.0)
+        if "side" in estimates:
+            side, back = estimates["side"].value, estimates["back"].value
             detection["orientation"] = [[0, 1], [90, _short(side)], [180, _short(back)]]
         section: dict[str, Any] = {"detection": detection}
         if self.identity:
             section["identity"] = self._identity(self.identity)
         return section
 
-    def _identity(self, who: WhoIsWho) -> dict[str, Any]:
+    def _identity(self, recognition: Recognition) -> dict[str, Any]:
         """Return the section as tables of the same distances, whose sum is nowhere above 1."""
-        estimates, farthest = who.right.estimates, float(self.log.distance.max())
-        # So dense that straight lines between rows stay within 0.3 % of the logistic.
+        estimates, farthest = recognition.right.estimates, float(self.log.distance.max())
+        # Dense enough for straight lines between rows to be within 0.3 % of the logistic curve.
         width = estimates["distance width"].value if "distance width" in estimates else farthest
         rows = min(MOST_ROWS, 2 + int(2 * farthest / width))
         places = [_short(x) for x in np.linspace(0, farthest, rows).tolist()]
         shares = [round(_at(estimates, x), 4) for x in places]
         right = [[x, share] for x, share in zip(places, shares, strict=True)]
         mistaken = [  # rounded down
-            [x, int(who.mistaken.value * (1 - share) * 10_000) / 10_000]
+            [x, int(recognition.mistaken.value * (1 - share) * 10_000) / 10_000]
             for x, share in zip(places, shares, strict=True)
         ]
         confusion = {
             user: {name: share for name, share in others.items() if share}
-            for user, others in who.confusion.items()
+            for user, others in recognition.confusion.items()
         }
         return {"right": right, "mistaken": mistaken, "confusion": confusion}
 
@@ -125,54 +132,56 @@ class Calibration:
 def calibrate(log: DetectionLog) -> Calibration:
     """Fit a perception to a log."""
     rows = len(log)
-    wanted: dict[str, Factor] = {"distance": Falling("distance", log.distance)}
+    candidates: dict[str, Factor] = {"distance": Falling("distance", log.distance)}
     if log.bearing is not None:
-        wanted["bearing"] = Falling("bearing", log.bearing)
+        candidates["bearing"] = Falling("bearing", log.bearing)
     if log.orientation is not None:
-        wanted["orientation"] = Turned(log.orientation)
-    detection = fit_curves(log.detected, Constant("top", rows), wanted)
+        candidates["orientation"] = Orientation(log.orientation)
+    detection = fit_curves(log.detected, Constant("top", rows), candidates)
     notes: list[str] = []
     identity = _fit_identity(log, notes)
     return Calibration(log, detection, identity, notes)
 
 
-def fit_curves(outcomes: NDArray[np.bool_], top: Constant, wanted: dict[str, Factor]) -> Curves:
-    """Fit a constant and those factors that the outcomes speak for, each tried without the rest."""
-    kept = dict(wanted)
-    left_out = {}
-    best = Likelihood([top, *kept.values()], outcomes).fit()
-    for name, factor in wanted.items():
-        others = [other for key, other in kept.items() if key != name]
-        without = Likelihood([top, *others], outcomes).fit()
-        lost = without.deviance - best.deviance
-        p_value = chi_square_tail(lost, len(factor.names))
-        if p_value > WORTH:
-            left_out[name] = f"the log shows no effect of it (p = {p_value:.2g})"
-            del kept[name]
-            best = without
-    likelihood = Likelihood([top, *kept.values()], outcomes)
-    return Curves(likelihood.estimates(best), best, left_out, group(best.shares, outcomes))
+def fit_curves(outcomes: NDArray[np.bool_], top: Constant, candidates: dict[str, Factor]) -> Curves:
+    """Fit the product of a constant and of those factors that improve the fit significantly."""
+    factors = dict(candidates)
+    omitted = {}
+    best = ProductLikelihood([top, *factors.values()], outcomes).fit()
+    for name, factor in candidates.items():
+        others = [other for key, other in factors.items() if key != name]
+        reduced = ProductLikelihood([top, *others], outcomes).fit()
+        p_value = float(chi2.sf(reduced.deviance - best.deviance, len(factor.names)))
+        if p_value > SIGNIFICANCE:
+            omitted[name] = f"the log shows no effect of it (p = {p_value:.2g})"
+            del factors[name]
+            best = reduced
+    likelihood = ProductLikelihood([top, *factors.values()], outcomes)
+    return Curves(likelihood.estimates(best), best, omitted, group_rows(best.shares, outcomes))
 
 
-def group(shares: NDArray[np.float64], outcomes: NDArray[np.bool_]) -> list[Group]:
-    """Sort rows by their probability into groups of one size, and count."""
+def group_rows(shares: NDArray[np.float64], outcomes: NDArray[np.bool_]) -> list[ProbabilityGroup]:
+    """Return groups of equal size of the rows, sorted by their predicted probability."""
     parts: Sequence[NDArray[np.int64]] = np.array_split(np.argsort(shares, kind="stable"), GROUPS)
     return [
-        Group(len(part), float(shares[part].mean()), wilson(int(outcomes[part].sum()), len(part)))
+        ProbabilityGroup(
+            len(part), float(shares[part].mean()), wilson(int(outcomes[part].sum()), len(part))
+        )
         for part in parts
         if len(part)
     ]
 
 
-def _fit_identity(log: DetectionLog, notes: list[str]) -> WhoIsWho | None:
+def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
+    """Fit how users are recognized, if the log has identities; else add a note."""
     if log.identity is None or log.true_identity is None:
         return None
-    true, found = log.true_identity[log.detected], log.identity[log.detected]
+    true, perceived = log.true_identity[log.detected], log.identity[log.detected]
     right = recognized(log)
     if len(true) < LEAST_KNOWN or right.all() or not right.any():
         notes.append(
             f"identity: left out: {int(right.sum())} of {len(true)} detections are recognized,"
-            " which tells nothing of when"
+            " too few or too uniform to fit anything to"
         )
         return None
     distance = log.distance[log.detected]
@@ -180,21 +189,21 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> WhoIsWho | None:
         right, Constant("top", len(right)), {"distance": Falling("distance", distance)}
     )
     wrong = ~right
-    mistaken = wrong & (found != "")
+    mistaken = wrong & (perceived != "")
     confusion: dict[str, dict[str, float]] = {}
     for user in sorted(set(true.tolist())):
-        names, counts = np.unique(found[mistaken & (true == user)], return_counts=True)
+        names, counts = np.unique(perceived[mistaken & (true == user)], return_counts=True)
         if len(names):
-            confusion[user] = _whole(dict(zip(names.tolist(), counts.tolist(), strict=True)))
+            confusion[user] = _shares(dict(zip(names.tolist(), counts.tolist(), strict=True)))
     if confusion:
         notes.append(
-            f"identity: the confusion is of the log's people, {', '.join(sorted(set(true)))}: name"
-            " the scenario's users so, or take it out"
+            f"identity: the confusion has the names of the log, {', '.join(sorted(set(true)))}:"
+            " give them to the scenario's users, or remove the confusion"
         )
-    return WhoIsWho(curves, wilson(int(mistaken.sum()), int(wrong.sum())), confusion)
+    return Recognition(curves, wilson(int(mistaken.sum()), int(wrong.sum())), confusion)
 
 
-def _whole(counts: dict[str, int]) -> dict[str, float]:
+def _shares(counts: dict[str, int]) -> dict[str, float]:
     """Return counts as shares of four decimals that add up to 1."""
     total = sum(counts.values())
     shares = {name: round(count / total, 4) for name, count in counts.items()}
@@ -203,7 +212,7 @@ def _whole(counts: dict[str, int]) -> dict[str, float]:
     return shares
 
 
-def _at(estimates: dict[str, Estimate], distance: float) -> float:
+def _at(estimates: dict[str, ParameterEstimate], distance: float) -> float:
     """Return the probability at a distance."""
     top = estimates["top"].value
     if "distance midpoint" not in estimates:
@@ -213,14 +222,15 @@ def _at(estimates: dict[str, Estimate], distance: float) -> float:
     return float(share)
 
 
-def _curve(estimates: dict[str, Estimate], name: str, top: float | None = None) -> Any:
+def _curve(estimates: dict[str, ParameterEstimate], name: str, top: float | None = None) -> Any:
+    """Return a fitted curve in the form of a scenario: a number, or midpoint, width and top."""
     height = estimates["top"].value if top is None else top
     if f"{name} midpoint" not in estimates:
         return _short(height)
-    found = {part: _short(estimates[f"{name} {part}"].value) for part in ("midpoint", "width")}
-    return found if height == 1 else {**found, "top": _short(height)}
+    curve = {part: _short(estimates[f"{name} {part}"].value) for part in ("midpoint", "width")}
+    return curve if height == 1 else {**curve, "top": _short(height)}
 
 
 def _short(value: float) -> float:
-    """Return a number with the digits that a fit can tell."""
+    """Return a number rounded to four significant digits."""
     return float(f"{value:.4g}")

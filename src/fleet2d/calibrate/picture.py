@@ -1,4 +1,4 @@
-"""A picture of a fit: curves beside what was observed, and predicted against observed."""
+"""Pictures of fits: curves with observed shares, and predicted against observed probabilities."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fleet2d.calibrate.likelihood import wilson
 from fleet2d.calibrate.log import recognized
-from fleet2d.calibrate.perception import Calibration, Group
+from fleet2d.calibrate.perception import Calibration, ProbabilityGroup
 from fleet2d.errors import InputError
 from fleet2d.view.floorplan import check_picture, drawing_style, save_figure
 
@@ -21,11 +21,11 @@ F64 = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 BINS = 12
-LEAST = 10  # rows in a bin, on the average; else there are fewer bins
-FITTED, SEEN = "#2b6cb0", "#3d4148"
+LEAST = 10  # the least mean number of rows per bin
+FIT_COLOR, OBSERVED_COLOR = "#2b6cb0", "#3d4148"
 
 
-def draw_fit(found: Calibration, target: Path) -> None:
+def draw_fit(calibration: Calibration, target: Path) -> None:
     """Draw a fit to a file.
 
     Raises:
@@ -33,13 +33,13 @@ def draw_fit(found: Calibration, target: Path) -> None:
     """
     check_picture(target)
     with drawing_style():
-        figure = _figure(found)
+        figure = _figure(calibration)
         save_figure(figure, target)
 
 
-def _figure(found: Calibration) -> Figure:
-    """Return a panel for each quantity of the log, and predicted against observed."""
-    log, shares = found.log, found.detection.fit.shares
+def _figure(calibration: Calibration) -> Figure:
+    """Return a figure with a panel for each quantity, and one of predicted against observed."""
+    log, shares = calibration.log, calibration.detection.fit.shares
     panels: list[tuple[str, str, F64, Flags, F64]] = []
     for label, values in (
         ("distance [m]", log.distance),
@@ -48,25 +48,25 @@ def _figure(found: Calibration) -> Figure:
     ):
         if values is not None:
             panels.append(("noticed", label, values, log.detected, shares))
-    if found.identity is not None:
+    if calibration.identity is not None:
         distance, right = log.distance[log.detected], recognized(log)
-        fitted = found.identity.right.fit.shares
+        fitted = calibration.identity.right.fit.shares
         panels.append(("recognized, if noticed", "distance [m]", distance, right, fitted))
     figure = Figure(figsize=(3.4 * (len(panels) + 1), 3.4), layout="constrained", dpi=150)
     axes = figure.subplots(1, len(panels) + 1, squeeze=False)[0]
-    for each, (what, label, values, hits, fitted) in zip(axes[:-1], panels, strict=True):
-        _by(each, values, hits, fitted)
-        each.set(xlabel=label, ylim=(0, 1.02), ylabel=what)
+    for panel, (outcome, label, values, hits, fitted) in zip(axes[:-1], panels, strict=True):
+        _draw_shares(panel, values, hits, fitted)
+        panel.set(xlabel=label, ylim=(0, 1.02), ylabel=outcome)
     axes[0].legend(frameon=False, fontsize=8, loc="upper right")
-    _predicted(axes[-1], found.detection.groups)
-    for each in axes:
-        each.spines[["top", "right"]].set_visible(False)
+    _draw_groups(axes[-1], calibration.detection.groups)
+    for panel in axes:
+        panel.spines[["top", "right"]].set_visible(False)
     figure.suptitle(f"{log.path.name}: {len(log)} times in view", fontsize=10)
     return figure
 
 
-def _by(axes: Axes, values: F64, detected: Flags, shares: F64) -> None:
-    """Draw observed shares with their intervals, and the fit's mean over the same rows."""
+def _draw_shares(axes: Axes, values: F64, detected: Flags, shares: F64) -> None:
+    """Draw observed shares with their intervals, and the mean fitted share of the same rows."""
     bins = min(BINS, max(1, len(values) // LEAST))
     edges = np.quantile(values, np.linspace(0, 1, bins + 1))
     index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
@@ -78,16 +78,17 @@ def _by(axes: Axes, values: F64, detected: Flags, shares: F64) -> None:
             ends = (hit.value - (hit.low or 0.0), (hit.high or 1.0) - hit.value)
             rows.append((values[inside].mean(), hit.value, *ends, shares[inside].mean()))
     x, y, below, above, fit = np.array(rows).T
-    axes.plot(x, fit, color=FITTED, lw=2, label="fitted")
+    axes.plot(x, fit, color=FIT_COLOR, lw=2, label="fitted")
     axes.errorbar(
-        x, y, yerr=[below, above], fmt="o", ms=4, color=SEEN, lw=1, label="observed, 95 %"
+        x, y, yerr=[below, above], fmt="o", ms=4, color=OBSERVED_COLOR, lw=1, label="observed, 95 %"
     )
 
 
-def _predicted(axes: Axes, groups: list[Group]) -> None:
+def _draw_groups(axes: Axes, groups: list[ProbabilityGroup]) -> None:
+    """Draw observed against predicted probabilities, with intervals."""
     axes.plot([0, 1], [0, 1], color="#b0b5bd", lw=1)
     for group in groups:
         low, high = group.observed.low or 0.0, group.observed.high or 1.0
-        axes.plot([group.predicted] * 2, [low, high], color=SEEN, lw=1)
-        axes.plot(group.predicted, group.observed.value, "o", ms=4, color=SEEN)
+        axes.plot([group.predicted] * 2, [low, high], color=OBSERVED_COLOR, lw=1)
+        axes.plot(group.predicted, group.observed.value, "o", ms=4, color=OBSERVED_COLOR)
     axes.set(xlabel="predicted", ylabel="observed", xlim=(0, 1), ylim=(0, 1))
