@@ -36,7 +36,7 @@ import numpy as np
 
 import fleet2d
 import fleet2d.routines.survey as survey
-from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
+from fleet2d.fit.traces import RoomTrace, trace_of_log, trace_of_persona
 from fleet2d.fit.visits import Visits, count_visits, spread, stays
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
@@ -287,7 +287,7 @@ def show_visits(data: Path, days: int, seed: int) -> bool:
     return good
 
 
-def show_dwell(traces: dict[str, Trace]) -> None:
+def show_dwell(traces: dict[str, RoomTrace]) -> None:
     """Print visits per day and the quartiles of their lengths, by kind of room."""
     print("\nvisits a day x median minutes [quartiles]")
     for name, (trace, kinds) in traces.items():

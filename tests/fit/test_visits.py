@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fleet2d.fit.traces import Trace, trace_of_log, trace_of_persona
+from fleet2d.fit.traces import RoomTrace, trace_of_log, trace_of_persona
 from fleet2d.fit.visits import Visits, count_visits, spread, stays
 from fleet2d.routines.persona import bundled_names
 
@@ -14,14 +14,14 @@ KINDS = ("away", "bathroom", "hallway", "kitchen", "living_room")
 HOUR = 3600
 
 
-def trace(*pieces: tuple[str, int]) -> Trace:
+def trace(*pieces: tuple[str, int]) -> RoomTrace:
     """A day from midnight: kinds of rooms and seconds, the last one until midnight."""
     rooms = np.full(86_400, KINDS.index(pieces[-1][0]), np.int16)
     at = 0
     for kind, length in pieces[:-1]:
         rooms[at : at + length] = KINDS.index(kind)
         at += length
-    return Trace(rooms, KINDS)
+    return RoomTrace(rooms, KINDS)
 
 
 def test_passing_through_a_room_is_no_visit() -> None:

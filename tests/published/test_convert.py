@@ -112,8 +112,8 @@ USUAL = [
     "simulation.outputs.output_dir: left out: `fleet2d run --out DIR` says where a run is stored",
     "simulation.outputs.save, simulation.outputs.every_n_steps: poses are stored every 10 min,"
     " observations and events in full; the published Fleet2D wrote nothing",
-    "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute: not needed: what is"
-    " in view is worked out exactly and at once",
+    "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute: not needed:"
+    " fields of view are computed exactly, when needed",
 ]
 
 
@@ -329,7 +329,7 @@ def test_walks_stay_at_walls_as_there(folder: Path) -> None:
 def test_progress_and_provider_and_prefix_are_left_out(folder: Path) -> None:
     assert [
         "simulation.show_progress: left out: `fleet2d run --quiet` shows none",
-        "simulation.fov_provider: left out: lines of sight are worked out exactly here",
+        "simulation.fov_provider: left out: lines of sight are computed exactly here",
         "simulation.outputs.output_dir, simulation.outputs.prefix: left out: `fleet2d run --out"
         " DIR` says where a run is stored",
     ] == extra(
@@ -382,8 +382,8 @@ def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
     assert [
         "floorplan.he.json_fpath: there is no file f2d/he/gone.json beside old.yaml, in the"
         " folders above it or in the current one; kept as written, it counts from the folder of"
-        " new.yaml: put the plan there, or run with floorplan.path=PLAN.json. Where everybody"
-        " starts was not checked"
+        " new.yaml: put the plan there, or run with floorplan.path=PLAN.json. The starts of"
+        " users and robot were not checked"
     ] == [remark for remark in remarks if remark not in USUAL]
     with pytest.raises(ScenarioError, match=r"floorplan\.path: no such file: .*gone\.json"):
         load_scenario(folder / "new.yaml")
@@ -522,12 +522,12 @@ robot: {base: {radius: 0.1, fov_config: {}}}
         "users.ana.base.radius: missing or 0; a body has a radius, and this one has 0.01 m",
         "users.ana.base.pose_config.init_pose, robot.base.pose_config.init_pose: has no x and y;"
         " where it starts is drawn",
-        "users.ana.base.seed: left out: everybody has random numbers of their own, from"
+        "users.ana.base.seed: left out: each entity has its own random numbers, from"
         " simulation.seed",
         "users.ana.base.pose_config.meander_strategy, robot.base.pose_config.meander_strategy:"
         " missing; it stands still",
         "simulation.start_ts: missing; the run starts on 2026-01-05, a Monday, at 00:00",
-        "robot.base.fov_config.distance: missing; taken as 4.5 m",
+        "robot.base.fov_config.distance: missing; 4.5 m is used",
         "robot.base.fov_config.angle: missing; the camera gets the angle that cameras have here",
     ] == remarks
     scenario = load_scenario(folder / "new.yaml")
@@ -589,13 +589,13 @@ def test_unknown_keys_are_left_out_with_their_lines(folder: Path) -> None:
         ('"plan.json"', "5", "floorplan.he.json_fpath: found 5; text is wanted"),
         ("ppm: 20", "ppm: -1", "floorplan.he.ppm: found -1; a number above 0 is wanted"),
         ('"user0,user1"', "7", "users.names: found 7; names with commas between them are wanted"),
-        ("user0,user1", "user0,bob", "users.names: 'bob' has no section users.bob: add or unname"),
+        ("user0,user1", "user0,bob", "users.names: 'bob' has no section users.bob: add it, or remove"),
         ("type: base", "type: cat", "users.user0: its type is 'cat', and it has no section of tha"),
         ("radius: 0.2", "radius: wide", "radius: found 'wide'; a number of 0 or more, 2 at most"),
         ("radius: 0.2", "radius: .nan", "radius: found nan; a number of 0 or more, 2 at most is w"),
         ("radius: 0.2", f"radius: 1{'0' * 400}", "a number of 0 or more, 2 at most is wanted"),
         ("x: 8.0", "x: [1]", "users.user0.base.pose_config.init_pose.x: found [1]; a number is wa"),
-        ("x: 8.0", "x: 8.0e+9", "old.yaml is no scenario: users.user0.start: found"),
+        ("x: 8.0", "x: 8.0e+9", "would become no valid scenario: users.user0.start: found"),
         ("lin_speed: 0.1", "lin_speed: 30", "lin_speed: 30 m in a step of 1 s is 30 m/s; 20 m/s a"),
         ("lin_speed: 0.1", "lin_speed: -1", "lin_speed: found -1; a number of 0 or more is wanted"),
         ("ang_speed: 15", "ang_speed: 1.0e+9", "ang_speed: found 1000000000.0; a number of -3600"),

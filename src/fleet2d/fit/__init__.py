@@ -1,1 +1,1 @@
-"""Fitting: personas learned from logs, and how well they match days that they weren't fitted on."""
+"""Fitting: personas learned from logs, and how well they match other days of the logs."""

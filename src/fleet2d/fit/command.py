@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
 
-# So that `fleet2d fit` keeps its subcommands when there is one of them only.
+# A callback, as typer would otherwise drop the name of the only subcommand.
 fitting.callback()(lambda: None)
 
 
@@ -19,18 +19,18 @@ def routine(
     log: Annotated[Path, typer.Argument(help="A log of rooms and activities, or its folder.")],
     out: Annotated[Path, typer.Option(help="The persona to write.")] = Path("persona.yaml"),
     layout: Annotated[
-        str, typer.Option("--format", help="casas, uci_adl, homer; auto looks.")
+        str, typer.Option("--format", help="casas, uci_adl, homer; auto recognizes it.")
     ] = "auto",
     picture: Annotated[
         Path | None, typer.Option(help="Picture of the fit to write, .png or .svg.")
     ] = None,
     seed: Annotated[int, typer.Option(help="The seed of the sampled days.")] = 0,
     model: Annotated[
-        str, typer.Option(help="recorded: days that go from one of the log to another; laws.")
+        str, typer.Option(help="recorded: days that switch between those of the log; laws.")
     ] = "recorded",
     sort: Annotated[bool, typer.Option(help="Sort lines whose time runs backwards.")] = False,
 ) -> None:
-    """Learn a persona from a log, and say how well its days match days held back."""
+    """Learn a persona from a log, and report how well its days match days held back."""
     for line in fit_routine(log, out, layout, picture, seed, sort=sort, model=model):
         typer.echo(line)
 
@@ -45,14 +45,14 @@ def fit_routine(
     sort: bool = False,
     model: str = "recorded",
 ) -> list[str]:
-    """Fit a persona to a log, write it, and return what to say about it.
+    """Fit a persona to a log, write it, and return a report in lines.
 
     Args:
         path: The log.
-        out: The persona's file.
-        layout: The log's layout; "auto" looks.
-        picture: Where to draw how it compares with the log; None: nowhere.
-        seed: Of the days that are sampled to compare.
+        out: The file of the persona.
+        layout: The log's layout; "auto" recognizes it.
+        picture: The file of a picture that compares it with the log; None: no picture.
+        seed: The seed of the days that are sampled to compare.
         sort: Sort lines of the log whose time runs backwards.
         model: "recorded" or "laws", see `fit_persona`.
 
@@ -101,11 +101,11 @@ def table(validation: "Validation") -> list[str]:
         " days sampled from a model fitted to the others:",
         f"{'':30}{'time shares':>12}{'by hour':>10}{'stays KS':>10}{'stays [min]':>12}",
     ]
-    for what, found in (("rooms", validation.rooms), ("activities", validation.activities)):
-        lines.append(what)
+    for title, distances in (("rooms", validation.rooms), ("activities", validation.activities)):
+        lines.append(title)
         lines += [
             f"  {name:28}{d.share:12.3f}{d.hours:10.3f}{d.ks:10.3f}{d.stay_min:12.1f}"
-            for name, d in zip(MODELS, found, strict=True)
+            for name, d in zip(MODELS, distances, strict=True)
         ]
     worse = validation.worse_than_copying()
     verdict = "; ".join(worse) if worse else "in nothing that is compared of rooms"

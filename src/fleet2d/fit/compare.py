@@ -1,4 +1,4 @@
-"""How far apart two sets of days are: in shares of time, by hour, and in how long one stays."""
+"""Distances between two sets of days: shares of time, shares by hour, durations of stays."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fleet2d.fit.timeline import I16, MINUTES, runs
 
 HOURS = 24
-FEWEST_STAYS = 5  # of a place, for its durations to be compared
+FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
 
 Floats = NDArray[np.float64]
 
@@ -30,39 +30,33 @@ class Distances(NamedTuple):
 
 
 def distances(real: I16, other: I16, count: int) -> Distances:
-    """Return the distances between days, labels int16 (days, 1440), -1 where nobody knows.
+    """Return the distances between days, labels int16 (days, 1440), -1 where unknown.
 
-    Durations are compared place by place and weighed by how often one stays there in the real
-    days. A stay that midnight cuts, or of which an end isn't known, is left out on both sides.
+    Durations are compared place by place, weighted by the number of stays in the real days. Stays
+    that midnight cuts, or of which an end is unknown, are left out in both.
     """
-    stays, others = dwell_times(real, count), dwell_times(other, count)
-    weights, gaps, moves = [], [], []
-    for mine, theirs in zip(stays, others, strict=True):
-        if len(mine) >= FEWEST_STAYS:
-            weights.append(len(mine))
-            gaps.append(ks_distance(mine, theirs))
-            moves.append(wasserstein(mine, theirs))
-    nothing = not weights
+    pairs = [
+        (times, other_times)
+        for times, other_times in zip(
+            dwell_times(real, count), dwell_times(other, count), strict=True
+        )
+        if len(times) >= FEWEST_STAYS
+    ]
+    total = max(sum(len(times) for times, _ in pairs), 1)
+    hours = zip(by_hour(real, count), by_hour(other, count), strict=True)
     return Distances(
         share=_variation(shares(real, count), shares(other, count)),
-        hours=float(
-            np.mean(
-                [
-                    _variation(a, b)
-                    for a, b in zip(by_hour(real, count), by_hour(other, count), strict=True)
-                ]
-            )
-        ),
-        ks=0.0 if nothing else float(np.average(gaps, weights=weights)),
-        stay_min=0.0 if nothing else float(np.average(moves, weights=weights)),
+        hours=float(np.mean([_variation(a, b) for a, b in hours])),
+        ks=sum(len(a) * ks_distance(a, b) for a, b in pairs) / total,
+        stay_min=sum(len(a) * wasserstein(a, b) for a, b in pairs) / total,
     )
 
 
 def shares(labels: I16, count: int) -> Floats:
-    """Return the share of the known time of each label, (count,)."""
+    """Return the share of each label in the known time, float64 (count,)."""
     known = labels[labels >= 0]
-    found: Floats = np.bincount(known, minlength=count) / max(len(known), 1)
-    return found
+    result: Floats = np.bincount(known, minlength=count) / max(len(known), 1)
+    return result
 
 
 def by_hour(labels: I16, count: int) -> Floats:
@@ -72,15 +66,15 @@ def by_hour(labels: I16, count: int) -> Floats:
 
 
 def dwell_times(labels: I16, count: int) -> list[Floats]:
-    """Return the durations of the whole stays at each label [min], sorted."""
-    found: list[list[int]] = [[] for _ in range(count)]
+    """Return the durations of the complete stays at each label [min], sorted."""
+    times: list[list[int]] = [[] for _ in range(count)]
     for day in labels:
         parts = runs(day)
         for i, (label, _, length) in enumerate(parts):
-            whole = 0 < i < len(parts) - 1 and parts[i - 1][0] >= 0 and parts[i + 1][0] >= 0
-            if label >= 0 and whole:
-                found[label].append(length)
-    return [np.sort(np.array(lengths, np.float64)) for lengths in found]
+            is_inside = 0 < i < len(parts) - 1
+            if label >= 0 and is_inside and min(parts[i - 1][0], parts[i + 1][0]) >= 0:
+                times[label].append(length)
+    return [np.sort(np.array(lengths, np.float64)) for lengths in times]
 
 
 def ks_distance(a: Floats, b: Floats) -> float:
@@ -98,7 +92,7 @@ def ks_distance(a: Floats, b: Floats) -> float:
 
 
 def wasserstein(a: Floats, b: Floats) -> float:
-    """Return the Wasserstein distance of two sorted samples; to an empty one, that to 0.
+    """Return the Wasserstein distance of two sorted samples; an empty one counts as a single 0.
 
     >>> wasserstein(np.array([1.0, 2.0]), np.array([2.0, 5.0]))
     2.0
@@ -111,4 +105,5 @@ def wasserstein(a: Floats, b: Floats) -> float:
 
 
 def _variation(a: Floats, b: Floats) -> float:
+    """Return the total variation between two distributions."""
     return float(np.abs(a - b).sum() / 2)

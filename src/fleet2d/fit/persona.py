@@ -1,4 +1,4 @@
-"""A persona fitted to days: when it wakes and sleeps, what it does when, what fills the rest."""
+"""Personas fitted to the days of a log: times of waking and sleep, tasks, and pastimes."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,34 +7,35 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fleet2d.fit.days import Day, Run, sleep_states
-from fleet2d.fit.timeline import MINUTES, State, Timeline
+from fleet2d.fit.days import LivedDay, Stretch, sleep_states
+from fleet2d.fit.timeline import MINUTES, ActivityPlace, Timeline
 from fleet2d.logs.log import AWAY, LogError
 from fleet2d.logs.rooms import USUAL
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.recorded import RecordedDay, write_day
 
-BLOCK = 180  # minutes of a day that share what is done to fill the time
-QUANTILES = 21  # of a law of durations, at most
+BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
+QUANTILES = 21  # the most quantiles of a law of durations
 LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "relax", "computer",
     "breakfast", "lunch", "dinner", "snack", "music", "rest", "social", "toilet")  # fmt: skip
-# An appointment is kept on this share of days or more, once a day, about the same time.
-KEPT, SPREAD, APART = 0.8, 20, 60  # share, min, min
-LONG = 10  # min; shorter things are no appointments
-FEWEST = 4  # days of a kind from which a template is fitted
+# A task is done on at least this share of the days, at most once a day. The standard deviation of
+# its begin is at most SPREAD, and the gap to begins at other times more than APART [min].
+LEAST_SHARE, SPREAD, APART = 0.8, 20, 60
+LONG = 10  # the least mean duration of a task [min]
+FEWEST = 4  # the fewest days of a kind from which a template is fitted
 WORKDAYS = 5
 Model = Literal["recorded", "laws"]
 
 
 @dataclass
-class Fitted:
-    """A persona and what it was fitted to.
+class FittedPersona:
+    """A fitted persona.
 
     Attributes:
-        document: As its YAML has it.
-        persona: As it is read from that.
-        states: The state of the timeline that each of its activities stands for.
-        notes: What the fit had to decide.
+        document: The persona as plain data, as in its YAML file.
+        persona: The persona.
+        states: The timeline's state of each of its activities.
+        notes: Decisions that the fit had to make.
     """
 
     document: dict[str, Any]
@@ -44,17 +45,18 @@ class Fitted:
 
 
 def fit_persona(
-    timeline: Timeline, days: Sequence[Day], about: str = "", *, model: Model = "recorded"
-) -> Fitted:
+    timeline: Timeline, days: Sequence[LivedDay], about: str = "", *, model: Model = "recorded"
+) -> FittedPersona:
     """Fit a persona to days of a log.
 
-    Of model `recorded`, its days are drawn from those of the log, of which each goes on as another
-    where both do the same at about the same time.
+    With the model `recorded`, its days are drawn from those of the log, and switch from one to
+    another where both have the same activity at about the same time.
 
-    Of model `laws`: what is done once on most days at about the same time becomes a task with the
-    mean and spread of its beginning, the measured law of its duration and the share of days that
-    have it. All else fills the rest: per three hours of the day a weighted choice, with the
-    measured durations of what began in them. Getting up at night becomes the fetching of sleep.
+    With the model `laws`, an activity that is done once on most days at about the same time becomes
+    a task, with the mean and spread of its begin, the measured law of its duration and the share of
+    days that have it. All other activities become pastimes of three hours of the day each, with
+    weights and the measured durations of those that began in them. Getting up at night becomes
+    `fetches` of the activity sleep.
 
     Raises:
         LogError: There are no days to fit.
@@ -76,46 +78,49 @@ def fit_persona(
     document = {
         "about": about or f"fitted to {len(days)} days of a log",
         "activities": fitter.activities,
-        "needs": {},  # the log has them already
+        "needs": {},  # their activities are in the log
         "errands": {},
         "days": templates,
     }
-    return Fitted(document, Persona.model_validate(document), fitter.states, notes)
+    return FittedPersona(document, Persona.model_validate(document), fitter.states, notes)
 
 
 def _kinds_of_days(
-    timeline: Timeline, days: Sequence[Day]
-) -> tuple[dict[str, tuple[str, list[Day]]], list[str]]:
-    """Return weekdays and weekend, or all days as one kind where either has too few."""
+    timeline: Timeline, days: Sequence[LivedDay]
+) -> tuple[dict[str, tuple[str, list[LivedDay]]], list[str]]:
+    """Return weekdays and weekend, or all days as one kind if either has too few; with notes.
+
+    Each kind has the `on` of its template, and its days.
+    """
     if timeline.weekdays is None:
         return {"every_day": ("daily", list(days))}, ["no dates: all days are of one kind"]
     weekdays = [day for day in days if timeline.weekdays[day.number] < WORKDAYS]
     weekend = [day for day in days if timeline.weekdays[day.number] >= WORKDAYS]
     if min(len(weekdays), len(weekend)) < FEWEST:
         note = (
-            f"{len(weekdays)} weekdays and {len(weekend)} days of weekends: too few to tell apart"
+            f"{len(weekdays)} weekdays and {len(weekend)} days of weekends: too few for two kinds"
         )
         return {"every_day": ("daily", list(days))}, [note]
     return {"weekday": ("weekdays", weekdays), "weekend": ("weekend", weekend)}, []
 
 
 def _names(timeline: Timeline) -> list[str]:
-    """Return a name for each state: its activity, with its room where it is done in several."""
+    """Return a name for each state: its activity, with its room if it is done in several."""
     asleep = sleep_states(timeline)
     lasts = np.bincount(
         timeline.minutes[timeline.minutes >= 0], minlength=len(timeline.states)
     ).tolist()
-    most: dict[str, int] = {}
+    most_frequent: dict[str, int] = {}
     for i in sorted(range(len(timeline.states)), key=lambda i: -lasts[i]):
-        most.setdefault(_called(timeline.states[i], i in asleep), i)
+        most_frequent.setdefault(_base_name(timeline.states[i], i in asleep), i)
     names = []
     for i, state in enumerate(timeline.states):
-        called = _called(state, i in asleep)
-        names.append(called if most[called] == i else f"{called}_in_{state.place}")
+        name = _base_name(state, i in asleep)
+        names.append(name if most_frequent[name] == i else f"{name}_in_{state.place}")
     return names
 
 
-def _called(state: State, asleep: bool) -> str:
+def _base_name(state: ActivityPlace, asleep: bool) -> str:
     if asleep:
         return "nap"
     return state.activity or (AWAY if state.place == AWAY else f"in_{state.place}")
@@ -131,56 +136,56 @@ class _Fitter:
         self.activities: dict[str, dict[str, Any]] = {}
         self.states: dict[str, int] = {}
 
-    def template(self, days: Sequence[Day], kind: str) -> dict[str, Any]:
+    def template(self, days: Sequence[LivedDay], kind: str) -> dict[str, Any]:
         """Return the template of a kind of days."""
         wakes = [day.wake for day in days]
         beds = [day.bed for day in days]
         shortest = min(day.next_wake - day.bed for day in days)
-        room = self.dawn + MINUTES - max(beds)  # however early the next day begins
+        least_night = self.dawn + MINUTES - max(beds)  # if the next day begins as early as possible
         tasks, rest = self._tasks(days)
         return {
             "wake": _timing(wakes),
-            "sleep": {**_timing(beds), "at_least": _minutes(max(1, min(shortest, room)))},
+            "sleep": {**_timing(beds), "at_least": _minutes(max(1, min(shortest, least_night)))},
             "do": tasks,
             "leisure": self._leisure(rest, min(wakes), kind),
         }
 
-    def _tasks(self, days: Sequence[Day]) -> tuple[dict[str, Any], list[Run]]:
-        """Return what is done once a day at its time, and the runs that are none of it."""
-        by_state: dict[int, list[tuple[int, Run]]] = defaultdict(list)
+    def _tasks(self, days: Sequence[LivedDay]) -> tuple[dict[str, Any], list[Stretch]]:
+        """Return the tasks, and the stretches that are part of none."""
+        by_state: dict[int, list[tuple[int, Stretch]]] = defaultdict(list)
         for day in days:
             for run in day.awake:
                 by_state[run.state].append((day.number, run))
         tasks, rest = {}, []
         for state, done in sorted(by_state.items()):
             for number, cluster in enumerate(_clusters(done)):
-                longest: dict[int, Run] = {}
+                longest: dict[int, Stretch] = {}
                 for number_of_day, run in cluster:
                     known = longest.get(number_of_day)
                     if known is None or run.length > known.length:
                         longest[number_of_day] = run
-                if not _is_appointment(list(longest.values()), len(cluster), len(days)):
+                stretches = list(longest.values())
+                if not _is_task(stretches, len(cluster), len(days)):
                     rest += [run for _, run in cluster]
                     continue
-                kept = list(longest.values())
                 name = self.names[state] + (f"_{number + 1}" if number else "")
                 tasks[name] = {
                     **({"activity": self.names[state]} if number else {}),
-                    **_timing([run.begin for run in kept]),
-                    "takes": _takes(kept),
-                    # Below 1, so that a full day is possible without it.
-                    "probability": round(min(len(kept) / len(days), 0.99), 3),
+                    **_timing([run.begin for run in stretches]),
+                    "takes": _takes(stretches),
+                    # Below 1, so that it may be left out of a day that is too full.
+                    "probability": round(min(len(stretches) / len(days), 0.99), 3),
                 }
-                self._add(self.names[state], state, kept)
+                self._add(self.names[state], state, stretches)
                 rest += [run for n, run in cluster if longest[n] is not run]
         return tasks, rest
 
-    def _leisure(self, rest: Iterable[Run], dawn: int, kind: str) -> dict[str, Any]:
-        """Return what fills the rest: of the stays that began in each block of the day, how often.
+    def _leisure(self, rest: Iterable[Stretch], dawn: int, kind: str) -> dict[str, Any]:
+        """Return the pastimes: one per block of the day and room, weighted by its stays.
 
-        All stays in a room are one pastime, for nobody leaves a room to go to the same.
+        All stays in a room are one pastime, as a pastime is never followed by itself.
         """
-        blocks: dict[int, dict[str, list[Run]]] = defaultdict(lambda: defaultdict(list))
+        blocks: dict[int, dict[str, list[Stretch]]] = defaultdict(lambda: defaultdict(list))
         for run in rest:
             place = self.timeline.states[run.state].place
             blocks[(run.begin - dawn) // BLOCK][place].append(run)
@@ -191,10 +196,9 @@ class _Fitter:
                 continue
             last = min(first + BLOCK, dawn + MINUTES) - 1
             for _, done in sorted(blocks[block].items()):
-                state, most = self._most(done)
-                called = self.names[state] if most else f"in_{self.timeline.states[state].place}"
-                words = [called, *([kind] if kind else []), f"{first // 60 % 24:02}h"]
-                name = "_".join(words)
+                state, is_main = self._main_state(done)
+                base = self.names[state] if is_main else f"in_{self.timeline.states[state].place}"
+                name = "_".join([base, *([kind] if kind else []), f"{first // 60 % 24:02}h"])
                 self._add(name, state, done)
                 leisure[name] = {
                     "weight": float(len(done)),
@@ -203,26 +207,26 @@ class _Fitter:
         return leisure
 
     @staticmethod
-    def _most(done: Sequence[Run]) -> tuple[int, bool]:
-        """Return the state that stays are most of, and whether that is most of their time."""
+    def _main_state(done: Sequence[Stretch]) -> tuple[int, bool]:
+        """Return the state with the most time, and whether that is more than half of the time."""
         lasts: dict[int, int] = defaultdict(int)
         for run in done:
             lasts[run.state] += run.length
         state = max(lasts, key=lambda s: (lasts[s], -s))
         return state, 2 * lasts[state] > sum(lasts.values())
 
-    def recorded(self, days: Sequence[Day]) -> list[str]:
-        """Return days as they were lived, with a name for each state."""
-        by_state: dict[int, list[Run]] = defaultdict(list)
+    def recorded(self, days: Sequence[LivedDay]) -> list[str]:
+        """Return days as texts of recorded days."""
+        by_state: dict[int, list[Stretch]] = defaultdict(list)
         for day in days:
             for run in (*day.awake, *day.up):
                 by_state[run.state].append(run)
         for state, done in sorted(by_state.items()):
             self._add(self.names[state], state, done)
-        return [write_day(_as_lived(day, self.names)) for day in days]
+        return [write_day(_recorded_day(day, self.names)) for day in days]
 
-    def sleep(self, days: Sequence[Day], *, gets_up: bool) -> None:
-        """Describe sleep, and how often and for how long one is up at night."""
+    def sleep(self, days: Sequence[LivedDay], *, gets_up: bool) -> None:
+        """Describe sleep, and how often and how long the person is up at night."""
         state = max(sleep_states(self.timeline), key=lambda s: (self.timeline.minutes == s).sum())
         fields = self._where(state) | {"posture": "lie"}
         places = self.timeline.states
@@ -243,8 +247,8 @@ class _Fitter:
         self.activities["sleep"] = fields
         self.states["sleep"] = state
 
-    def rest(self, days: Sequence[Day]) -> None:
-        """Describe what is done where nothing else fits: what is done most."""
+    def rest(self, days: Sequence[LivedDay]) -> None:
+        """Describe rest, for times in which nothing else fits, by the most frequent state."""
         lasts: dict[int, int] = defaultdict(int)
         for day in days:
             for run in day.awake:
@@ -254,7 +258,7 @@ class _Fitter:
         self.activities["rest"] = self._where(state) | {"takes": "15 min"}
         self.states["rest"] = state
 
-    def _add(self, name: str, state: int, done: Sequence[Run]) -> None:
+    def _add(self, name: str, state: int, done: Sequence[Stretch]) -> None:
         self.activities[name] = self._where(state) | {"takes": _takes(done)}
         self.states[name] = state
 
@@ -269,8 +273,8 @@ class _Fitter:
         return {"rooms": list(rooms), "posture": posture}
 
 
-def _as_lived(day: Day, names: Sequence[str]) -> RecordedDay:
-    """Return a day of a log; what nobody knows of it is taken for going on with what one did."""
+def _recorded_day(day: LivedDay, names: Sequence[str]) -> RecordedDay:
+    """Return a day of a log as a recorded day; in unknown times, the activity before continues."""
     entries = [(run.begin, names[run.state]) for run in day.awake] or [(day.wake, "rest")]
     entries[0] = (day.wake, entries[0][1])
     entries.append((day.bed, "sleep"))
@@ -280,15 +284,15 @@ def _as_lived(day: Day, names: Sequence[str]) -> RecordedDay:
     last = [e for e in entries if e[0] < day.next_wake - 1]
     if last[-1][1] != "sleep":
         last.append((day.next_wake - 1, "sleep"))
-    kept = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
-    begins, activities = zip(*kept, strict=True)
+    changes = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
+    begins, activities = zip(*changes, strict=True)
     return RecordedDay(tuple(60 * at for at in begins), tuple(activities), 60 * day.next_wake)
 
 
-def _clusters(done: Sequence[tuple[int, Run]]) -> list[list[tuple[int, Run]]]:
-    """Return runs by time of day, in groups that are an hour or more apart."""
+def _clusters(done: Sequence[tuple[int, Stretch]]) -> list[list[tuple[int, Stretch]]]:
+    """Return stretches, with the number of their day, in groups more than APART from each other."""
     ordered = sorted(done, key=lambda entry: (entry[1].begin, entry[0]))
-    groups: list[list[tuple[int, Run]]] = []
+    groups: list[list[tuple[int, Stretch]]] = []
     for entry in ordered:
         if not groups or entry[1].begin - groups[-1][-1][1].begin > APART:
             groups.append([])
@@ -296,13 +300,20 @@ def _clusters(done: Sequence[tuple[int, Run]]) -> list[list[tuple[int, Run]]]:
     return groups
 
 
-def _is_appointment(kept: Sequence[Run], count: int, days: int) -> bool:
-    begins = np.array([run.begin for run in kept], np.float64)
+def _is_task(stretches: Sequence[Stretch], count: int, days: int) -> bool:
+    """Tell whether an activity is a task.
+
+    Args:
+        stretches: The longest one of each day that has some.
+        count: The number of all of them.
+        days: The number of days.
+    """
+    begins = np.array([run.begin for run in stretches], np.float64)
     return (
-        len(kept) >= max(KEPT * days, 2)
-        and count <= 1.3 * len(kept)
+        len(stretches) >= max(LEAST_SHARE * days, 2)
+        and count <= 1.3 * len(stretches)
         and float(np.std(begins)) <= SPREAD
-        and float(np.mean([run.length for run in kept])) >= LONG
+        and float(np.mean([run.length for run in stretches])) >= LONG
     )
 
 
@@ -317,15 +328,15 @@ def _timing(begins: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _takes(done: Sequence[Run]) -> dict[str, Any]:
+def _takes(done: Sequence[Stretch]) -> dict[str, Any]:
     """Return the measured law of durations, as quantiles at even steps from 0 to 1."""
     lengths = np.log(np.sort([float(run.length) for run in done]))
     count = min(max(2, 2 * len(lengths) - 1), QUANTILES)
     at = np.linspace(0, len(lengths) - 1, count)
-    # Durations differ by factors: between two measured ones, their geometric means.
+    # Interpolated geometrically, as durations differ by factors.
     values = np.exp(np.interp(at, np.arange(len(lengths)), lengths))
     quantiles = [_seconds(round(60 * v)) for v in values.tolist()]
-    # It may be broken off by what comes next, rather than not be begun.
+    # A short least duration, so that it may be cut rather than left out.
     return {"law": "measured", "quantiles": quantiles, "at_least": "1 min"}
 
 
@@ -342,7 +353,7 @@ def _seconds(seconds: int) -> str:
 
 
 def to_yaml(document: Mapping[str, Any]) -> str:
-    """Write a persona as people read it: one line for each activity and task."""
+    """Return a persona as YAML, with one line per activity and task."""
     lines = [f"about: {document['about']}", "activities:"]
     for name, fields in sorted(document["activities"].items()):
         lines.append(f"  {name}: {_flow(fields)}")

@@ -1,4 +1,4 @@
-"""A picture of a fit: time shares by hour and durations of stays, of the log and of the persona."""
+"""Pictures of fits: time shares by hour and durations of stays, of the log and of the persona."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fleet2d.fit.compare import by_hour, dwell_times, shares
-from fleet2d.fit.days import Day
-from fleet2d.fit.persona import Fitted
+from fleet2d.fit.days import LivedDay
+from fleet2d.fit.persona import FittedPersona
 from fleet2d.fit.sample import sample_markov, sample_persona
 from fleet2d.fit.timeline import Timeline
 from fleet2d.logs.log import AWAY
@@ -20,12 +20,12 @@ LINES = ("#222222", "#c2410c", "#9aa5b1")
 
 
 def draw_fit(
-    timeline: Timeline, days: Sequence[Day], fitted: Fitted, target: Path, seed: int = 0
+    timeline: Timeline, days: Sequence[LivedDay], fitted: FittedPersona, target: Path, seed: int = 0
 ) -> None:
-    """Draw the log, the persona's days and a Markov chain's beside each other.
+    """Draw the days of the log, of the persona and of a Markov chain next to each other.
 
-    Above: which share of each hour is spent where. Below: of each room, which share of the stays
-    is over after how long.
+    At the top: the shares of the rooms in each hour. At the bottom: the distribution function of
+    the durations of stays, room by room.
     """
     from matplotlib.figure import Figure
 

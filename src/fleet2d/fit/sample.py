@@ -1,11 +1,11 @@
-"""Days drawn from a fitted persona and from a Markov chain, as minutes."""
+"""Samples of days from a fitted persona and from a Markov chain, as minutes."""
 
 from datetime import date
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.fit.persona import Fitted
+from fleet2d.fit.persona import FittedPersona
 from fleet2d.fit.timeline import DAY_S, I16, MINUTES, Timeline
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import KNOTS, exponential
@@ -13,12 +13,14 @@ from fleet2d.routines.life import Life
 from fleet2d.routines.planner import Doing
 from fleet2d.streams import Draws, stream_key
 
-# The Monday on which the first sampled day is.
+# The date of the first sampled day, a Monday.
 MONDAY = date(2017, 1, 2).toordinal()
 
 
-def sample_persona(fitted: Fitted, timeline: Timeline, days: int, seed: int = 0) -> tuple[I16, I16]:
-    """Return the states and the places of days that a persona lives, int16 (days, 1440) each."""
+def sample_persona(
+    fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0
+) -> tuple[I16, I16]:
+    """Return the states and the places of days drawn from a persona, int16 (days, 1440) each."""
     life = Life(fitted.persona, seed, "fit")
     key = stream_key(seed, "fit", "up at night")
     places = timeline.places
@@ -33,29 +35,29 @@ def sample_persona(fitted: Fitted, timeline: Timeline, days: int, seed: int = 0)
             rooms[begin:end] = place_of[doing.activity]
             activity = fitted.persona.activity(doing.activity)
             if activity.fetches is not None and activity.fetches_from[0] in places:
-                there = places.index(activity.fetches_from[0])
+                place = places.index(activity.fetches_from[0])
                 for first, last in _fetches(activity, doing, Draws(key, ordinal * 1024 + i)):
-                    rooms[day * DAY_S + first : day * DAY_S + last] = there
+                    rooms[day * DAY_S + first : day * DAY_S + last] = place
     sample = slice(DAY_S + 30, (days + 1) * DAY_S + 30, 60)  # the middles of the minutes
     return states[sample].reshape(-1, MINUTES), rooms[sample].reshape(-1, MINUTES)
 
 
 def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, int]]:
-    """Return when somebody is up for something while doing it [s], as an inhabitant is."""
+    """Return begin and end of each fetch during a doing [s], drawn like those of inhabitants."""
     assert activity.fetches is not None
     wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
     times = []
     now = doing.begin + wait.knots[draws.below(KNOTS)]
     while now < doing.end:
-        over = now + takes.draw(draws)
-        if over < doing.end:
-            times.append((now, over))
-        now = over + wait.knots[draws.below(KNOTS)]
+        end = now + takes.draw(draws)
+        if end < doing.end:
+            times.append((now, end))
+        now = end + wait.knots[draws.below(KNOTS)]
     return times
 
 
 def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
-    """Return whole days drawn from some, which is copying: int16 (days, 1440)."""
+    """Return copies of whole days, drawn with replacement, int16 (days, 1440)."""
     draws = Draws(stream_key(seed, "fit", "whole days"), 0)
     return labels[[draws.below(len(labels)) for _ in range(days)]]
 
@@ -63,8 +65,8 @@ def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
 def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
     """Return days of the first-order Markov chain of some days' minutes, int16 (days, 1440).
 
-    The chain that is most likely given them: of each label, how often which follows in the next
-    minute. It begins each run of days at a label drawn from how often there is each.
+    Its transition probabilities are the relative frequencies of the label in the next minute. The
+    first label is drawn by the frequency of the labels.
     """
     follows = np.zeros((count, count), np.int64)
     known = (labels[:, :-1] >= 0) & (labels[:, 1:] >= 0)

@@ -1,4 +1,4 @@
-"""A log as minutes: which activity is done in which kind of room, in each minute of each day."""
+"""Timelines: the activity and the kind of room of a log in each minute of each day."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from fleet2d.units import micros
 
 MINUTES = 1440
 DAY_S = 86_400
-NOBODY_KNOWS = -1
-# Silence up to this is taken for staying: who is modelled has to be somewhere.
+UNKNOWN_STATE = -1
+# Silence up to this counts as staying in the room, in general and in one room.
 HOLD = timedelta(hours=3)
 STILL = timedelta(hours=12)
-OUT = timedelta(minutes=10)  # silence at the front door that lasts longer is being out
-# A pair of activity and room that is rarer than both becomes part of the room's others.
+OUT = timedelta(minutes=10)  # a longer silence at the front door counts as being out
+# An activity in a room with less time and fewer runs than this loses its name.
 RARE_MINUTES, RARE_RUNS = 30, 4
 
 I16 = NDArray[np.int16]
 
 
-class State(NamedTuple):
-    """What is done where: `activity` is "" for what the log doesn't name or what is rare."""
+class ActivityPlace(NamedTuple):
+    """An activity in a kind of room; the activity is "" if it is unnamed in the log, or rare."""
 
     activity: str
     place: str
@@ -36,15 +36,15 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Timeline:
-    """What is done in each minute: what holds for most of its seconds.
+    """The state in each minute: that of most of its seconds.
 
     Attributes:
-        states: What there is.
-        minutes: Index of the state, -1 where nobody knows, int16 (days, 1440).
-        weekdays: Day of the week of each day, 0 = Monday; None where the log has no dates.
+        states: The states.
+        minutes: Index of the state in each minute, -1 if unknown, int16 (days, 1440).
+        weekdays: Day of the week of each day, 0 = Monday; None if the log has no dates.
     """
 
-    states: tuple[State, ...]
+    states: tuple[ActivityPlace, ...]
     minutes: I16
     weekdays: tuple[int, ...] | None
 
@@ -55,7 +55,7 @@ class Timeline:
 
     @property
     def rooms(self) -> I16:
-        """Index of the place in each minute, -1 where nobody knows, int16 (days, 1440)."""
+        """Index of the place in each minute, -1 if unknown, int16 (days, 1440)."""
         places = self.places
         index = np.array([places.index(s.place) for s in self.states] + [-1], np.int16)
         return index[self.minutes]
@@ -65,21 +65,21 @@ def read_timeline(log: ActivityLog) -> Timeline:
     """Return the minutes of a log.
 
     Raises:
-        LogError: It tells nothing for most of the time.
+        LogError: The state is unknown for most of the time.
     """
     pairs, seconds = read_seconds(log)
     minutes = _by_minute(seconds, len(pairs))
-    states, minutes = _without_rare(pairs, _one_a_stay(pairs, minutes))
+    states, minutes = _without_rare(pairs, _one_per_stay(pairs, minutes))
     if np.count_nonzero(minutes >= 0) < minutes.size // 4:
         raise LogError(
-            f"{log.path} tells nothing for most of its {log.days} days: there is nothing to fit"
+            f"{log.path} has no readings for most of its {log.days} days: there is nothing to fit"
         )
     first = log.first_day
     weekdays = tuple((first.weekday() + i) % 7 for i in range(log.days)) if first else None
     return Timeline(states, minutes, weekdays)
 
 
-def read_seconds(log: ActivityLog) -> tuple[list[State], I16]:
+def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
     """Return the states of a log, and the index of that in each second of its days, -1 unknown."""
     kinds = {label: (_kind(label),) for label in log.rooms}
     rule = VisitRule(
@@ -99,27 +99,27 @@ def _kind(label: str) -> str:
     return AWAY if label == AWAY else kind
 
 
-def _by_second(visits: list[LoggedVisit], count: int) -> tuple[list[State], I16]:
-    index: dict[State, int] = {}
-    seconds = np.full(count, NOBODY_KNOWS, np.int16)
+def _by_second(visits: list[LoggedVisit], count: int) -> tuple[list[ActivityPlace], I16]:
+    index: dict[ActivityPlace, int] = {}
+    seconds = np.full(count, UNKNOWN_STATE, np.int16)
     for number, visit in enumerate(visits):
         if visit.place == UNKNOWN:
             continue
-        over = visits[number + 1].first if number + 1 < len(visits) else visit.last + 1
+        visit_end = visits[number + 1].first if number + 1 < len(visits) else visit.last + 1
         place = "entryway" if visit.place == DOOR else visit.place
-        begun = [(max(step, 0), what) for step, what in visit.activities] or [(visit.first, "")]
-        for (step, what), (end, _) in zip(begun, [*begun[1:], (over, "")], strict=True):
-            name = room_type(what) if what else ""
-            state = State("away" if place == AWAY and not name else name, place)
+        parts = [(max(step, 0), label) for step, label in visit.activities] or [(visit.first, "")]
+        for (step, label), (end, _) in zip(parts, [*parts[1:], (visit_end, "")], strict=True):
+            name = room_type(label) if label else ""
+            state = ActivityPlace("away" if place == AWAY and not name else name, place)
             seconds[step:end] = index.setdefault(state, len(index))
     return list(index), seconds
 
 
 def _by_minute(seconds: I16, states: int) -> I16:
-    """Return the state that holds longest in each minute, the first of equals; -1 counts, too."""
+    """Return the most frequent state of each minute, the first of equals; unknown counts, too."""
     by_minute = seconds.reshape(-1, 60)
-    best = np.full(len(by_minute), NOBODY_KNOWS, np.int16)
-    most = (by_minute == NOBODY_KNOWS).sum(axis=1)
+    best = np.full(len(by_minute), UNKNOWN_STATE, np.int16)
+    most = (by_minute == UNKNOWN_STATE).sum(axis=1)
     for state in range(states):
         count = (by_minute == state).sum(axis=1)
         best[count > most] = state
@@ -127,20 +127,20 @@ def _by_minute(seconds: I16, states: int) -> I16:
     return best.reshape(-1, MINUTES)
 
 
-def is_sleep(state: State) -> bool:
-    """Tell whether a state is named as sleep."""
+def is_sleep(state: ActivityPlace) -> bool:
+    """Tell whether the activity of a state is sleep, by its name."""
     return "sleep" in state.activity and not state.activity.startswith("go_to")
 
 
-def _one_a_stay(pairs: list[State], minutes: I16) -> I16:
-    """Let every stay in a room be of the activity that it is most of; sleep is a stay of its own.
+def _one_per_stay(pairs: list[ActivityPlace], minutes: I16) -> I16:
+    """Give every stay in a room the activity with the most time; sleep is a separate stay.
 
-    What is done in passing on a stay, washing hands after the toilet, is no stay by itself.
+    Short activities during a stay, such as washing hands after the toilet, are dropped.
     """
     flat = minutes.ravel().copy()
     kinds: dict[tuple[str, bool], int] = {}
     kind = [kinds.setdefault((s.place, is_sleep(s)), len(kinds)) for s in pairs]
-    of_state = np.array([*kind, NOBODY_KNOWS], np.int16)
+    of_state = np.array([*kind, UNKNOWN_STATE], np.int16)
     for label, begin, length in runs(of_state[flat]):
         if label >= 0:
             stay = flat[begin : begin + length]
@@ -148,18 +148,22 @@ def _one_a_stay(pairs: list[State], minutes: I16) -> I16:
     return flat.reshape(-1, MINUTES)
 
 
-def _without_rare(pairs: list[State], minutes: I16) -> tuple[tuple[State, ...], I16]:
+def _without_rare(
+    pairs: list[ActivityPlace], minutes: I16
+) -> tuple[tuple[ActivityPlace, ...], I16]:
+    """Return the states that occur, without the names of rare activities, and the minutes."""
     flat = minutes.ravel()
-    begun = flat[np.append(True, flat[1:] != flat[:-1])]
-    runs, lasts = Counter(begun.tolist()), Counter(flat.tolist())
-    kept: dict[State, int] = {}
-    index = np.full(len(pairs) + 1, NOBODY_KNOWS, np.int16)
+    firsts = flat[np.append(True, flat[1:] != flat[:-1])]
+    run_counts, minute_counts = Counter(firsts.tolist()), Counter(flat.tolist())
+    result: dict[ActivityPlace, int] = {}
+    index = np.full(len(pairs) + 1, UNKNOWN_STATE, np.int16)
     for i, state in enumerate(pairs):
-        if not lasts[i]:
+        if not minute_counts[i]:
             continue
-        rare = runs[i] < RARE_RUNS and lasts[i] < RARE_MINUTES
-        index[i] = kept.setdefault(State("", state.place) if rare else state, len(kept))
-    return tuple(kept), index[minutes]
+        is_rare = run_counts[i] < RARE_RUNS and minute_counts[i] < RARE_MINUTES
+        renamed = ActivityPlace("", state.place) if is_rare else state
+        index[i] = result.setdefault(renamed, len(result))
+    return tuple(result), index[minutes]
 
 
 def runs(labels: I16) -> list[tuple[int, int, int]]:

@@ -1,4 +1,4 @@
-"""In which kind of room somebody is in each second: of a log, and of a simulated persona."""
+"""Traces: the kind of room of each second, of a log and of a simulated persona."""
 
 from datetime import timedelta
 from pathlib import Path
@@ -15,18 +15,23 @@ START = "2026-01-05"  # a Monday
 I16 = NDArray[np.int16]
 
 
-class Trace(NamedTuple):
-    """Second by second, from midnight, the index of a kind of room; -1 where nobody knows."""
+class RoomTrace(NamedTuple):
+    """The kind of room of each second, from midnight on.
+
+    Attributes:
+        rooms: Index of the kind, -1 if unknown, int16 (seconds,).
+        kinds: The kinds of rooms.
+    """
 
     rooms: I16
     kinds: tuple[str, ...]
 
 
-def trace_of_log(path: Path) -> Trace:
+def trace_of_log(path: Path) -> RoomTrace:
     """Return the trace of a log of rooms and activities.
 
     Raises:
-        LogError: It can't be read, or is of positions.
+        LogError: The log can't be read, or is one of positions.
     """
     log = read_log(path)
     if not isinstance(log, ActivityLog):
@@ -34,11 +39,11 @@ def trace_of_log(path: Path) -> Trace:
     states, seconds = read_seconds(log)
     kinds = tuple(sorted({state.place for state in states}))
     index = np.array([kinds.index(state.place) for state in states] + [-1], np.int16)
-    return Trace(index[seconds], kinds)
+    return RoomTrace(index[seconds], kinds)
 
 
-def trace_of_persona(persona: str, days: int, seed: int) -> Trace:
-    """Return the trace of a persona that lives alone in the bundled home, furnished."""
+def trace_of_persona(persona: str, days: int, seed: int) -> RoomTrace:
+    """Return the trace of a persona that lives alone in the bundled home, with furniture."""
     from fleet2d.engine.run import run
 
     stored = run(
@@ -51,4 +56,4 @@ def trace_of_persona(persona: str, days: int, seed: int) -> Trace:
     of_room = [room.type for room in stored.plan.rooms]
     kinds = tuple(sorted({*of_room, AWAY}))
     index = np.array([kinds.index(kind) for kind in (*of_room, AWAY)], np.int16)
-    return Trace(index[stored.path("ana", every=timedelta(seconds=1)).room], kinds)
+    return RoomTrace(index[stored.path("ana", every=timedelta(seconds=1)).room], kinds)

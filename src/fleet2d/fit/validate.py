@@ -1,4 +1,4 @@
-"""Is a fit any good: days that it wasn't fitted on, beside a Markov chain's."""
+"""Validation of fits: distances to days held back, compared with copies and a Markov chain."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.fit.compare import Distances, distances
-from fleet2d.fit.days import Day, find_days
+from fleet2d.fit.days import LivedDay, find_days
 from fleet2d.fit.persona import Model, fit_persona
 from fleet2d.fit.sample import sample_days, sample_markov, sample_persona
 from fleet2d.fit.timeline import I16, Timeline
@@ -16,11 +16,11 @@ MODELS = (
     "the persona", "whole days drawn anew", "a first-order Markov chain",
     "the days they were fitted on",
 )  # fmt: skip
-# Nearer than that, two distances of so few days are equal.
+# Two distances that differ by less than this count as equal.
 EQUAL = 0.0005
 FOLDS = 3
-SAMPLED = 700  # days: whole weeks
-CHAIN_DAYS = 140  # of the chain, minute by minute
+SAMPLED = 700  # the number of days drawn from a persona, whole weeks
+CHAIN_DAYS = 140  # the number of days drawn from the chain
 
 
 class Validation(NamedTuple):
@@ -28,9 +28,9 @@ class Validation(NamedTuple):
 
     Attributes:
         days: The number of days, each held back once.
-        folds: How many times a part of them was held back.
-        rooms: Of rooms: the distances of the models, in the order of MODELS.
-        activities: The same of activities.
+        folds: The number of parts that were held back in turn.
+        rooms: The distances of rooms, for each model of MODELS.
+        activities: The distances of activities, likewise.
     """
 
     days: int
@@ -39,12 +39,12 @@ class Validation(NamedTuple):
     activities: tuple[Distances, ...]
 
     def worse_than_copying(self) -> list[str]:
-        """Return in what the persona is farther from days held back than whole days drawn anew."""
+        """Return lines about distances of rooms in which the persona is worse than copied days."""
         persona, copies = self.rooms[0], self.rooms[1]
-        what = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
+        keys = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
         return [
             f"{name} {getattr(persona, key):.3f}, copies {getattr(copies, key):.3f}"
-            for name, key in what.items()
+            for name, key in keys.items()
             if getattr(persona, key) > getattr(copies, key) + EQUAL
         ]
 
@@ -52,9 +52,9 @@ class Validation(NamedTuple):
 def validate(
     timeline: Timeline, folds: int = FOLDS, seed: int = 0, *, model: Model = "recorded"
 ) -> Validation:
-    """Fit to some of the days and compare with the others, for each of some parts in turn.
+    """Fit a persona to a part of the days and compare it with the others, for each part in turn.
 
-    Every third day is held back, so that each part has early and late ones.
+    With three parts, every third day is held back, so that each part has early and late days.
 
     Raises:
         LogError: There are too few days to hold any back.
@@ -70,31 +70,33 @@ def validate(
     for fold in range(folds):
         held = days[fold::folds]
         rest = [day for day in days if day not in held]
-        found = _fold(timeline, rest, held, seed, model)
-        rooms.append(found[0])
-        activities.append(found[1])
+        of_rooms, of_activities = _fold(timeline, rest, held, seed, model)
+        rooms.append(of_rooms)
+        activities.append(of_activities)
     return Validation(len(days), folds, _mean(rooms), _mean(activities))
 
 
 def _fold(
-    timeline: Timeline, rest: Sequence[Day], held: Sequence[Day], seed: int, model: Model
+    timeline: Timeline, rest: Sequence[LivedDay], held: Sequence[LivedDay], seed: int, model: Model
 ) -> tuple[tuple[Distances, ...], tuple[Distances, ...]]:
+    """Return the distances of rooms and of activities between days held back and the models."""
     fitted = fit_persona(timeline, rest, model=model)
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
-    mine, yours = ([day.number for day in part] for part in (rest, held))
+    rest_days, held_days = ([day.number for day in part] for part in (rest, held))
     place_count, state_count = len(timeline.places), len(timeline.states)
-    found = []
+    result = []
     for sampled, labels, count in (
         (rooms, timeline.rooms, place_count),
         (states, timeline.minutes, state_count),
     ):
-        real: I16 = labels[yours]
-        copies = sample_days(labels[mine], SAMPLED, seed)
-        chain = sample_markov(labels[mine], count, CHAIN_DAYS, seed)
-        models = (sampled, copies, chain, labels[mine])
-        found.append(tuple(distances(real, other, count) for other in models))
-    return found[0], found[1]
+        real: I16 = labels[held_days]
+        copies = sample_days(labels[rest_days], SAMPLED, seed)
+        chain = sample_markov(labels[rest_days], count, CHAIN_DAYS, seed)
+        models = (sampled, copies, chain, labels[rest_days])
+        result.append(tuple(distances(real, other, count) for other in models))
+    return result[0], result[1]
 
 
-def _mean(found: Sequence[tuple[Distances, ...]]) -> tuple[Distances, ...]:
-    return tuple(Distances(*row) for row in np.mean(np.array(found), axis=0).tolist())
+def _mean(folds: Sequence[tuple[Distances, ...]]) -> tuple[Distances, ...]:
+    """Return the mean distances of each model over the folds."""
+    return tuple(Distances(*row) for row in np.mean(np.array(folds), axis=0).tolist())

@@ -1,7 +1,7 @@
-"""How people move about a home: visits to each kind of room per day, short ones, and returns.
+"""Counts of movements in a home: visits to kinds of rooms per day, short visits, and returns.
 
-What is compared is second by second the kind of room that somebody is in, from a log or from a
-simulated run, so that both are counted by one rule.
+They are counted in the kinds of rooms of each second, so that logs and simulated runs are compared
+by the same rule.
 """
 
 from collections.abc import Sequence
@@ -15,14 +15,14 @@ from fleet2d.logs.log import AWAY
 
 I16 = NDArray[np.int16]
 DAY_S, HOUR_S = 86_400, 3_600
-# Less than this in a room is passing through [s].
+# A shorter time in a room is not counted as a visit [s].
 PASSING_S = 15
-# A visit shorter than this is short [s]; who is back within this long made a way there and back.
+# The limit of short visits, and of the time away from a room to which one returns [s].
 SHORT_S, BACK_S = 180, 300
 DAYTIME_S = (9 * HOUR_S, 21 * HOUR_S)
 BATHROOMS = ("bathroom", "toilet")
-# In such rooms nobody stays: they lead to others.
-WAYS = ("hallway", "entryway", "corridor", "lobby")
+# Kinds of rooms that lead to others; visits to them are not counted.
+PASSAGES = ("hallway", "entryway", "corridor", "lobby")
 
 
 class Visits(NamedTuple):
@@ -32,8 +32,8 @@ class Visits(NamedTuple):
         bathroom: Visits to bathrooms and toilets.
         bathroom_daytime: Those from 9 to 21 h.
         short: Visits to any room but hallways that last less than three minutes.
-        returns: Ways out of a room and back into it within five minutes.
-        comings: How often one came home.
+        returns: Times that a room was left and entered again within five minutes.
+        comings: Times that the person came home.
     """
 
     bathroom: list[int]
@@ -44,7 +44,7 @@ class Visits(NamedTuple):
 
 
 class Stay(NamedTuple):
-    """A stay in a kind of room: from when [s of the trace], and how long [s]."""
+    """A stay in a kind of room: its begin [s of the trace] and its length [s]."""
 
     kind: str
     begin: int
@@ -52,16 +52,16 @@ class Stay(NamedTuple):
 
 
 def stays(trace: I16, kinds: Sequence[str]) -> list[Stay]:
-    """Return the stays of a trace, without the rooms that one only passes through.
+    """Return the stays of a trace, without passages and rooms that are only passed through.
 
     Args:
-        trace: The index of the kind of room in each second, -1 where nobody knows.
+        trace: The index of the kind of room in each second, -1 if unknown.
         kinds: The kinds of rooms.
     """
     result: list[Stay] = []
     for label, begin, length in runs(trace):
         kind = kinds[label] if label >= 0 else ""
-        if not kind or kind in WAYS or (length < PASSING_S and kind != AWAY):
+        if not kind or kind in PASSAGES or (length < PASSING_S and kind != AWAY):
             continue
         last = result[-1] if result else None
         if last is not None and last.kind == kind and begin - last.begin - last.length < PASSING_S:
@@ -73,25 +73,27 @@ def stays(trace: I16, kinds: Sequence[str]) -> list[Stay]:
 
 def count_visits(trace: I16, kinds: Sequence[str]) -> Visits:
     """Count the visits of each whole day of a trace that begins at midnight."""
-    found = stays(trace, kinds)
+    all_stays = stays(trace, kinds)
     counts = np.zeros((len(Visits._fields), len(trace) // DAY_S + 1), np.int64)
-    for i, stay in enumerate(found):
+    for i, stay in enumerate(all_stays):
         day, second = divmod(stay.begin, DAY_S)
         bath = stay.kind in BATHROOMS
-        before = found[i - 1].kind if i else ""
-        back = i + 1 < len(found) and found[i + 1].kind == before != stay.kind
+        before = all_stays[i - 1].kind if i else ""
+        after = all_stays[i + 1] if i + 1 < len(all_stays) else None
+        is_return = after is not None and after.kind == before != stay.kind != AWAY
         counts[0, day] += bath
         counts[1, day] += bath and DAYTIME_S[0] <= second < DAYTIME_S[1]
         counts[2, day] += stay.length < SHORT_S and stay.kind != AWAY
-        counts[3, day] += back and found[i + 1].begin - stay.begin < BACK_S and stay.kind != AWAY
+        counts[3, day] += is_return and after is not None and after.begin - stay.begin < BACK_S
         counts[4, day] += before == AWAY
     return Visits(*(row[: len(trace) // DAY_S].tolist() for row in counts))
 
 
 def spread(homes: Sequence[Visits]) -> tuple[list[int], list[int]]:
-    """Return the lowest and the highest count of any day of some homes, by field of Visits.
+    """Return the least and the largest count of a day in some homes, by field of Visits.
 
-    Days on which nobody was seen at all, such as the last of a log that ends at night, don't count.
+    Days without a visit to a bathroom, such as the last day of a log that ends at night, are left
+    out.
     """
     lows, highs = [], []
     for field in range(len(Visits._fields)):

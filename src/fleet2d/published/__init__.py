@@ -1,4 +1,4 @@
-"""Turn a configuration of the published Fleet2D into a scenario, and say what changes by it."""
+"""Conversion of configurations of the published Fleet2D to scenarios, with remarks on changes."""
 
 from fleet2d.published.convert import convert_file
 

@@ -1,4 +1,4 @@
-"""Convert a file: read it, check what comes of it, write that."""
+"""Conversion of a file: read the configuration, check the resulting scenario, write it."""
 
 import os
 import textwrap
@@ -34,12 +34,13 @@ def convert_file(old: Path, new: Path) -> list[str]:
         new: The scenario to write; it must not exist.
 
     Returns:
-        What could not be carried over or means something else now, each with the old key first.
+        Remarks on what could not be converted or has another meaning now, each beginning with the
+        old key.
 
     Raises:
         InputError: `old` can't be read or is no such configuration, or `new` exists or can't be
             written.
-        ArtifactError: The disk is full. In either case nothing is left in the place of `new`.
+        ArtifactError: The disk is full. After any error, there is no file `new`.
     """
     old, new = Path(old), Path(new)
     _check_target(new)
@@ -60,9 +61,9 @@ def _read(old: Path) -> Document:
 
 
 def _convert(reader: Reader, old: Path, new: Path) -> dict[str, Any]:
-    """Return the scenario as plain data; starts that a body can't have are moved."""
+    """Return the scenario as plain data; starts in or near walls are moved to free points."""
     step = read_step(reader)
-    floorplan, found = convert_floorplan(reader, old, new)
+    floorplan, plan_file = convert_floorplan(reader, old, new)
     users, paths = convert_users(reader, step)
     data: dict[str, Any] = {
         "simulation": convert_simulation(reader, step),
@@ -80,25 +81,25 @@ def _convert(reader: Reader, old: Path, new: Path) -> dict[str, Any]:
             reader.remark(("robot",), f"called {name}: there is a user robot")
         paths[name] = body_keys(reader, ("robot",))
         data["robots"][name] = convert_robot(reader, paths[name], step)
-    scenario = _validate(data, found, reader.shown_as)
-    if found:
-        _move_starts(reader, data, scenario, found, paths)
+    scenario = _validate(data, plan_file, reader.shown_as)
+    if plan_file:
+        _move_starts(reader, data, scenario, plan_file, paths)
     return {key: value for key, value in data.items() if value}
 
 
-def _validate(data: dict[str, Any], found: Path | None, shown_as: str) -> Scenario:
-    """Return the scenario, checked in full; without a file for its plan, with another plan."""
-    plan = {"type": "houseexpo", "path": str(found)} if found else {"type": "bundled"}
+def _validate(data: dict[str, Any], plan_file: Path | None, shown_as: str) -> Scenario:
+    """Return the scenario, fully checked; without a plan's file, with the bundled plan."""
+    plan = {"type": "houseexpo", "path": str(plan_file)} if plan_file else {"type": "bundled"}
     try:
         return load_scenario({**data, "floorplan": {**plan, "cell": data["floorplan"]["cell"]}})
     except ScenarioError as error:
-        raise ScenarioError(f"what would come of {shown_as} is no scenario: {error}") from None
+        raise ScenarioError(f"{shown_as} would become no valid scenario: {error}") from None
 
 
 def _move_starts(
     reader: Reader, data: dict[str, Any], scenario: Scenario, plan: Path, paths: Mapping[str, Keys]
 ) -> None:
-    """Move every start where its body can't be to the nearest point where it can."""
+    """Move every start at which its body doesn't fit to the nearest point at which it does."""
     home = Home(read_houseexpo(plan, data["floorplan"]["cell"]))
     lattice = home.plan.lattice
     for name, entity in [*scenario.users.items(), *scenario.robots.items()]:
@@ -113,13 +114,13 @@ def _move_starts(
         near = space.nearest(x, y, 0)
         if space.part_at(x, y) >= 0 or near is None:
             continue
-        there = [round(value, 4) for value in lattice.to_metres(near).tolist()]
+        free = [round(value, 4) for value in lattice.to_metres(near).tolist()]
         reader.remark(
             (*paths[name], "pose_config", "init_pose"),
             f"{start} is in a wall or nearer to one than its radius, {entity.radius:g} m: it starts"
-            f" at {there}, the nearest free point",
+            f" at {free}, the nearest free point",
         )
-        start[:] = there
+        start[:] = free
 
 
 # The new file
@@ -133,12 +134,12 @@ def _dump(data: Mapping[str, Any]) -> str:
 
 
 def _header(old: Path, remarks: list[str]) -> str:
-    """Return the comment on top: what the scenario came from, and all that changed by it."""
+    """Return the comment at the top: the source of the scenario, and all remarks."""
     text = (
         f"Converted by `fleet2d convert` from {old.name}, a configuration of the published Fleet2D."
     )
     lines = [text, *(["What changed:"] if remarks else []), *(f"- {remark}" for remark in remarks)]
-    # Only what can be printed: a line break in a key would end the comment.
+    # Only printable characters, as a line break in a key would end the comment.
     printable = ("".join(c if c.isprintable() else "?" for c in line) for line in lines)
     wrapped = (
         textwrap.wrap(
@@ -161,7 +162,7 @@ def _check_target(new: Path) -> None:
 
 
 def _write_new(new: Path, text: str) -> None:
-    """Write a file that must not exist, whole or not at all."""
+    """Write a file that must not exist, completely or not at all."""
     part = new.with_name(f".{new.name}.{os.getpid()}")
     try:
         with part.open("x", encoding="utf-8", newline="\n") as file:

@@ -1,7 +1,7 @@
-"""What becomes of the users and the robot of the published Fleet2D.
+"""Conversion of the users and the robot of the published Fleet2D.
 
-Poses there are metres in the plan's own coordinates and degrees counter-clockwise from +x, as here;
-pixels come in only where it rounds walls and looks up where one may go.
+Its poses are metres in the plan's own coordinates and degrees counter-clockwise from +x, as here;
+it uses pixels only to round walls and to look up free space.
 """
 
 import math
@@ -18,7 +18,7 @@ from fleet2d.published.reader import Reader, tidy
 from fleet2d.sight.camera import Camera
 from fleet2d.units import micros
 
-# A random turn is cut at 4.88 standard deviations (kernels.random): this limit never cuts one.
+# Random turns are cut at 4.88 standard deviations (kernels.random), so this limit has no effect.
 _TURN_LIMIT_STD = 5
 _FASTEST_TURN_DEG_S = 36_000
 _WIDEST_TURN_DEG = 3600
@@ -28,7 +28,7 @@ _SLOWEST_M_S = 0.01
 
 
 def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict[str, Keys]]:
-    """Return the users by name, and where each stands in the old file."""
+    """Return the users by name, and the keys of each one's settings in the old file."""
     keys: Keys = ("users", "names")
     names = reader.get(keys, whole=True)
     if isinstance(names, str):
@@ -43,13 +43,13 @@ def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict
     for old_name in old_names:
         if reader.get(("users", old_name)) is None:
             raise reader.wrong(
-                keys, f"{old_name!r} has no section users.{old_name}: add or unname it"
+                keys, f"{old_name!r} has no section users.{old_name}: add it, or remove the name"
             )
-        where = body_keys(reader, ("users", old_name))
+        section = body_keys(reader, ("users", old_name))
         name = free_name(old_name, users)
         if name != old_name:
             reader.remark(("users", old_name), f"called {name}: names are letters, digits, _ and -")
-        users[name], paths[name] = _body(reader, where, step), where
+        users[name], paths[name] = _body(reader, section, step), section
     for name in reader.get(("users",)) or {}:
         if name != "names" and name not in old_names:
             reader.get(("users", name), whole=True)
@@ -60,7 +60,7 @@ def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict
 
 
 def body_keys(reader: Reader, keys: Keys) -> Keys:
-    """Return where an entity's settings are: in the section that its `type` names."""
+    """Return the keys of an entity's settings: those of the section that its `type` names."""
     kind = reader.text((*keys, "type")) or "base"
     if reader.get((*keys, kind)) is None:
         raise reader.wrong(keys, f"its type is {kind!r}, and it has no section of that name")
@@ -72,7 +72,7 @@ def body_keys(reader: Reader, keys: Keys) -> Keys:
 
 
 def _body(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
-    """Return what users and the robot have in common."""
+    """Return the keys that users and robots have in common."""
     result: dict[str, Any] = {}
     radius = reader.number((*keys, "radius"), least=0, most=_WIDEST_M)
     if radius:
@@ -96,7 +96,7 @@ def _body(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
     if reader.get((*keys, "seed")) is not None:
         reader.remark(
             (*keys, "seed"),
-            "left out: everybody has random numbers of their own, from simulation.seed",
+            "left out: each entity has its own random numbers, from simulation.seed",
         )
     return result | _walk(reader, (*keys, "pose_config", "meander_strategy"), step)
 
@@ -107,19 +107,19 @@ def _walk(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
         reader.remark(keys, "missing; it stands still")
         return {}
     step_s = Fraction(micros(step), 10**6)
-    pace = _pace(reader, (*keys, "lin_speed"), step_s)
-    if pace is None:
+    speed = _speed(reader, (*keys, "lin_speed"), step_s)
+    if speed is None:
         return {}
     return {
         "type": "meander",
-        "speed": pace,
+        "speed": speed,
         "at_walls": "stay",
-        **_sway(reader, (*keys, "ang_speed"), step_s),
+        **_turns(reader, (*keys, "ang_speed"), step_s),
     }
 
 
-def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
-    """Return how fast it walks [m/s], None for not at all; it is written in metres per step."""
+def _speed(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
+    """Return the speed [m/s], in metres per step in the old file; None: it stands still."""
     stride = reader.number(keys, least=0)
     speed = float(Fraction(repr(stride)) / step_s) if stride else 0.0
     if speed < _SLOWEST_M_S:
@@ -140,12 +140,12 @@ def _pace(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
     return speed
 
 
-def _sway(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
-    """Return how it turns; a standard deviation is written in degrees per step."""
-    sway = abs(reader.number(keys, least=-_WIDEST_TURN_DEG, most=_WIDEST_TURN_DEG) or 0.0)
-    if not sway:
+def _turns(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
+    """Return the keys of random turns, whose deviation is in degrees per step in the old file."""
+    deviation = abs(reader.number(keys, least=-_WIDEST_TURN_DEG, most=_WIDEST_TURN_DEG) or 0.0)
+    if not deviation:
         return {"turn_std_deg": 0.0}
-    limit = _TURN_LIMIT_STD * sway / float(step_s)
+    limit = _TURN_LIMIT_STD * deviation / float(step_s)
     reader.remark(
         keys,
         "degrees per step there, per square root of a second here, and the same law at this step;"
@@ -154,7 +154,7 @@ def _sway(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
     if limit > _FASTEST_TURN_DEG_S:
         limit = _FASTEST_TURN_DEG_S
         reader.remark(keys, f"turns are cut at {limit:g} deg/s, the fastest there is")
-    return {"turn_std_deg": tidy(sway / math.sqrt(step_s)), "turn_rate_deg": tidy(limit)}
+    return {"turn_std_deg": tidy(deviation / math.sqrt(step_s)), "turn_rate_deg": tidy(limit)}
 
 
 def convert_robot(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
@@ -163,50 +163,50 @@ def convert_robot(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]
 
 
 def _camera(reader: Reader, keys: Keys) -> dict[str, Any]:
-    """Return the camera; a key that is missing gets our default."""
+    """Return the camera; missing keys have the defaults of cameras here."""
     for key in ("load_fov_file", "lazy_compute"):
         if reader.get((*keys, key)) is not None:
             reader.remark(
-                (*keys, key), "not needed: what is in view is worked out exactly and at once"
+                (*keys, key), "not needed: fields of view are computed exactly, when needed"
             )
-    camera: dict[str, Any] = {"range": _reach(reader, keys)}
+    camera: dict[str, Any] = {"range": _range(reader, keys)}
     angle = reader.number((*keys, "angle"), above=0)
     if angle is None:
         reader.remark((*keys, "angle"), "missing; the camera gets the angle that cameras have here")
     else:
-        camera["angle_deg"] = min(angle, 360.0)  # it saw all round from there on
+        camera["angle_deg"] = min(angle, 360.0)  # it saw in all directions from there on
     return camera
 
 
-def _reach(reader: Reader, keys: Keys) -> list[float]:
+def _range(reader: Reader, keys: Keys) -> list[float]:
     """Return the nearest and the farthest distance of the camera [m]."""
-    saw = reader.number((*keys, "distance"), above=0)
-    if saw is None:
-        saw = Camera().range[1]
-        reader.remark((*keys, "distance"), f"missing; taken as {saw:g} m")
+    distance = reader.number((*keys, "distance"), above=0)
+    if distance is None:
+        distance = Camera().range[1]
+        reader.remark((*keys, "distance"), f"missing; {distance:g} m is used")
     limits = ("min_distance", "max_distance")
     lowest, highest = (reader.number((*keys, limit), least=0) for limit in limits)
-    near, far = lowest or 0.0, saw if highest is None else highest
+    near, far = lowest or 0.0, distance if highest is None else highest
     if near >= far:
         raise reader.wrong(
             keys,
             f"the camera would see from {near:g} m to {far:g} m; a farthest distance beyond the"
             " nearest is wanted",
         )
-    held = [(*keys, limit) for limit in limits if reader.get((*keys, limit)) is not None]
-    if held:
+    present = [(*keys, limit) for limit in limits if reader.get((*keys, limit)) is not None]
+    if present:
         reader.remark(
-            held[0],
-            f"accepted and ignored there, where it saw from 0 to distance, {saw:g} m; here they"
-            f" hold, and camera.range is [{near:g}, {far:g}]",
-            *held[1:],
+            present[0],
+            f"accepted and ignored there, where it saw from 0 to distance, {distance:g} m; here"
+            f" they hold, and camera.range is [{near:g}, {far:g}]",
+            *present[1:],
         )
     return [near, far]
 
 
-def free_name(name: str, taken: Iterable[str]) -> str:
-    """Return a name for an entity that is valid and not taken, as close to `name` as can be."""
+def free_name(name: str, used: Iterable[str]) -> str:
+    """Return a valid name for an entity that is not used, as similar to `name` as possible."""
     valid = re.sub(r"[^A-Za-z0-9_-]", "_", name)
     valid = valid if valid[0].isalpha() else f"user_{valid}"
     numbered = (f"{valid}_{number}" for number in count(2))
-    return next(free for free in chain([valid], numbered) if free not in taken)
+    return next(candidate for candidate in chain([valid], numbered) if candidate not in used)

@@ -1,4 +1,4 @@
-"""Read a configuration of another program, key by key, and keep track of what came of each."""
+"""Readers of old configurations, key by key, which collect remarks and note unknown keys."""
 
 import math
 from collections.abc import Mapping
@@ -14,17 +14,17 @@ from fleet2d.units import parse_duration
 
 _HUGE = 1e300
 _UNITS = {"weeks", "days", "hours", "minutes", "seconds", "milliseconds", "microseconds"}
-_TRUTHS = {"yes": True, "on": True, "no": False, "off": False}  # in YAML 1.1, as it is read there
+_BOOLEANS = {"yes": True, "on": True, "no": False, "off": False}  # of YAML 1.1, as it is read there
 
 
 class Reader:
-    """An old configuration: checks what is read, notes what never is, and collects remarks."""
+    """A reader of an old configuration: checks values, collects remarks, and notes unread keys."""
 
     def __init__(self, document: Document, shown_as: str) -> None:
         self.document = document
         self.shown_as = shown_as
         self._touched: set[Keys] = set()
-        self._whole: set[Keys] = set()  # read or refused with all that is in them
+        self._whole: set[Keys] = set()  # read together with all keys below them
         self._remarks: dict[str, list[str]] = {}
 
     def check_kind(self) -> None:
@@ -42,11 +42,11 @@ class Reader:
             )
 
     def remark(self, keys: Keys, text: str, *also: Keys) -> None:
-        """Note a remark about a key, and others; the same text is said once for all its keys."""
+        """Add a remark about a key, and others; all keys with the same text share one remark."""
         self._remarks.setdefault(text, []).extend(".".join(path) for path in (keys, *also))
 
     def finish(self) -> list[str]:
-        """Return all remarks, those about keys that nobody asked for last."""
+        """Return all remarks, with those about unknown keys last."""
         self._note_unknown(self.document.data, ())
         return [f"{', '.join(dict.fromkeys(k))}: {text}" for text, k in self._remarks.items()]
 
@@ -59,11 +59,11 @@ class Reader:
                 self._note_unknown(value, keys)
 
     def wrong(self, keys: Keys, message: str) -> ScenarioError:
-        """Make the error about a key."""
+        """Return the error about a key."""
         return ScenarioError(f"{self.document.place(keys)}: {'.'.join(keys)}: {message}")
 
     def get(self, keys: Keys, *, whole: bool = False) -> Any:
-        """Return a value, None if it is missing; `whole` says that its inside is read with it."""
+        """Return a value, None if it is missing; with `whole`, all keys below it count as read."""
         data: Any = self.document.data
         for depth, key in enumerate(keys):
             if data is None:
@@ -83,13 +83,13 @@ class Reader:
         value = self.get(keys)
         if value is None:
             return None
-        wanted = "a number"
-        wanted += f" above {above:g}" if above > -math.inf else ""
-        wanted += f" of {least:g} or more" if least > -math.inf else ""
-        wanted += f", {most:g} at most" if most < math.inf else ""
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not (abs(value) < _HUGE and above < value <= most and value >= least):
-            raise self.wrong(keys, f"found {shown(value)}; {wanted} is wanted")
+        expected = "a number"
+        expected += f" above {above:g}" if above > -math.inf else ""
+        expected += f" of {least:g} or more" if least > -math.inf else ""
+        expected += f", {most:g} at most" if most < math.inf else ""
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not (abs(value) < _HUGE and above < value <= most and value >= least):
+            raise self.wrong(keys, f"found {shown(value)}; {expected} is wanted")
         return float(value)
 
     def integer(self, keys: Keys, least: int, below: int = 2**63) -> int | None:
@@ -104,22 +104,22 @@ class Reader:
         return value
 
     def text(self, keys: Keys) -> str | None:
-        """Return a text, or None; an empty one is none."""
+        """Return a text; None if it is missing or empty."""
         value = self.get(keys)
         if value is not None and not isinstance(value, str):
             raise self.wrong(keys, f"found {shown(value)}; text is wanted")
         return str(value) if value else None
 
-    def truth(self, keys: Keys) -> bool | None:
+    def boolean(self, keys: Keys) -> bool | None:
         """Return true or false, or None."""
         value = self.get(keys)
-        value = _TRUTHS.get(value.lower(), value) if isinstance(value, str) else value
+        value = _BOOLEANS.get(value.lower(), value) if isinstance(value, str) else value
         if value is not None and not isinstance(value, bool):
             raise self.wrong(keys, f"found {shown(value)}; true or false is wanted")
         return value
 
     def duration(self, keys: Keys) -> timedelta | None:
-        """Return the sum of a mapping of units, or None."""
+        """Return the sum of a mapping of units to numbers as a duration, or None."""
         value = self.get(keys, whole=True)
         if value is None:
             return None
@@ -132,5 +132,5 @@ class Reader:
 
 
 def tidy(value: float) -> float:
-    """Return a computed number without the dust of its last digits."""
+    """Return a computed number rounded to 12 significant digits."""
     return float(f"{value:.12g}")

@@ -1,4 +1,4 @@
-"""What becomes of the sections `simulation` and `floorplan` of the published Fleet2D."""
+"""Conversion of the sections `simulation` and `floorplan` of the published Fleet2D."""
 
 import os
 from contextlib import suppress
@@ -35,11 +35,11 @@ def read_step(reader: Reader) -> timedelta:
 
 
 def convert_simulation(reader: Reader, step: timedelta) -> dict[str, Any]:
-    """Return the section `simulation`: when, how long, how fast, from which seed."""
+    """Return the section `simulation`: start, duration, step, seed and speedup."""
     duration_keys = (*_SIMULATION, "duration")
     duration = reader.duration(duration_keys)
     if duration is None:
-        raise reader.wrong(duration_keys, "missing; without it nobody knows how long to run")
+        raise reader.wrong(duration_keys, "missing; add the duration of the run")
     if duration < step:
         raise reader.wrong(
             duration_keys,
@@ -97,28 +97,28 @@ def _start(reader: Reader) -> datetime | None:
 
 
 def _windows(reader: Reader) -> None:
-    """Read what is about watching a run; nothing of it belongs in a scenario."""
+    """Read the keys about watching a run, which have no place in a scenario."""
     picture: Keys = (*_SIMULATION, "visualization")
     every = reader.get((*picture, "every_n_steps"))
-    if reader.truth((*picture, "visualize")):
+    if reader.boolean((*picture, "visualize")):
         reader.remark(
             (*picture, "visualize"),
             "left out: no window opens during a run; `fleet2d show RUN_DIR` draws a stored one",
             *([(*picture, "every_n_steps")] if every else []),
         )
-    if reader.truth((*_SIMULATION, "show_progress")) is False:
+    if reader.boolean((*_SIMULATION, "show_progress")) is False:
         reader.remark((*_SIMULATION, "show_progress"), "left out: `fleet2d run --quiet` shows none")
 
 
 def convert_sight(reader: Reader) -> dict[str, Any]:
-    """Return the section `sight`: the method that is called as the provider is."""
+    """Return the section `sight`: the method with the name of the provider, if there is one."""
     keys: Keys = (*_SIMULATION, "fov_provider")
     provider = reader.text(keys)
     if provider == "Flashlight":
         reader.remark(keys, "kept: sight.method is flashlight; left out, sight is exact")
         return {"method": {"type": "flashlight"}}
     if provider:
-        reader.remark(keys, "left out: lines of sight are worked out exactly here")
+        reader.remark(keys, "left out: lines of sight are computed exactly here")
     return {}
 
 
@@ -131,7 +131,7 @@ def convert_outputs(reader: Reader, step: timedelta) -> dict[str, Any]:
                 (*keys, key), "left out: `fleet2d run --out DIR` says where a run is stored"
             )
     every = reader.integer((*keys, "every_n_steps"), least=1)
-    if reader.truth((*keys, "save")) is False:
+    if reader.boolean((*keys, "save")) is False:
         reader.remark(
             (*keys, "save"), "every table is off; a run still makes a directory with its manifest"
         )
@@ -154,25 +154,26 @@ def convert_outputs(reader: Reader, step: timedelta) -> dict[str, Any]:
 
 
 def convert_floorplan(reader: Reader, old: Path, new: Path) -> tuple[dict[str, Any], Path | None]:
-    """Return the floorplan section, and the plan's file if there is one."""
+    """Return the section `floorplan`, and the plan's file if it exists."""
     kind = reader.get(("floorplan", "type"))
     if kind != "he":
         raise reader.wrong(
             ("floorplan", "type"), f"found {shown(kind)}; only he (HouseExpo) can be converted"
         )
     path_keys = (*_PLAN, "json_fpath")
-    written = reader.text(path_keys)
-    if written is None:
+    old_path = reader.text(path_keys)
+    if old_path is None:
         raise reader.wrong(path_keys, "missing; the path of a HouseExpo JSON file is wanted")
-    # Paths there count from the top of its repository, some folders above the configuration.
+    # Paths there are relative to the top of its repository, some folders above the configuration.
     folders = dict.fromkeys([old.absolute().parent, Path.cwd(), *old.absolute().parents])
-    found = next((p.resolve() for f in folders if (p := f / written).is_file()), None)
-    if found is None:
+    file = next((p.resolve() for f in folders if (p := f / old_path).is_file()), None)
+    if file is None:
         reader.remark(
             path_keys,
-            f"there is no file {written} beside {old.name}, in the folders above it or in the"
+            f"there is no file {old_path} beside {old.name}, in the folders above it or in the"
             f" current one; kept as written, it counts from the folder of {new.name}: put the plan"
-            " there, or run with floorplan.path=PLAN.json. Where everybody starts was not checked",
+            " there, or run with floorplan.path=PLAN.json. The starts of users and robot were not"
+            " checked",
         )
     ppm = reader.number((*_PLAN, "ppm"), above=0)
     cell = 0.05 if ppm is None else min(max(1 / ppm, MIN_CELL_M), MAX_CELL_M)
@@ -183,12 +184,12 @@ def convert_floorplan(reader: Reader, old: Path, new: Path) -> tuple[dict[str, A
     )
     if reader.get((*_PLAN, "border_pad")) is not None:
         reader.remark((*_PLAN, "border_pad"), "left out: the grid has a margin of its own")
-    path = _path_from(new.absolute().parent.resolve(), found) if found else written
-    return {"type": "houseexpo", "path": path, "cell": tidy(cell)}, found
+    path = _path_from(new.absolute().parent.resolve(), file) if file else old_path
+    return {"type": "houseexpo", "path": path, "cell": tidy(cell)}, file
 
 
 def _path_from(folder: Path, file: Path) -> str:
-    """Return the path of a file as seen from a folder, absolute if they share nothing."""
+    """Return the path of a file relative to a folder, or absolute if they only share the root."""
     try:
         shared = Path(os.path.commonpath([folder, file]))
     except ValueError:  # on two drives
