@@ -101,8 +101,8 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
     """What a camera saw beyond the end of a span is as if it had never looked there."""
     simulation = fleet2d.Simulation({**looks(), "sight": {"method": {"type": method}}})
     state, beyond, ended = simulation._state, 0, 0
-    while simulation.step < 1200:
-        span = Span(simulation.step, 1200)
+    while simulation.step < 600:
+        span = Span(simulation.step, 600)
         for phase in PHASES[: PHASES.index(phases.watch)]:
             phase(state, span)
         ahead, whole = (copy.deepcopy(simulation)._state for _ in range(2))

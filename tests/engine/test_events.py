@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.scenes import digests, everything, run, table
+from tests.thorough import some
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, History, Home, Metric, Plan, Present, Situation
@@ -56,7 +57,7 @@ class Watch(Behavior):
         return plan.stay(timedelta(seconds=1))
 
 
-def content(duration: str = "1 h", **sections: Any) -> dict[str, Any]:
+def content(duration: str = "30 min", **sections: Any) -> dict[str, Any]:
     found = everything(duration)
     for section, entries in sections.items():
         found[section] = {**found.get(section, {}), **entries}
@@ -132,10 +133,10 @@ def test_histories_join_without_gaps_from_update_to_update(whole: Any) -> None:
 def test_metrics_hear_of_users_and_get_the_rest_at_the_end(whole: Any) -> None:
     expected = steps_of(whole, {"activity"}, ("ana", "ben"))
     expected = sorted({*expected, *steps_of(whole, {"obeys"}, ROBOTS)})
-    assert [*expected, 3599] == whole.metrics["diary"]["steps"]
+    assert [*expected, 1799] == whole.metrics["diary"]["steps"]
 
 
-@pytest.mark.parametrize("span", [1, 7, 600])
+@pytest.mark.parametrize("span", some([1, 7, 600], 2))
 def test_events_are_the_same_for_every_max_span(whole: Any, span: int) -> None:
     other = whole_run(max_span=span)
     assert digests(whole) == digests(other)
@@ -152,7 +153,7 @@ def test_who_waits_for_events_changes_nothing_else(whole: Any) -> None:
 
 def test_a_copy_goes_on_hearing(whole: Any) -> None:
     simulation = fleet2d.Simulation(content(algorithms=ALL, metrics=METRICS, objects=SENSORS))
-    simulation.advance(1777)
+    simulation.advance(877)
     twin = copy.deepcopy(simulation)
     simulation.advance(100)
     assert digests(whole) == digests(twin.run()) == digests(simulation.run())

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import digests, fleet2d_process, run, scenario, table
+from tests.scenes import Cli, digests, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
@@ -250,20 +250,20 @@ class Broken(fleet2d.Algorithm):
 """
 
 
-def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(tmp_path: Path) -> None:
+def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(
+    fleet2d: Cli, tmp_path: Path
+) -> None:
     (tmp_path / "mine.py").write_text(USERS_OWN)
     override = "algorithms.broken.type=mine:Broken"
-    done = fleet2d_process(
-        "run", "simulation.duration=2 h", override, "--out", "out", "--quiet", cwd=tmp_path
-    )
-    assert 1 == done.returncode
-    error, where = done.stderr.strip().splitlines()
+    code, _, err = fleet2d("run", "simulation.duration=2 h", override, "--out", "out", "--quiet")
+    assert 1 == code
+    error, where = err.strip().splitlines()
     assert (
         "error: algorithms.broken failed at step 3599: IndexError: tuple index out of range"
         ' (mine.py:9, in update: return {"name": deeper(state.home.rooms).name};'
         " mine.py:5, in deeper: return rooms[99])"
     ) == error
     assert "the run until then, 2026-01-05 01:00:00, is in out" == where
-    shown = fleet2d_process("show", "out", cwd=tmp_path)
-    assert 0 == shown.returncode, shown.stderr
+    code, _, err = fleet2d("show", "out")
+    assert 0 == code, err
     assert (tmp_path / "out" / "picture.png").stat().st_size > 10_000
