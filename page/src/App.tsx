@@ -2,6 +2,7 @@
 
 import { useSignal } from "@preact/signals";
 import type { ComponentType } from "preact";
+import { useRef } from "preact/hooks";
 import { KEYS } from "./keyboard";
 import { LiveControls } from "./live/LiveControls";
 import { BeliefsPanel } from "./panels/BeliefsPanel";
@@ -196,30 +197,32 @@ function SpeedChoice() {
 }
 
 function GoTo() {
-  const wrong = useSignal(false);
+  const isWrong = useSignal(false);
+  const input = useRef<HTMLInputElement>(null);
   const run = state.run.value!;
+  const go = () => {
+    const us = run.clock.parse(input.current!.value, state.moment.value);
+    isWrong.value = us === null;
+    if (us === null) return;
+    state.goTo(us);
+    input.current!.blur();
+  };
+  // Not a form: notebooks and reports show the page in a frame that may not submit any.
   return (
-    <form
-      class="goto"
-      onSubmit={(event) => {
-        event.preventDefault();
-        const input = event.currentTarget.querySelector("input")!;
-        const us = run.clock.parse(input.value, state.moment.value);
-        wrong.value = us === null;
-        if (us === null) return;
-        state.goTo(us);
-        input.blur();
-      }}
-    >
+    <div class="goto">
       <input
         id="goto"
+        ref={input}
         aria-label="Go to a time, such as day 3 18:30"
         placeholder="day 3 18:30"
-        aria-invalid={wrong.value}
+        aria-invalid={isWrong.value}
         size={12}
+        onKeyDown={(event) => {
+          if (event.key === "Enter") go();
+        }}
       />
-      <button type="submit">Go</button>
-    </form>
+      <button onClick={go}>Go</button>
+    </div>
   );
 }
 

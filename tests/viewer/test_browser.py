@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fleet2d
-from fleet2d.viewer.export import export_html
+from fleet2d.viewer.export import embedded_run, export_html, html_of
 from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.serve import PageServer
@@ -310,6 +310,23 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     assert {"change", "put"} == {entry["do"] for entry in live.run.manifest["interventions"]}
     events = live.run.tables["events"].to_pylist()
     assert ("bath_door", "shut") in [(row["entity"], row["event"]) for row in events]
+
+
+def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> None:
+    """Jupyter, marimo and reports show the page in a frame that may run scripts, and nothing else."""
+    document = html_of([embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 9 * 3600)])
+    page = browser.new_page()
+    page.set_content('<iframe sandbox="allow-scripts" width="1000" height="800"></iframe>')
+    page.eval_on_selector("iframe", "(frame, text) => { frame.srcdoc = text; }", document)
+    frame = page.frame_locator("iframe")
+    for number, press in enumerate(("Enter", "Go"), start=4):
+        frame.locator("#goto").fill(f"day 1 0{number}:00")
+        if press == "Go":
+            frame.get_by_role("button", name="Go", exact=True).click()
+        else:
+            frame.locator("#goto").press(press)
+        frame.locator(f"table.now[data-step='{number * 3600}']").wait_for(timeout=20_000)
+    page.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -37,6 +37,13 @@ def test_run_is_a_widget(run_dir: Path) -> None:
     assert "fleet2d-runs" in widget.content
 
 
+def test_run_shows_itself_in_marimo(run_dir: Path) -> None:
+    marimo = pytest.importorskip("marimo", reason="marimo is not installed")
+    run = fleet2d.open_run(run_dir)
+    assert "<marimo-anywidget" in marimo.as_html(run.view()).text
+    assert str(run.digest)[:12] in marimo.as_html(run).text
+
+
 def test_missing_library_is_named(run_dir: Path) -> None:
     registered = views()
 
