@@ -22,7 +22,7 @@ from fleet2d.artifacts import store
 from fleet2d.artifacts.journal import JournalWriter
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.seal import verify_run
-from fleet2d.engine.checkpoint import Keeper
+from fleet2d.engine.checkpoint import CheckpointWriter
 
 
 @contextmanager
@@ -34,7 +34,7 @@ def without(*names: str) -> Iterator[None]:
             patch.object(JournalWriter, "add", nothing),
             patch.object(Ledger, "commit", nothing),
         ],
-        "checkpoints": [patch.object(Keeper, "after_span", nothing)],
+        "checkpoints": [patch.object(CheckpointWriter, "after_span", nothing)],
         "seal": [patch.object(store, "make_seal", nothing)],
     }
     with ExitStack() as stack:

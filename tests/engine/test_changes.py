@@ -315,7 +315,7 @@ def test_algorithm_that_opens_a_door_that_is_not_there_is_named(plan: str) -> No
         objects={"door": {"type": "door", "doorway": "kitchen_0"}},
         algorithms={"wrecker": {"type": f"{__name__}:Wrecker", "period": "1 min"}},
     )
-    with pytest.raises(ComponentError, match=r"algorithms\.wrecker asks.*no door 'gate'.*door"):
+    with pytest.raises(ComponentError, match=r"algorithms\.wrecker requests.*no door 'gate'.*door"):
         run(content)
 
 

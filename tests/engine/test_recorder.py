@@ -24,7 +24,7 @@ def test_tables_do_not_depend_on_when_rows_are_handed_over(
     monkeypatch: pytest.MonkeyPatch, span: int | None
 ) -> None:
     expected = digests(run(everything("30 min")))
-    monkeypatch.setattr(recorder, "GATHERED", 0)
+    monkeypatch.setattr(recorder, "MOST_ROWS", 0)
     assert expected == digests(run(everything("30 min"), max_span=span))
 
 
@@ -36,7 +36,7 @@ def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_ear
         content = everything(f"{seconds} s")
         expected = digests(run(content))
         with monkeypatch.context() as patch:
-            patch.setattr(recorder, "GATHERED", 0)
+            patch.setattr(recorder, "MOST_ROWS", 0)
             assert expected == digests(run(content, max_span=1)), seconds
 
 

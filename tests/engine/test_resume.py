@@ -430,7 +430,7 @@ def test_resume_on_the_command_line(tmp_path: Path) -> None:
     cut_off(simulation)
     done = fleet2d_process("resume", "run", cwd=tmp_path)
     assert 0 == done.returncode, done.stderr
-    assert "going on from 2026-01-06 00:00:00, step 86400" in done.stderr
+    assert "continuing from 2026-01-06 00:00:00, step 86400" in done.stderr
     expected = fleet2d.run(None, *changes, seed=4).digest
     assert expected == fleet2d.open_run(tmp_path / "run").digest
     again = fleet2d_process("resume", "run", cwd=tmp_path)

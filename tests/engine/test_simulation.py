@@ -127,7 +127,7 @@ def test_a_span_that_broke_off_is_never_complete() -> None:
     simulation = fleet2d.Simulation(content)
     with pytest.raises(ComponentError):
         simulation.advance(600)
-    with pytest.raises(InputError, match="broke off"):
+    with pytest.raises(InputError, match="run failed"):
         simulation.advance(600)
     assert "failed" == simulation.finish().status
 

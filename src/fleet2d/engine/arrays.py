@@ -1,7 +1,7 @@
-"""Arrays in the file of a state: their bytes behind a plain type, and nothing else.
+"""Arrays in files of states: a plain type and the bytes.
 
-NumPy's own way to pickle lets a file state sizes and flags that are not those of the bytes, which
-crashes the process or worse. These functions check both.
+NumPy's own pickle format trusts the sizes and flags in a file, so that a wrong file can crash the
+process or worse. These functions check them.
 """
 
 import copyreg
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import ArtifactError
 
-# Truth values, numbers, moments and texts of a fixed length.
+# Booleans, numbers, times and text of a fixed length.
 _PLAIN = frozenset("biufcmMSU")
 
 
@@ -21,12 +21,12 @@ def plain_type(text: str) -> np.dtype[Any]:
     """Return a type of plain values.
 
     Raises:
-        ArtifactError: It is another.
+        ArtifactError: It is another type.
     """
-    found = np.dtype(str(text))
-    if found.kind not in _PLAIN:
-        raise ArtifactError(f"arrays of {found} can't be kept in a file: keep plain ones")
-    return found
+    dtype = np.dtype(str(text))
+    if dtype.kind not in _PLAIN:
+        raise ArtifactError(f"arrays of {dtype} can't be stored in a file: use a plain type")
+    return dtype
 
 
 def plain_array(
@@ -40,9 +40,9 @@ def plain_array(
     """
     kind = plain_type(text)
     values = np.frombuffer(bytes(content), kind) if content else np.empty(0, kind)
-    shaped = np.array(values).reshape(tuple(shape), order="F" if order == "F" else "C")
-    shaped.setflags(write=bool(is_writable))
-    return shaped
+    array = np.array(values).reshape(tuple(shape), order="F" if order == "F" else "C")
+    array.setflags(write=bool(is_writable))
+    return array
 
 
 def object_array(shape: Sequence[int], content: Sequence[Any]) -> NDArray[Any]:
@@ -88,4 +88,4 @@ def _reducers() -> dict[type, Any]:
 
 
 REDUCERS = _reducers()
-"""How arrays, their values and their types are written, for a pickler's `dispatch_table`."""
+"""The `dispatch_table` of a pickler for arrays, their values and their types."""

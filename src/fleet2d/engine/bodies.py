@@ -1,4 +1,4 @@
-"""The bodies of a run: where each is at the present step, how it goes on, and when it decides."""
+"""The bodies of a run: their present poses, their motion from then on, and their next decisions."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -45,7 +45,7 @@ class Bodies:
     Attributes:
         step: The present step: decisions are made at it, poses beyond it may still change.
         ask_at: int64 (bodies,), the step at which each body decides next; NEVER for never.
-        users: How many of the bodies are users.
+        users: Number of users among the bodies.
     """
 
     def __init__(self, users: int, robots: int, step_us: int) -> None:
@@ -62,15 +62,15 @@ class Bodies:
         return len(self.ask_at)
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what follows from the timelines."""
+        """Leave out caches, which follow from the timelines."""
         return {**self.__dict__, "_window": None, "_block": None}
 
     def pose(self, row: int) -> Pose:
-        """Return where a body is at the present step."""
+        """Return the pose of a body at the present step."""
         return Pose(*self._timelines.pose(row, self.step))
 
     def pose_at(self, row: int, step: int) -> Pose:
-        """Return where a body is at a step that isn't forgotten."""
+        """Return the pose of a body at a step that isn't forgotten."""
         return Pose(*self._timelines.pose(row, step))
 
     def poses(self, step: int) -> tuple[I64, I64, I64, NDArray[np.uint8]]:
@@ -128,7 +128,7 @@ class Bodies:
         return rows
 
     def forget(self, before: int) -> None:
-        """Drop what is only needed for steps earlier than `before`."""
+        """Drop the poses at steps earlier than `before`."""
         self._timelines.forget(before)
 
 

@@ -1,4 +1,4 @@
-"""The cameras of a body in a run: what they carry from span to span, and what they find."""
+"""The cameras of a body in a run: their memory from span to span, and what they perceive."""
 
 from collections.abc import Iterator, Sequence, Set
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from fleet2d.algorithms.activities import ActivitySense
 from fleet2d.blame import blame
 from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.engine.disturbing import (
-    carried_over,
+    carry_over,
     dark_cameras,
     forced_of,
     injected_by,
@@ -76,18 +76,19 @@ class Cameras:
     """The cameras of one body. Robots look at users; a user who has a camera looks at robots.
 
     Attributes:
-        owner: Whose cameras.
+        owner: The body with the cameras.
         row: The owner's row among the bodies.
         index: Its index among the robots, or among the users.
-        others: Who can be seen.
+        others: The bodies that can be seen.
         names: Names of the cameras.
-        errs: Whether what is perceived can differ from the truth.
-        activity_senses: How each camera tells activities.
-        method: What tells who is in view; None: lines of sight.
-        radii: Of all bodies, which hide each other [lattice units]; None: they don't.
-        memory: All that is carried along.
-        drift: How wrong its owner is about where it is; None: it knows.
-        perceived: Where each identity was perceived last, somebody unknown last: (identities, 2).
+        errs: Whether observations can differ from the truth.
+        activity_senses: How each camera perceives activities.
+        method: The method of sight; None: lines of sight.
+        radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
+        memory: The memory from span to span.
+        drift: The error of the owner's belief about its own pose; None: it has none.
+        perceived: The last perceived place of each identity, (identities, 2); the last row is for
+            somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
         taken: The step before which it has looked.
     """
@@ -100,17 +101,17 @@ class Cameras:
         method: FieldOfView | None = None,
         radii: I64 | None = None,
     ) -> None:
-        """Switch on the cameras of one body.
+        """Set up the cameras of one body.
 
         Args:
             row: Its row among the bodies.
-            actors: Everybody, users first.
-            users: How many of them are users.
-            method: What tells who is in view; None: lines of sight.
-            radii: Of all bodies, if they hide each other [lattice units].
+            actors: All bodies, users first.
+            users: Number of users among them.
+            method: The method of sight; None: lines of sight.
+            radii: Radii of all bodies, if they hide each other [lattice units].
 
         Raises:
-            ScenarioError: A period is no multiple of the step, or somebody unknown is named.
+            ScenarioError: A period is no multiple of the step, or an unknown body is named.
         """
         self.owner, self.row = actors[row], row
         # Lines of sight are compiled into the look.
@@ -121,27 +122,27 @@ class Cameras:
         self._first = 0 if is_robot else users
         self.disturbances: list[Disturbance] = []
         self.activity_senses: list[ActivitySense] = []
-        self.may_err = False  # by what somebody outside does
+        self.may_err = False  # because of interventions
         self.others = actors[:users] if is_robot else actors[users:]
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
         self.taken = 0
-        # Where its owner was in the last steps, for looks that become known later.
+        # Places of the owner in the last steps, for looks whose detections become known later.
         self._trace = np.zeros((0, 2), np.int64)
         self._sightings: list[I64] = []  # not collected yet
         self._ahead: _Look | None = None
 
     def prepare_to_err(self) -> None:
-        """Let what they perceive be kept beside the truth: somebody outside will disturb them."""
+        """Let observations be stored beside the truth, because interventions will disturb them."""
         self.may_err = self.errs = True
 
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
-        """Let somebody outside disturb them from the step before which they have looked."""
+        """Set all disturbances from the step on before which they have looked."""
         self.disturbances = list(disturbances)
-        made, people = self._set_up(), [other.name for other in self.others]
+        memory, people = self._set_up(), [other.name for other in self.others]
         forced = forced_of(self.disturbances, self.names, people)
-        self.memory = carried_over(made, self.memory, forced)
+        self.memory = carry_over(memory, self.memory, forced)
 
     def _set_up(self) -> Memory:
         owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
@@ -153,14 +154,14 @@ class Cameras:
             ]
         except ValueError as error:
             raise ScenarioError(f"{owner.path}: {error}") from None
-        common = getattr(owner.entity, "perception", None)  # users see what is there
+        common = getattr(owner.entity, "perception", None)  # users have no errors
         perceptions = [
             present_errors(self.disturbances, name) or camera.perception or common
             for name, camera in cameras.items()
         ]
-        wrong = [not is_perfect(perception) for perception in perceptions]
+        has_errors = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
-        self.errs = self.may_err or any(wrong) or self.drift is not None
+        self.errs = self.may_err or any(has_errors) or self.drift is not None
         context = TableContext(
             [other.name for other in self.others],
             [other.entity.radius * lattice.units_per_m for other in self.others],
@@ -168,17 +169,16 @@ class Cameras:
             clock.step_us,
             owner.path,
         )
-        self.lenses = stack_lenses(lenses, wrong, context)
-        self.errors = error_tables(
-            lenses, [p if w else None for p, w in zip(perceptions, wrong, strict=True)], context
-        )
+        self.lenses = stack_lenses(lenses, has_errors, context)
+        errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
+        self.errors = error_tables(lenses, errors, context)
         self._dark = dark_cameras(self.disturbances, self.names)
         worsen(self.lenses, self.disturbances, self.names)
         self.errors.haunted[self._dark] = 0
         injected = injected_by(self.disturbances, self.names, context)
         self.errors = self.errors._replace(injected=injected)
         self._draw_streams()
-        if not self.activity_senses:  # the tables of the run go by the first ones
+        if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
         count = len(self.others)
         bursts = count + MOST_GHOSTS * self.errors.haunted + len(self.errors.injected)
@@ -196,20 +196,20 @@ class Cameras:
         return new_memory(len(lenses), count, int((looks * bursts).max()))
 
     def _draw_streams(self) -> None:
-        """Give every draw a stream of its own, by name: a user more leaves the others' alone."""
+        """Set the random stream of each draw, by names: another user doesn't change the others'."""
         owner, errors = self.owner, self.errors
         for c, camera in enumerate(self.names):
-            of = "" if len(self.names) == 1 and camera == "camera" else f"{camera}: "
+            prefix = "" if len(self.names) == 1 and camera == "camera" else f"{camera}: "
             for u, other in enumerate(self.others):
                 for draw in UserDraw if self.errs else (UserDraw.DETECT,):
-                    name = f"{of}{USER_STREAMS[draw]} {other.name}"
+                    name = f"{prefix}{USER_STREAMS[draw]} {other.name}"
                     errors.keys[c, u, draw.value] = stream_key(owner.seed, owner.path, name)
             for ghost_draw, purpose in GHOST_STREAMS.items():
-                name = f"{of}{purpose}, false positives"
+                name = f"{prefix}{purpose}, false positives"
                 errors.ghost_keys[c, ghost_draw.value] = stream_key(owner.seed, owner.path, name)
 
     def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
-        """Note which cameras perceive activities, and for what they take them."""
+        """Set how each camera perceives activities."""
         for c, (name, perception) in enumerate(zip(self.names, perceptions, strict=True)):
             keys = [
                 stream_key(self.owner.seed, self.owner.path, f"{name}: activity {other.name}")
@@ -222,36 +222,36 @@ class Cameras:
 
     @property
     def event_names(self) -> tuple[str, str]:
-        """The kinds of event when somebody is lost, and when somebody is seen."""
+        """The kinds of event when a body is lost, and when a body is seen."""
         return self.owner.entity.sight_events
 
     @property
     def stops(self) -> tuple[bool, bool]:
-        """Whether its owner's plan ends when somebody is lost, and when somebody is seen."""
+        """Whether its owner's plan ends when a body is lost, and when a body is seen."""
         interrupts, names = self.owner.plan.interrupts, self.event_names
         return names[USER_LOST] in interrupts, names[USER_SEEN] in interrupts
 
     @property
     def ends(self) -> tuple[bool, bool]:
-        """Whether a span ends when somebody is lost, and when somebody is seen."""
+        """Whether a span ends when a body is lost, and when a body is seen."""
         lost, seen = self.stops
         names = self.event_names
         return lost or names[USER_LOST] in self.awaited, seen or names[USER_SEEN] in self.awaited
 
     @property
     def waits(self) -> bool:
-        """Whether an event of its own ends the present span."""
+        """Whether an event of it may end the present span."""
         return any(self.ends)
 
     @property
     def counts(self) -> I64:
-        """How often each camera had each user in view and noticed: (cameras, users, 2)."""
+        """How often each camera had each user in view, and noticed them: (cameras, users, 2)."""
         counts: I64 = self.memory.about[..., [About.IN_VIEW.value, About.NOTICED.value]]
         return counts
 
     @property
     def in_view(self) -> dict[str, tuple[float, float]]:
-        """Whom it has in view, and where each was perceived last [m], as far as it has looked."""
+        """The last perceived place [m] of each body in view, by name, when it last looked."""
         lattice, in_view = self.owner.home.plan.lattice, {}
         for identity in np.flatnonzero(self.memory.seen).tolist():
             x, y = lattice.to_metres(self.perceived[identity]).tolist()
@@ -259,7 +259,7 @@ class Cameras:
         return in_view
 
     def name_of(self, identity: int) -> str:
-        """Return the name of an identity; that of somebody unknown is empty."""
+        """Return the name of an identity; empty for somebody unknown."""
         return self.others[identity].name if identity < len(self.others) else ""
 
     def limit(self, bodies: Bodies, end: int) -> int:
@@ -270,20 +270,20 @@ class Cameras:
         return self._ahead.end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Look in the steps from `taken` to `end` - 1; return who came into view, and who left.
+        """Look in the steps from `taken` to `end` - 1; return the events of seeing and losing.
 
-        A camera that looked further ahead before another one ended the span looks again at less.
+        Cameras that looked beyond `end`, before another watcher ended the span, look again.
         """
-        found, self._ahead = self._ahead, None
-        if found is not None and found.end != end:
-            for array, before in zip(self.memory, found.memory_before, strict=True):
-                array[:] = before
-            found = None
-        if found is None:
-            found = self._look(bodies, end, stop=False)
-        rows = (
-            found.sightings if self.drift is None else self._misplaced(found.sightings, bodies, end)
-        )
+        result, self._ahead = self._ahead, None
+        if result is not None and result.end != end:
+            for array, old in zip(self.memory, result.old_memory, strict=True):
+                array[:] = old
+            result = None
+        if result is None:
+            result = self._look(bodies, end, stop=False)
+        rows = result.sightings
+        if self.drift is not None:
+            rows = self._misplace(rows, bodies, end)
         self.taken = end
         if len(rows):
             self._sightings.append(rows)
@@ -293,11 +293,11 @@ class Cameras:
         names, entity = self.event_names, self.owner.name
         return [
             Event(step, entity, names[kind], self.name_of(identity))
-            for step, identity, kind in found.events
+            for step, identity, kind in result.events
         ]
 
     def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
-        """Yield those of its last step's events that end its owner's plan."""
+        """Yield the events of the last step that end its owner's plan."""
         stops = {name for name, stop in zip(self.event_names, self.stops, strict=True) if stop}
         lattice = self.owner.home.plan.lattice
         index = {other.name: i for i, other in enumerate(self.others)}
@@ -307,8 +307,8 @@ class Cameras:
                 x, y = lattice.to_metres(place).tolist()
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
-    def _misplaced(self, rows: I64, bodies: Bodies, end: int) -> I64:
-        """Return sightings as they are off with where their owner believes to be."""
+    def _misplace(self, rows: I64, bodies: Bodies, end: int) -> I64:
+        """Return sightings with the error of the owner's belief about its own pose."""
         drift, latest = self.drift, int(self.lenses.latency.max())
         assert drift is not None
         if not len(rows) and not latest:
@@ -325,14 +325,14 @@ class Cameras:
         return rows
 
     def collect(self) -> I64:
-        """Hand over what was perceived since this was called last, int64 (n, SIGHTING)."""
+        """Return the sightings since the last call, int64 (n, SIGHTING)."""
         blocks, self._sightings = self._sightings, []
         return np.concatenate([NOTHING, *blocks])
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
-        before = [array.copy() for array in self.memory] if stop else []
-        lost, seen = self.ends if stop else (False, False)
-        home, window, shown = self.owner.home, bodies.window(self.taken, end), None
+        old_memory = [array.copy() for array in self.memory] if stop else []
+        stop_lost, stop_seen = self.ends if stop else (False, False)
+        home, window, points = self.owner.home, bodies.window(self.taken, end), None
         if self.method is not None:
             block = bodies.block(self.taken, end)
             others = slice(self._first, self._first + len(self.others))
@@ -341,22 +341,22 @@ class Cameras:
             step_us = self.owner.clock.step_us
             with blame("sight.method", self.taken):
                 lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
-                shown = points_seen(self.method, home, lenses, poses, crowd, self.taken, step_us)
-                shown[self._dark] = 0
-        done, sightings, step, identity, kind = look(
+                points = points_seen(self.method, home, lenses, poses, crowd, self.taken, step_us)
+                points[self._dark] = 0
+        count, sightings, step, identity, kind = look(
             home.walls,
             self.lenses,
             self.errors,
-            self.rule._replace(stop_lost=lost, stop_seen=seen),
+            self.rule._replace(stop_lost=stop_lost, stop_seen=stop_seen),
             window,
             self.row,
             self._first,
             self.memory,
-            shown,
+            points,
             self.radii,
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
-        return _Look(self.taken + done, sightings, events, before)
+        return _Look(self.taken + count, sightings, events, old_memory)
 
 
 def _drift_of(owner: Actor) -> Drift | None:
@@ -368,18 +368,18 @@ def _drift_of(owner: Actor) -> Drift | None:
 
 
 class _Look(NamedTuple):
-    """What cameras found up to before step `end`, and what they carried before."""
+    """The result of a look up to step `end` - 1, and the memory before it."""
 
     end: int
     sightings: I64
     events: list[tuple[int, int, int]]
-    memory_before: list[I64]
+    old_memory: list[I64]
 
 
 def open_cameras(
     actors: Sequence[Actor], users: int, sight: SightSettings
 ) -> tuple[list[Cameras], list[Cameras]]:
-    """Return the cameras of users and those of robots, if there is anybody to be seen."""
+    """Return the cameras of users and those of robots; none without both users and robots."""
     if not 0 < users < len(actors):
         return [], []
     home, method, radii = actors[0].home, sight.method.model_copy(), None

@@ -1,8 +1,8 @@
-"""What changes in a home during a run: when, in which order, and whom it stops.
+"""Changes of the home during a run: their times and order, and the bodies that they stop.
 
-Everything that is known beforehand waits in a queue by step: the scenario's changes, doors by their
-schedule, doors that somebody will come to, doors that fall shut. The floor plan comes first in a
-step, so what is due at a step holds for everybody in it.
+Known changes wait in a queue by step: those of the scenario, doors by their schedule, doors on the
+way of a body, and doors that close by themselves. Changes are the first phase of a step, so they
+hold for all bodies in it.
 """
 
 import heapq
@@ -27,25 +27,30 @@ from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home, lattice_footprint
 from fleet2d.floorplan.home.space import grow_shape
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.units import micros
 
-# A door begins to open this long before somebody reaches its line.
+# Time from the opening of a door to the moment when a body reaches its line [us].
 OPENS_AHEAD_US = 1_000_000
-# What can't shut or stand for somebody in the way tries again after this long.
-TRIES_AGAIN_US = 1_000_000
+# Time after which a change that a body blocks is tried again [us].
+RETRY_US = 1_000_000
 DAY_US = 86_400_000_000
 
 I64 = NDArray[np.int64]
 
 
-class Due(NamedTuple):
-    """A change that waits for its step; ties are taken in the order they were put in.
+class DueChange(NamedTuple):
+    """A change that waits for its step; those of one step happen in the order of their numbers.
 
     Attributes:
-        by: Who causes it, for the events table.
-        door: Number of the door that it opens for somebody, or shuts by itself; else -1.
-        opens_for: Row and decision of who comes to the door: void once that plan is replaced.
+        step: The step.
+        number: The number of changes that were put into the queue before.
+        change: The change; None: the door opens for a body, or closes by itself.
+        by: The body or thing that causes it, for the table of events.
+        door: Number of that door; else -1.
+        opens_for: Row of the body that the door opens for, and the step of its decision: the
+            opening is void if the body has decided anew since.
+        passed_us: When the body passes the line of the door [us].
     """
 
     step: int
@@ -75,7 +80,7 @@ class Changes:
         self.doors = {name: thing for name, thing in objects.items() if isinstance(thing, Door)}
         self.names = list(self.doors)
         self._used_us = [-1] * len(self.names)
-        self._queue: list[Due] = []
+        self._queue: list[DueChange] = []
         self._count = 0
         for number, door in enumerate(self.doors.values()):
             if door.locked:
@@ -85,14 +90,14 @@ class Changes:
             self._schedule(number, door)
 
     def next_due(self) -> int | None:
-        """Return the step at which something changes next."""
+        """Return the step of the next change; None if there is none."""
         return self._queue[0].step if self._queue else None
 
     def declare(self, index: int, change: HomeChange) -> None:
-        """Take in a change of the scenario.
+        """Schedule a change of the scenario.
 
         Raises:
-            ScenarioError: It doesn't say when, or there is nothing of that name.
+            ScenarioError: It has no time, or names something unknown.
         """
         if change.at is None:
             raise ScenarioError(f"changes.{index}: there is no 'at': say when it happens")
@@ -103,10 +108,10 @@ class Changes:
         self._put(self._step_of(change.at), change, "scenario")
 
     def ask(self, change: HomeChange, step: int, by: str) -> None:
-        """Let a change happen at a step, as an algorithm or a script wants it.
+        """Schedule a change that an algorithm or a script requests.
 
         Raises:
-            ComponentError: There is nothing of that name to change.
+            ComponentError: It names something unknown.
         """
         self.check(change, by)
         if change.at is not None:
@@ -114,18 +119,18 @@ class Changes:
         self._put(step, change, by)
 
     def check(self, change: HomeChange, by: str) -> None:
-        """Refuse a change that an algorithm or a script asks for.
+        """Refuse an impossible request of an algorithm or a script.
 
         Raises:
-            ComponentError: There is nothing of that name to change.
+            ComponentError: It names something unknown.
         """
         try:
             self.check_names(change)
         except ScenarioError as error:
-            raise ComponentError(f"{by} asks for a change that can't be: {error}") from None
+            raise ComponentError(f"{by} requests an impossible change: {error}") from None
 
     def expect(self, row: int, actor: Actor) -> None:
-        """Note the doors on the way of somebody who opens doors, once a plan is made."""
+        """Schedule the opening of the doors on a body's way, after it has a new plan."""
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
             return
         for door in range(len(self.names)):
@@ -135,26 +140,26 @@ class Changes:
                 self._put(step, None, actor.name, door, plan, moment)
 
     def make(self, step: int, actors: Sequence[Actor]) -> list[Event]:
-        """Make all changes that are due at a step; ask those anew whose way they cut.
+        """Make all changes that are due at a step; bodies whose way they block decide anew.
 
         Raises:
-            ComponentError: What an algorithm or a script asks for can't be.
+            ComponentError: A request of an algorithm or a script is impossible.
         """
         events: list[Event] = []
         while self._queue and self._queue[0].step <= step:
             due = heapq.heappop(self._queue)
             if due.change is not None:
-                events += self._declared(due, due.change, step, actors)
+                events += self._make_change(due, due.change, step, actors)
             elif due.opens_for is not None:
                 events += self._open_for(due, step, actors)
             else:
-                events += self._fall_shut(due, step, actors)
+                events += self._close_unused(due, step, actors)
         return events
 
-    # What is due
+    # Changes that are due
 
-    def _declared(
-        self, due: Due, change: HomeChange, step: int, actors: Sequence[Actor]
+    def _make_change(
+        self, due: DueChange, change: HomeChange, step: int, actors: Sequence[Actor]
     ) -> list[Event]:
         verb, target = change.verb, change.target
         if verb == "room":
@@ -173,7 +178,7 @@ class Changes:
             return []
         return self._turn(door, is_open, due, step, actors)
 
-    def _open_for(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Event]:
+    def _open_for(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
         row, planned_at = due.opens_for or (0, 0)
         if actors[row].planned_at != planned_at:
             return []
@@ -187,8 +192,8 @@ class Changes:
             return []
         return self._turn(door, True, due, step, actors)
 
-    def _fall_shut(self, due: Due, step: int, actors: Sequence[Actor]) -> list[Event]:
-        """Shut a door behind the last who went through."""
+    def _close_unused(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
+        """Shut a door that nobody has used for its `closes_after`."""
         after = self.doors[self.names[due.door]].closes_after
         if after is None or due.door in self.home.shut:
             return []
@@ -197,11 +202,11 @@ class Changes:
         return self._turn(due.door, False, due, step, actors)
 
     def _turn(
-        self, door: int, is_open: bool, due: Due, step: int, actors: Sequence[Actor]
+        self, door: int, is_open: bool, due: DueChange, step: int, actors: Sequence[Actor]
     ) -> list[Event]:
         shape = self._door_shape(door)
-        if not is_open and self._in_the_way(shape, actors):
-            self._try_again(due, step)
+        if not is_open and self._is_blocked(shape, actors):
+            self._retry(due, step)
             return []
         self.home.set_door(door, is_open=is_open)
         self._stop(step, actors, None if is_open else shape)
@@ -215,29 +220,29 @@ class Changes:
         ]
 
     def _move(
-        self, due: Due, change: HomeChange, step: int, actors: Sequence[Actor]
+        self, due: DueChange, change: HomeChange, step: int, actors: Sequence[Actor]
     ) -> list[Event]:
         plan = self.home.plan
-        thing = next(o for o in self.home.objects if o.name == change.target)
+        old = next(item for item in self.home.objects if item.name == change.target)
         assert change.to is not None
-        there = move_object(thing, plan.lattice, change.to, change.turn_deg)
-        shape = _corners(lattice_footprint(plan, there))
-        solid = there.blocks != "nothing"
-        if solid and self._in_the_way(shape, actors):
-            self._try_again(due, step)
+        new = move_object(old, plan.lattice, change.to, change.turn_deg)
+        shape = _corners(lattice_footprint(plan, new))
+        is_solid = new.blocks != "nothing"
+        if is_solid and self._is_blocked(shape, actors):
+            self._retry(due, step)
             return []
-        self.home.put(there)
-        self._stop(step, actors, shape if solid else None)
+        self.home.put(new)
+        self._stop(step, actors, shape if is_solid else None)
         x, y = change.to
-        return [Event(step, HOME, EventKind.MOVED, f"{thing.name} to ({x:g}, {y:g})")]
+        return [Event(step, HOME, EventKind.MOVED, f"{old.name} to ({x:g}, {y:g})")]
 
-    # Who is in the way
+    # Bodies in the way
 
     def _door_shape(self, door: int) -> NDArray[np.float64]:
         return np.array(self.home.door_line(door), np.float64)
 
-    def _in_the_way(self, shape: NDArray[np.float64], actors: Sequence[Actor]) -> bool:
-        """Tell whether somebody stands where a shape [lattice] is to be."""
+    def _is_blocked(self, shape: NDArray[np.float64], actors: Sequence[Actor]) -> bool:
+        """Whether a body stands where a shape [lattice units] is to be."""
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
             if not actor.state.away:
@@ -247,7 +252,7 @@ class Changes:
         return False
 
     def _stop(self, step: int, actors: Sequence[Actor], shape: NDArray[np.float64] | None) -> None:
-        """Ask everybody anew whose way is cut, and who walks at random by walls that changed."""
+        """Let bodies decide anew whose way is blocked, or that walk at random along the walls."""
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
             if not isinstance(actor.motion, Track):
@@ -259,7 +264,7 @@ class Changes:
                     actor.ask(step)
 
     def _passes(self, actor: Actor, shape: NDArray[np.float64]) -> bool:
-        """Tell whether a body opens the door that a shape is."""
+        """Whether a shape is a door that the body opens."""
         if not actor.entity.opens_doors or len(shape) > 2:
             return False
         door = next(d for d in range(len(self.names)) if np.array_equal(self._door_shape(d), shape))
@@ -276,16 +281,16 @@ class Changes:
         opens_for: tuple[int, int] | None = None,
         passed_us: int = 0,
     ) -> None:
-        due = Due(step, self._count, change, by, door, opens_for, passed_us)
+        due = DueChange(step, self._count, change, by, door, opens_for, passed_us)
         heapq.heappush(self._queue, due)
         self._count += 1
 
-    def _try_again(self, due: Due, step: int) -> None:
-        wait = max(1, self.clock.step_at_or_after(TRIES_AGAIN_US))
+    def _retry(self, due: DueChange, step: int) -> None:
+        wait = max(1, self.clock.step_at_or_after(RETRY_US))
         self._put(step + wait, due.change, due.by, due.door, due.opens_for, due.passed_us)
 
     def _schedule(self, number: int, door: Door) -> None:
-        """Put in what a door's schedule says, for all days of the run."""
+        """Put the schedule of a door into the queue, for all days of the run."""
         midnight = datetime.combine(self.clock.start.date(), datetime.min.time())
         end = self.clock.time(self.clock.steps)
         while midnight < end:
@@ -294,39 +299,37 @@ class Changes:
             midnight += timedelta(days=1)
 
     def _turn_daily(
-        self, name: str, is_open: bool | None, locked: bool | None, when: datetime
+        self, name: str, is_open: bool | None, is_locked: bool | None, moment: datetime
     ) -> None:
-        if when < self.clock.start:
+        if moment < self.clock.start:
             return
-        step = self._step_of(when)
+        step = self._step_of(moment)
         if is_open is not None:
             change = HomeChange(open=name) if is_open else HomeChange(shut=name)
             self._put(step, change, "schedule")
-        if locked is not None:
-            change = HomeChange(lock=name) if locked else HomeChange(unlock=name)
+        if is_locked is not None:
+            change = HomeChange(lock=name) if is_locked else HomeChange(unlock=name)
             self._put(step, change, "schedule")
 
-    def _step_of(self, at: datetime | timedelta) -> int:
-        elapsed = micros(at) if isinstance(at, timedelta) else self.clock.elapsed(at)
+    def _step_of(self, time: datetime | timedelta) -> int:
+        elapsed = micros(time) if isinstance(time, timedelta) else self.clock.elapsed(time)
         return max(0, self.clock.step_at_or_after(elapsed))
 
     def check_names(self, change: HomeChange) -> None:
-        """Refuse what names nothing that is there.
+        """Refuse a change of something unknown.
 
         Raises:
-            ScenarioError: Says what there is.
+            ScenarioError: There is no such thing; the message lists all names.
         """
+        noun, names = "door", self.names
         if change.verb == "room":
-            kind, known = "room", [room.name for room in self.home.rooms]
+            noun, names = "room", [room.name for room in self.home.rooms]
         elif change.verb == "move":
-            kind, known = "object in the floor plan", [thing.name for thing in self.home.objects]
-        else:
-            kind, known = "door", self.names
-        if change.target not in known:
-            hint = how_to_hang_a_door(self.home.plan, change.target) if kind == "door" else ""
+            noun, names = "object in the floor plan", [item.name for item in self.home.objects]
+        if change.target not in names:
+            hint = how_to_hang_a_door(self.home.plan, change.target) if noun == "door" else ""
             raise ScenarioError(
-                f"there is no {kind} {change.target!r}{did_you_mean(change.target, known)}"
-                f" There are: {', '.join(known) or 'none'}{hint}"
+                f"there is no {noun} {change.target!r}{suggest(change.target, names)}{hint}"
             )
         if change.verb == "move":
             self._check_move(change)
@@ -335,28 +338,25 @@ class Changes:
 
     def _check_type(self, word: str) -> None:
         """Refuse a room type that is neither in the vocabulary nor that of any room."""
-        known = [*PRIORITY, *(room.type for room in self.home.rooms)]
-        if usual_type(word) not in known:
-            raise ScenarioError(
-                f"there is no room type {word!r}{did_you_mean(word, known)}"
-                f" There are: {', '.join(dict.fromkeys(known))}"
-            )
+        types = dict.fromkeys([*PRIORITY, *(room.type for room in self.home.rooms)])
+        if usual_type(word) not in types:
+            raise ScenarioError(f"there is no room type {word!r}{suggest(word, types)}")
 
     def _check_move(self, change: HomeChange) -> None:
         plan = self.home.plan
-        thing = next(o for o in self.home.objects if o.name == change.target)
+        old = next(item for item in self.home.objects if item.name == change.target)
         assert change.to is not None
         try:
-            there = move_object(thing, plan.lattice, change.to, change.turn_deg)
+            new = move_object(old, plan.lattice, change.to, change.turn_deg)
         except (PlacementError, OverflowError) as error:
             raise ScenarioError(str(error)) from None
         inside = shapely.intersection(
-            shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, there)
+            shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, new)
         )
         if inside.area == 0:
             x, y = change.to
             raise ScenarioError(
-                f"({x:g}, {y:g}) m is not in the home: {thing.name} can't stand there"
+                f"({x:g}, {y:g}) m is not in the home: {old.name} can't stand there"
             )
 
 

@@ -1,4 +1,4 @@
-"""Keeping a run while it goes on: commits of its rows, and checkpoints of its state."""
+"""Commits of the rows of a run, and checkpoints of its state, while it is running."""
 
 import io
 import time
@@ -19,28 +19,28 @@ from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.units import micros
 
 DAY_US = 86_400_000_000
-# Rows are committed at least this often [s of wall time], and every simulated day.
+# Longest wall time between commits of rows [s]; they are also committed every simulated day.
 COMMIT_S = 2.0
-# `auto`: a checkpoint is written after so much computing [s], or so much time [s] where a run is
-# held at a pace, and so rarely that it takes a fortieth of the computing.
+# `auto`: a checkpoint is written after this much computing [s], or this much wall time [s] in a run
+# that is slowed down; and so rarely that checkpoints take at most 1/40 of the computing.
 COMPUTING_S = 10.0
 WAITING_S = 60.0
 SHARE = 40
 
 
 class UnusableCheckpointError(ArtifactError):
-    """A checkpoint can't be gone on from: the run begins anew."""
+    """A checkpoint can't be used: the run starts again from its first step."""
 
 
 @dataclass
 class Checkpoint:
-    """A checkpoint as it was read from its file, but for the state.
+    """A checkpoint that was read from its file, without the state.
 
     Attributes:
-        commit: The rows that belong to it.
-        manifest: As it was then.
-        wall_s: Time spent until then on setup, simulate, save [s].
-        body: The state.
+        commit: The commit of the rows before it.
+        manifest: The manifest at that time.
+        wall_s: Wall time until then of setup, simulate, save [s].
+        body: The file, at the begin of the state.
     """
 
     commit: Commit
@@ -59,15 +59,16 @@ class Checkpoint:
             raise UnusableCheckpointError("there is no checkpoint yet")
         try:
             header, body = open_snapshot(path)
-            commit, then = Commit(**header["commit"]), Manifest.of_content(path, header["manifest"])
+            commit = Commit(**header["commit"])
+            stored = Manifest.of_content(path, header["manifest"])
             setup_s, simulate_s, save_s = map(float, header["wall_s"])
         except ArtifactError as error:
             raise UnusableCheckpointError(str(error)) from error
         except (KeyError, TypeError, ValueError, RunDirectoryError) as error:
             raise UnusableCheckpointError(f"{path} is no checkpoint of a run") from error
-        if (then.scenario, then.seed) != (manifest.scenario, manifest.seed):
+        if (stored.scenario, stored.seed) != (manifest.scenario, manifest.seed):
             raise UnusableCheckpointError(f"{path} is of another scenario or seed")
-        return cls(commit, then, (setup_s, simulate_s, save_s), body)
+        return cls(commit, stored, (setup_s, simulate_s, save_s), body)
 
     def read(self, constants: Constants) -> State:
         """Return the state.
@@ -81,11 +82,11 @@ class Checkpoint:
             raise UnusableCheckpointError(str(error)) from error
 
 
-class Keeper:
-    """Commits the rows of a run in a directory, and keeps its state to go on from.
+class CheckpointWriter:
+    """Commits the rows of a run in a directory, and writes checkpoints of its state.
 
     Attributes:
-        is_able: Whether the state can be written; False once a component's own could not.
+        is_able: Whether the state can be written; False after that of a component could not.
     """
 
     def __init__(
@@ -95,14 +96,13 @@ class Keeper:
         clock: Clock,
         describe: Callable[[], tuple[Constants, Mapping[str, Any]]],
     ) -> None:
-        """Prepare to keep a run.
+        """Prepare the commits and checkpoints of a run.
 
         Args:
-            store: Its tables.
-            settings: How often a checkpoint is wanted.
-            clock: Of the run.
-            describe: Returns what never changes in the run, by name, and what to write before its
-                state.
+            store: The tables of the run.
+            settings: How often checkpoints are written.
+            clock: The clock of the run.
+            describe: Returns the constants of the run by name, and the header of a checkpoint.
         """
         self._store, self._describe = store, describe
         self._day = max(1, DAY_US // clock.step_us)
@@ -112,7 +112,7 @@ class Keeper:
         self.resume(0)
 
     def resume(self, step: int) -> None:
-        """Count from a step on."""
+        """Count the time to the next commit and checkpoint from a step on."""
         now = time.monotonic()
         self._next_day = (step // self._day + 1) * self._day
         self._next_commit = now + COMMIT_S
@@ -121,7 +121,7 @@ class Keeper:
         self._check_at = min(self._next_day, self._next_step) if self._every else self._next_day
 
     def after_span(self, state: State) -> None:
-        """Commit, and write a checkpoint, if it is time.
+        """Write a commit or a checkpoint if one is due.
 
         Raises:
             ArtifactError: The disk is full or failed; the run is marked as failed.
@@ -129,26 +129,26 @@ class Keeper:
         step = state.bodies.step
         if step < self._check_at and time.monotonic() < self._next_commit:
             return
-        wanted = step >= self._next_step
+        is_due = step >= self._next_step
         if not self._every:
-            computing, waiting = self._next_checkpoint
-            wanted = time.process_time() >= computing or time.monotonic() >= waiting
-        if wanted and self.is_able:
+            computing_s, waiting_s = self._next_checkpoint
+            is_due = time.process_time() >= computing_s or time.monotonic() >= waiting_s
+        if is_due and self.is_able:
             self.checkpoint(state)
         else:
             self.commit(state)
 
     def commit(self, state: State, *, sync: bool = False) -> Mapping[str, Any] | None:
-        """Let everything before the present step survive the end of this process.
+        """Write all rows before the present step to the journal.
 
         Returns:
-            What was committed; None for a run in memory.
+            The commit as a mapping; None for a run in memory.
         """
         step = state.bodies.step
         state.settle(step)
         state.recorder.drain()
         began = time.perf_counter()
-        self._keep_interventions(state)
+        self._store_interventions(state)
         commit = self._store.commit(step, sync=sync)
         state.recorder.wall_s += time.perf_counter() - began
         self._next_commit = time.monotonic() + COMMIT_S
@@ -158,7 +158,7 @@ class Keeper:
         return None if commit is None else commit._asdict()
 
     def checkpoint(self, state: State) -> None:
-        """Write the state of the run, and the rows until then, so that it can be gone on with."""
+        """Write the state of the run and its rows, so that it can be resumed."""
         computed = time.process_time()
         if self._every:
             self._next_step = (state.bodies.step // self._every + 1) * self._every
@@ -183,8 +183,8 @@ class Keeper:
             time.monotonic() + WAITING_S,
         )
 
-    def _keep_interventions(self, state: State) -> None:
-        """Let the manifest name what was done to the run so far."""
+    def _store_interventions(self, state: State) -> None:
+        """Update the interventions in the manifest."""
         manifest = self._store.manifest
         records = state.interventions.records
         if len(records) != len(manifest.interventions):

@@ -1,9 +1,9 @@
-"""Clearance: which robots are about to drive at people, step by step.
+"""Clearance: the robots that are about to drive at people, step by step.
 
-It follows from the poses alone. A robot that gives way is in somebody's way at a step if its next
-move would bring it within its distance of where somebody is, and nearer than it is; one that goes
-round people, if that would bring the bodies together. It is asked anew at that step, before it
-moves, so it makes no difference where spans end.
+It follows from the poses alone. A robot that gives way is in a person's way at a step if its next
+move would bring it nearer to the person, and within its distance; for a robot that goes round
+people, if the bodies would touch. It decides at that step, before it moves, so the result doesn't
+depend on spans.
 """
 
 from collections.abc import Iterable, Sequence
@@ -46,49 +46,49 @@ class Clearance:
         return bool(self.robots)
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step at which a robot is to be asked anew: not the first of the span."""
+        """Return the step at which a robot has to decide: not the first of the span."""
         first = self.taken
         block = bodies.block(first, end + 1)  # a move leads to the step after
         people = slice(0, len(self._users))
         xs, ys, away = block.x[people], block.y[people], block.away[people]
         for row, robot in self.robots.items():
-            met = self._first(robot, poses_of(block, row), xs, ys, away, first, begin=1)
-            if met is not None:
-                end = min(end, first + met[0])
+            meeting = self._first(robot, poses_of(block, row), xs, ys, away, first, begin=1)
+            if meeting is not None:
+                end = min(end, first + meeting[0])
             end = min(end, self._next_look(robot, xs, ys, away, first, end))
         return end
 
     def _next_look(
         self, robot: DecidingActor, xs: I64, ys: I64, away: NDArray[np.uint8], first: int, end: int
     ) -> int:
-        """Return the step at which a robot that waits looks whether its way is clear."""
+        """Return the step at which a waiting robot checks whether its way is clear."""
         waiting = robot.waiting
         if waiting is None:
             return end
-        x, y, out = waiting.crowd.everybody.T[:, :, None]
-        moved = ((xs != x) | (ys != y) | (away != out)).any(axis=0)
-        moved |= waiting.crowd.arrangement != robot.arrangement
-        column = int(moved.argmax())
-        return waiting.look_from(max(first + column, first + 1)) if moved[column] else end
+        x, y, was_away = waiting.crowd.everybody.T[:, :, None]
+        has_changed = ((xs != x) | (ys != y) | (away != was_away)).any(axis=0)
+        has_changed |= waiting.crowd.arrangement != robot.arrangement
+        column = int(has_changed.argmax())
+        return waiting.look_from(max(first + column, first + 1)) if has_changed[column] else end
 
     def looks(self, row: int, step: int) -> bool:
-        """Tell whether a robot that waits looks again at a step, for somebody has moved."""
+        """Whether a waiting robot checks its way at a step, because a person has moved."""
         waiting = self.robots[row].waiting if row in self.robots else None
         if waiting is None or waiting.look_from(step) != step:
             return False
         return not waiting.crowd.is_as(self.crowd(self.robots[row]))
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Go on to a step."""
+        """Advance to a step."""
         self.taken = end
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: it is asked at every decision."""
+        """Return nothing: it is checked at every decision."""
         return ()
 
     def in_way(self, bodies: Bodies, row: int) -> DecidingActor | None:
-        """Return the person at whom a robot would drive next, with everybody where they are."""
+        """Return the person at whom a robot would drive next, if people stay where they are."""
         robot = self.robots.get(row)
         if robot is None:
             return None
@@ -97,13 +97,13 @@ class Clearance:
         poses = Poses(*(np.array(column) for column in columns))
         if poses.x[0] == poses.x[1] and poses.y[0] == poses.y[1]:
             return None
-        where = np.array([user.state for user in self._users], np.int64)
-        twice = np.repeat(where[:, None, :], 2, axis=1)
-        met = self._first(robot, poses, twice[..., 0], twice[..., 1], twice[..., 3], step, begin=0)
-        return None if met is None else self._users[met[1]]
+        states = np.array([user.state for user in self._users], np.int64)
+        x, y, _, away = np.repeat(states[:, :, None], 2, axis=2).swapaxes(0, 1)
+        meeting = self._first(robot, poses, x, y, away, step, begin=0)
+        return None if meeting is None else self._users[meeting[1]]
 
     def crowd(self, robot: DecidingActor) -> Crowd:
-        """Return where people are at present."""
+        """Return the present places of people."""
         units = robot.home.plan.lattice.units_per_m
         rows = [
             (u.state.x, u.state.y, int((u.entity.radius + robot.entity.radius) * units))
@@ -124,38 +124,38 @@ class Clearance:
         first: int,
         begin: int,
     ) -> tuple[int, int] | None:
-        """Return the first column, from `begin` to the last but one, and at whom it drives."""
+        """Return the first column, from `begin` to the last but one, and the user it drives at."""
         assert isinstance(robot.entity, Robot)
         assert robot.entity.gives_way is not None
         x, y = poses.x, poses.y
         moves = np.flatnonzero((x[1:] != x[:-1]) | (y[1:] != y[:-1]))
         moves = moves[moves >= begin]
-        if not len(moves):  # mostly it stands
+        if not len(moves):  # the usual case: it stands
             return None
         units = robot.home.plan.lattice.units_per_m
-        best: tuple[int, int] | None = None
-        here_x, here_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
+        first_meeting: tuple[int, int] | None = None
+        now_x, now_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
         gap = np.where(
             first + moves < robot.passes_until, TOUCHING, robot.entity.gives_way.distance
         )
         for number, user in enumerate(self._users):
-            keeps = user.entity.radius + robot.entity.radius + gap
+            clearance = user.entity.radius + robot.entity.radius + gap
             user_x, user_y = xs[number, moves], ys[number, moves]
-            now = (here_x - user_x) ** 2 + (here_y - user_y) ** 2
-            ahead = (next_x - user_x) ** 2 + (next_y - user_y) ** 2
-            close = (ahead <= (keeps * units) ** 2) & (ahead < now)
-            close &= (away[number, moves] == 0) & (poses.away[moves] == 0)
-            for move in np.flatnonzero(close).tolist():
+            distance = (now_x - user_x) ** 2 + (now_y - user_y) ** 2
+            next_distance = (next_x - user_x) ** 2 + (next_y - user_y) ** 2
+            is_close = (next_distance <= (clearance * units) ** 2) & (next_distance < distance)
+            is_close &= (away[number, moves] == 0) & (poses.away[moves] == 0)
+            for move in np.flatnonzero(is_close).tolist():
                 column = int(moves[move])
-                if best is not None and column >= best[0]:
+                if first_meeting is not None and column >= first_meeting[0]:
                     break
-                there = int(user_x[move]), int(user_y[move])
-                if _sees(robot, int(here_x[move]), int(here_y[move]), there):
-                    best = column, number
+                user_place = int(user_x[move]), int(user_y[move])
+                if _sees(robot, int(now_x[move]), int(now_y[move]), user_place):
+                    first_meeting = column, number
                     break
-        return best
+        return first_meeting
 
 
-def _sees(robot: DecidingActor, x: int, y: int, there: tuple[int, int]) -> bool:
+def _sees(robot: DecidingActor, x: int, y: int, place: tuple[int, int]) -> bool:
     walls = robot.home.walls
-    return bool(line_of_sight(walls, x, y, locate(walls, x, y), *there))
+    return bool(line_of_sight(walls, x, y, locate(walls, x, y), *place))

@@ -1,4 +1,4 @@
-"""What is expected of a run: measured while it goes on, and judged at any time and at its end."""
+"""Expectations of a run: measured during the run, judged at any time and at its end."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from fleet2d.algorithms.log import SensorRow
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
-from fleet2d.engine.gauges import Block, Gauge, NotedGauge
+from fleet2d.engine.gauges import Block, Gauge, ValueGauge
 from fleet2d.engine.measuring import BatteryGauge, gauge_of
 from fleet2d.engine.state import State
 from fleet2d.engine.tables import STEP, TIME
@@ -31,68 +31,68 @@ TABLE = "violations"
 
 
 @dataclass(frozen=True)
-class Entry:
-    """Something that is expected from a step on."""
+class ActiveExpectation:
+    """An expectation and the step from which it holds."""
 
     expectation: Expectation
     since: int
 
 
 class Expecting:
-    """What is expected of a run, by name.
+    """The expectations of a run, and the gauges that measure their signals.
 
     Attributes:
-        entries: What is expected.
+        entries: The expectations by name.
     """
 
     def __init__(self, clock: Clock) -> None:
-        self.entries: dict[str, Entry] = {}
+        self.entries: dict[str, ActiveExpectation] = {}
         self._clock = clock
         self._gauges: dict[str, Gauge] = {}
         self._batteries: dict[str, BatteryGauge] = {}
-        self._noted: dict[tuple[str, str], list[NotedGauge]] = {}
+        self._value_gauges: dict[tuple[str, str], list[ValueGauge]] = {}
         self._events: list[Event] = []
-        self._taken = 0
+        self._end = 0
 
     def add(self, name: str, expectation: Expectation, since: int, state: State) -> None:
-        """Expect something from a step on; what it needs is measured from the present step on."""
-        self._taken = state.settled
+        """Add an expectation from a step on; its signals are measured from the present step on."""
+        self._end = state.settled
         for signal in expectation.measures():
             if str(signal) not in self._gauges:
                 self._measure(signal, state)
-        self.entries[name] = Entry(expectation, since)
+        self.entries[name] = ActiveExpectation(expectation, since)
 
     def _measure(self, signal: Measurement, state: State) -> None:
         gauge = gauge_of(signal, state, self._clock.step_us)
         self._gauges[str(signal)] = gauge
         if isinstance(gauge, BatteryGauge):
             self._batteries[signal.robot] = gauge  # type: ignore[attr-defined]
-        if isinstance(gauge, NotedGauge):
+        if isinstance(gauge, ValueGauge):
             kind, path = type(signal).__name__, signal.path  # type: ignore[attr-defined]
-            self._noted.setdefault((kind, path.split(".")[0]), []).append(gauge)
+            self._value_gauges.setdefault((kind, path.split(".")[0]), []).append(gauge)
 
     # Measuring
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Gather events until the block that they are in is taken."""
+        """Collect events until `take` measures their steps."""
         self._events += events
 
     def begin_plan(self, actor: Actor) -> None:
-        """Take in that a body follows a new plan."""
+        """Measure the battery of a body along its new plan."""
         if actor.name in self._batteries:
             self._batteries[actor.name].begin_plan(actor)
 
     def learned(self, step: int, state: State) -> None:
-        """Take in what algorithms have put out, and what metrics have come to, before a step."""
+        """Measure the outputs of algorithms and the results of metrics before a step."""
         learners = state.learners
-        for (kind, name), gauges in self._noted.items():
+        for (kind, name), gauges in self._value_gauges.items():
             for gauge in gauges:
                 if kind == "OutputSignal" and name in learners.fresh:
                     gauge.note(step, learners.fresh[name])
                 elif kind == "MetricSignal":
                     self._note_metric(gauge, name, step, state)
 
-    def _note_metric(self, gauge: NotedGauge, name: str, step: int, state: State) -> None:
+    def _note_metric(self, gauge: ValueGauge, name: str, step: int, state: State) -> None:
         for learner in state.learners.all:
             metric = learner.component
             if learner.name == name and isinstance(metric, Metric) and learner.since == step:
@@ -114,47 +114,47 @@ class Expecting:
         block = Block(first, end, state.bodies, state.home, observations, readings, events, names)
         for gauge in self._gauges.values():
             gauge.take(block)
-        self._taken = end
+        self._end = end
 
     # Judging
 
     def verdicts(self, *, ended: bool) -> dict[str, Verdict]:
-        """Return the verdicts on what is known so far, by name.
+        """Return the present verdicts, by name.
 
         Args:
-            ended: Whether the run is over, so that nothing comes after.
+            ended: Whether the run is over.
         """
-        known = ((name, self.verdict(name, ended=ended)) for name in self.entries)
-        return {name: verdict for name, verdict in known if verdict is not None}
+        verdicts = ((name, self.verdict(name, ended=ended)) for name in self.entries)
+        return {name: verdict for name, verdict in verdicts if verdict is not None}
 
     def verdict(self, name: str, *, ended: bool) -> Verdict | None:
-        """Return the verdict on one expectation; None if its first step is yet to come."""
+        """Return the verdict on one expectation; None before its first step."""
         entry = self.entries[name]
-        if self._taken <= entry.since:
+        if self._end <= entry.since:
             return None
         keys = [str(signal) for signal in entry.expectation.measures()]
-        known = RunSignals(
-            {key: self._gauges[key].trace(self._taken) for key in keys},
+        signals = RunSignals(
+            {key: self._gauges[key].trace(self._end) for key in keys},
             {key: self._gauges[key].words for key in keys},
             entry.since,
-            self._taken,
+            self._end,
             ended,
             self._clock,
         )
-        return verdict_of(name, entry.expectation, known)
+        return verdict_of(name, entry.expectation, signals)
 
     def finish(self, results: Mapping[str, Any], store: RunStore, *, ended: bool) -> dict[str, Any]:
-        """Store when what is violated; return what became of it all, for the manifest.
+        """Store the table of violations; return the content of all verdicts for the manifest.
 
         Args:
-            results: Of the metrics, over the whole run.
-            store: Takes the table of violations.
+            results: The results of the metrics over the whole run.
+            store: The store for the table of violations.
             ended: Whether the run is complete.
         """
-        for (kind, name), gauges in self._noted.items():
+        for (kind, name), gauges in self._value_gauges.items():
             if kind == "MetricSignal" and name in results:
                 for gauge in gauges:
-                    gauge.note(self._taken - 1, results[name])
+                    gauge.note(self._end - 1, results[name])
         verdicts = self.verdicts(ended=ended)
         store_violations(store, verdicts, self._clock)
         return {name: verdict.content() for name, verdict in verdicts.items()}
@@ -162,7 +162,7 @@ class Expecting:
 
 def store_violations(store: RunStore, verdicts: Mapping[str, Verdict], clock: Clock) -> None:
     """Store a row for each violation, in order of its first step."""
-    names = tuple(sorted(verdicts))  # a manifest keeps no order of names
+    names = tuple(sorted(verdicts))  # the keys of a manifest are sorted, too
     store.add_table(
         TableSpec(
             TABLE,
@@ -174,7 +174,7 @@ def store_violations(store: RunStore, verdicts: Mapping[str, Verdict], clock: Cl
                 Column("worst_step", "int64", description="the first at which it is worst"),
                 Column("robustness", "float64", nullable=True, description="missing: infinite"),
             ),
-            "when which expectation was violated",
+            "the violations of expectations",
         )
     )
     rows = sorted(
@@ -203,11 +203,11 @@ def expect(
     expectation: Expectation,
     since: int,
 ) -> None:
-    """Expect something of a run from a step on.
+    """Add an expectation to a run, from a step on.
 
     Raises:
-        ScenarioError: It names what isn't there, or what can never happen, or lasts too long.
-        InputError: It doesn't say when, or its name is taken.
+        ScenarioError: It names something unknown or an impossible event, or lasts too long.
+        InputError: It has no time, or there is another one of that name.
     """
     check_judged(expectation)
     expectation.check(
@@ -232,7 +232,7 @@ def scene_of(state: State, scenario: Scenario, remaining: timedelta) -> Scene:
         users=[actor.name for actor in state.actors[:users]],
         robots=[actor.name for actor in state.actors[users:]],
         rooms=[name for room in state.home.rooms for name in (room.name, room.type)],
-        things=[thing.name for thing in state.home.plan.objects],
+        things=[item.name for item in state.home.plan.objects],
         doors=state.changes.names,
         sensors=state.sensors.names,
         algorithms=list(scenario.algorithms),

@@ -1,7 +1,7 @@
-"""Look for garbage rarely while a run is under way.
+"""Rare garbage collection while a run is simulated.
 
-What a run makes either lives on or is freed at once, for next to nothing of it is in a cycle. To
-search it after every 700 new objects, as Python does, takes up to a quarter of the time of a run
+Hardly any objects of a run are in reference cycles, so they are freed without garbage collection.
+To collect after every 700 new objects, as Python does, takes up to a quarter of the time of a run
 with many people.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from threading import Lock
 
-# New objects between two searches.
+# New objects between two collections.
 OBJECTS = 100_000
 
 _lock = Lock()
@@ -20,7 +20,7 @@ _usual = gc.get_threshold()
 
 @contextmanager
 def rare_collections() -> Iterator[None]:
-    """Let Python look for garbage rarely; as before once no run in this process needs it so.
+    """Let Python collect garbage rarely until no run in this process is within the context.
 
     Example:
         >>> with rare_collections():
@@ -32,7 +32,7 @@ def rare_collections() -> Iterator[None]:
         _runs += 1
         if _runs == 1:
             _usual = gc.get_threshold()
-            if 0 < _usual[0] < OBJECTS:  # 0: the user wants none
+            if 0 < _usual[0] < OBJECTS:  # 0: the user has disabled it
                 gc.set_threshold(OBJECTS, *_usual[1:])
     try:
         yield
@@ -44,9 +44,9 @@ def rare_collections() -> Iterator[None]:
 
 
 def free_bodies(actors: Iterable[object]) -> None:
-    """Free the bodies of a run that is over, and with them all of it but its results.
+    """Free the bodies of a finished run, and with them all of its state.
 
-    A body and its plan refer to each other, and would stay until Python looks for garbage.
+    A body and its plan refer to each other, and would remain until the next garbage collection.
     """
     for actor in actors:
         vars(actor).clear()

@@ -1,4 +1,4 @@
-"""Gauges: what measures the signals of expectations during a run, stretch by stretch."""
+"""Gauges: they measure the signals of expectations during a run, block by block."""
 
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
@@ -23,14 +23,16 @@ I64 = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Block:
-    """What is known of the steps from `first` to `end` - 1, in which the home doesn't change.
+    """The steps from `first` to `end` - 1, in which the home doesn't change.
 
     Attributes:
-        bodies: How everybody moves.
+        first: The first step.
+        end: The step after the last one.
+        bodies: The bodies and their poses.
         home: The home in these steps.
-        observations: What robots perceived, int64 (n, OBSERVATION).
-        readings: What sensors said.
-        events: What happened, in order of step.
+        observations: The observations of robots, int64 (n, OBSERVATION).
+        readings: The readings of sensors.
+        events: The events, in order of step.
         sensors: Names of the sensors, in the order of their numbers.
     """
 
@@ -48,11 +50,11 @@ class Gauge:
     """Measures a signal, block by block.
 
     Attributes:
-        words: What each value stands for, of a signal of words.
+        words: The words that each value stands for, if the signal consists of words.
     """
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Start without a measured step."""
         self.words: dict[int, Set[str]] = {}
         self._parts: list[Trace] = []
 
@@ -61,17 +63,17 @@ class Gauge:
         self._parts.append(self._measure(block))
 
     def trace(self, end: int) -> Trace:
-        """Return what was measured before a step, which all blocks have reached."""
-        whole = joined(self._parts)
-        self._parts = [whole]
-        return whole
+        """Return the measured signal before a step, which all blocks have reached."""
+        trace = joined(self._parts)
+        self._parts = [trace]
+        return trace
 
     def _measure(self, block: Block) -> Trace:
         raise NotImplementedError
 
 
 class BodyGauge(Gauge):
-    """Measures a body by the runs of its pose, and goes on from where it was."""
+    """Base of gauges that measure the poses of a body."""
 
     def __init__(self, row: int) -> None:
         super().__init__()
@@ -82,7 +84,7 @@ class BodyGauge(Gauge):
 
 
 class DistanceGauge(BodyGauge):
-    """Measures how far a body is from another, or from a shape [m]."""
+    """Measures the distance of a body from another, or from a shape [m]."""
 
     def __init__(self, row: int, other: int | None, shape: Callable[[Home], I64] | None) -> None:
         super().__init__(row)
@@ -99,23 +101,23 @@ class DistanceGauge(BodyGauge):
 
 
 class SpeedGauge(BodyGauge):
-    """Measures how fast a body goes [m/s]: the way from the step before."""
+    """Measures the speed of a body [m/s]: its distance from its place at the step before."""
 
-    def __init__(self, row: int, before: Sequence[int], step_us: int) -> None:
+    def __init__(self, row: int, last_pose: Sequence[int], step_us: int) -> None:
         super().__init__(row)
-        self._before = np.array(before, np.int64)
-        self._steps_a_second = 1e6 / step_us
+        self._last_pose = np.array(last_pose, np.int64)
+        self._steps_per_s = 1e6 / step_us
 
     def _measure(self, block: Block) -> Trace:
-        start, way = speeds(self._window(block), self._row, self._before)
+        start, distance = speeds(self._window(block), self._row, self._last_pose)
         pose = block.bodies.pose_at(self._row, block.end - 1)
-        self._before = np.array([pose.x, pose.y, pose.away], np.int64)
-        metres = way / block.home.plan.lattice.units_per_m
-        return Trace(start, metres * self._steps_a_second, block.end)
+        self._last_pose = np.array([pose.x, pose.y, pose.away], np.int64)
+        metres = distance / block.home.plan.lattice.units_per_m
+        return Trace(start, metres * self._steps_per_s, block.end)
 
 
 class RoomGauge(BodyGauge):
-    """Tells the room of a body; -1 where there is none, or away."""
+    """Measures the room of a body by its index; -1 if it is in none or away."""
 
     def __init__(self, row: int, home: Home) -> None:
         super().__init__(row)
@@ -128,7 +130,7 @@ class RoomGauge(BodyGauge):
 
 
 class AwayGauge(BodyGauge):
-    """Tells whether a body is away."""
+    """Measures whether a body is away."""
 
     def _measure(self, block: Block) -> Trace:
         runs = block.bodies.runs(self._row, block.first, block.end)
@@ -136,7 +138,7 @@ class AwayGauge(BodyGauge):
 
 
 class DoorGauge(Gauge):
-    """Tells whether a door is open."""
+    """Measures whether a door is open."""
 
     def __init__(self, number: int) -> None:
         super().__init__()
@@ -148,7 +150,7 @@ class DoorGauge(Gauge):
 
 
 class SwitchGauge(Gauge):
-    """Follows what changes at single steps: an activity, whether somebody is seen, a sensor."""
+    """Base of gauges of values that change by events, such as an activity or a sensor."""
 
     def __init__(self, now: float) -> None:
         super().__init__()
@@ -166,31 +168,31 @@ class SwitchGauge(Gauge):
         return shortest(np.array(start, np.int64), np.array(value), block.end)
 
     def _changes(self, block: Block) -> list[tuple[int, float]]:
-        """Return what it is from which step on, in order."""
+        """Return the steps of changes and the values from then on, in order."""
         raise NotImplementedError
 
 
 class SeenGauge(SwitchGauge):
-    """Follows whether a camera's owner counts somebody as seen."""
+    """Measures whether a body counts as seen by the owner of a camera."""
 
     def __init__(self, signal: states.CameraCondition, now: bool) -> None:
         super().__init__(float(now))
         self._body, self._by = signal.body, signal.by
 
     def _changes(self, block: Block) -> list[tuple[int, float]]:
-        seen = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
-        lost = (EventKind.USER_LOST, EventKind.ROBOT_LOST)
+        begins = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
+        ends = (EventKind.USER_LOST, EventKind.ROBOT_LOST)
         return [
-            (event.step, float(event.event in seen))
+            (event.step, float(event.event in begins))
             for event in block.events
             if event.entity == self._by
             and event.detail == self._body
-            and event.event in seen + lost
+            and event.event in begins + ends
         ]
 
 
 class ActivityGauge(SwitchGauge):
-    """Follows what a user does."""
+    """Measures the activity of a user, as a number for each activity."""
 
     NOTHING = -1.0
 
@@ -201,11 +203,11 @@ class ActivityGauge(SwitchGauge):
             self._now = self._code(now)
 
     def _code(self, activity: str) -> float:
-        known = next((code for code, words in self.words.items() if activity in words), None)
-        if known is None:
-            known = len(self.words)
-            self.words[known] = {activity}
-        return float(known)
+        code = next((code for code, words in self.words.items() if activity in words), None)
+        if code is None:
+            code = len(self.words)
+            self.words[code] = {activity}
+        return float(code)
 
     def _changes(self, block: Block) -> list[tuple[int, float]]:
         return [
@@ -216,7 +218,7 @@ class ActivityGauge(SwitchGauge):
 
 
 class SensorGauge(SwitchGauge):
-    """Follows whether a sensor is on."""
+    """Measures whether a sensor is on."""
 
     def __init__(self, name: str, now: bool) -> None:
         super().__init__(float(now))
@@ -248,7 +250,7 @@ class EventGauge(Gauge):
 
 
 class PerceivedGauge(Gauge):
-    """Tells at which steps a robot perceives somebody."""
+    """Measures at which steps a robot perceives a user."""
 
     def __init__(self, robot: int, user: int) -> None:
         super().__init__()
@@ -260,8 +262,8 @@ class PerceivedGauge(Gauge):
         return pulses(np.unique(rows[:, STEP]), block.first, block.end)
 
 
-class NotedGauge(Gauge):
-    """Keeps a number that is handed in whenever it changes; missing before the first one."""
+class ValueGauge(Gauge):
+    """Records a number that is passed to `note` whenever it changes; missing before the first."""
 
     def __init__(self, since: int, read: Callable[[Any], float]) -> None:
         super().__init__()
@@ -269,7 +271,7 @@ class NotedGauge(Gauge):
         self._read = read
 
     def note(self, step: int, source: Any) -> None:
-        """Take in what it is from a step on."""
+        """Record the value from a step on."""
         while self._start and self._start[-1] >= step:
             self._start.pop()
             self._value.pop()
@@ -277,13 +279,13 @@ class NotedGauge(Gauge):
         self._value.append(self._read(source))
 
     def take(self, block: Block) -> None:
-        """Do nothing: it is told."""
+        """Do nothing: the values are passed to `note`."""
 
     def trace(self, end: int) -> Trace:
-        """Return what it was before a step."""
+        """Return the signal before a step."""
         start, value = np.array(self._start, np.int64), np.array(self._value)
-        known = start < end
-        return shortest(start[known], value[known], end)
+        is_before = start < end
+        return shortest(start[is_before], value[is_before], end)
 
 
 def outline(mask: NDArray[np.bool_], side: int) -> I64:
@@ -291,19 +293,19 @@ def outline(mask: NDArray[np.bool_], side: int) -> I64:
 
     Args:
         mask: bool (rows, columns), the cells.
-        side: Of a cell [lattice units].
+        side: The side of a cell [lattice units].
     """
     padded = np.pad(mask, 1)
-    level = [(x0, y, x1, y) for y, x0, x1 in _borders(padded[1:] != padded[:-1])]
-    upright = [(x, y0, x, y1) for x, y0, y1 in _borders((padded[:, 1:] != padded[:, :-1]).T)]
-    edges = np.array(level + upright, np.int64).reshape(-1, 4)
+    horizontal = [(x0, y, x1, y) for y, x0, x1 in _borders(padded[1:] != padded[:-1])]
+    vertical = [(x, y0, x, y1) for x, y0, y1 in _borders((padded[:, 1:] != padded[:, :-1]).T)]
+    edges = np.array(horizontal + vertical, np.int64).reshape(-1, 4)
     return edges * side
 
 
 def _borders(differ: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
-    """Return the unbroken stretches of each row: row, first column, one past the last column."""
+    """Return the runs of true values of each row: row, first column, one past the last column."""
     padded = np.pad(differ, ((0, 0), (1, 1)))
     row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
-    # One column of padding is off again, as the cells themselves were padded.
+    # Columns are shifted by 1, as the cells themselves were padded.
     pairs = zip(row[::2].tolist(), column[::2].tolist(), column[1::2].tolist(), strict=True)
     return [(r, a - 1, b - 1) for r, a, b in pairs]

@@ -1,4 +1,4 @@
-"""The files that a run depends on, besides Fleet2D itself."""
+"""The input files of a run."""
 
 import inspect
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ from fleet2d.scenario.model import Scenario
 
 
 def input_files(scenario: Scenario) -> list[Path]:
-    """Return the files that components read, and the modules of the user's own, sorted.
+    """Return the files that components read, and the modules of the user's own ones, sorted.
 
-    A component says by `files` what it reads; the paths among its fields are noted anyway.
+    The files of a component are those of its method `files`, and all paths among its fields.
     """
     files: set[Path] = set()
     for component in components_of(scenario):
-        reads = getattr(component, "files", None)
-        files |= set(reads()) if reads else set()
+        files_of = getattr(component, "files", None)
+        files |= set(files_of()) if files_of else set()
         files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}
         if not type(component).__module__.startswith("fleet2d."):
             source = inspect.getsourcefile(type(component))
@@ -28,12 +28,12 @@ def input_files(scenario: Scenario) -> list[Path]:
 
 
 def changed_inputs(manifest: Manifest) -> list[str]:
-    """Return the files that a run read and that hold something else now.
+    """Return the files that a run read and whose content has changed since.
 
     Raises:
-        RunDirectoryError: One is gone, or is no file.
+        RunDirectoryError: One is missing, or is no file.
     """
-    changed = []
+    changed_paths = []
     for record in manifest.inputs:
         path = Path(record.path)
         try:
@@ -42,24 +42,24 @@ def changed_inputs(manifest: Manifest) -> list[str]:
                     f"the run read {path}, which is no file now: put the file back"
                 )
             if input_record(path).sha256 != record.sha256:
-                changed.append(record.path)
+                changed_paths.append(record.path)
         except (OSError, ValueError) as error:
             raise RunDirectoryError(
                 f"the run read {path}, which is gone or can't be read: put it back"
             ) from error
-    return changed
+    return changed_paths
 
 
 def components_of(scenario: Scenario) -> Iterator[Component]:
-    """Yield all components of a scenario, and those within others."""
-    outer: list[Component] = [scenario.floorplan, scenario.sight.method]
+    """Yield all components of a scenario, also those within others."""
+    queue: list[Component] = [scenario.floorplan, scenario.sight.method]
     for entity in (*scenario.users.values(), *scenario.robots.values()):
-        outer += entity.behaviors
-    outer += scenario.objects.values()
-    outer += scenario.algorithms.values()
-    outer += scenario.metrics.values()
-    outer += [entry.act for entry in scenario.script]
-    while outer:  # components may have others within: an algorithm its model
-        component = outer.pop()
+        queue += entity.behaviors
+    queue += scenario.objects.values()
+    queue += scenario.algorithms.values()
+    queue += scenario.metrics.values()
+    queue += [entry.act for entry in scenario.script]
+    while queue:  # components may contain others, such as an algorithm its model
+        component = queue.pop()
         yield component
-        outer += [value for _, value in component if isinstance(value, Component)]
+        queue += [value for _, value in component if isinstance(value, Component)]

@@ -1,8 +1,8 @@
-"""Interventions in a run: when each is done, and what the manifest keeps of it.
+"""Interventions in a run: when each is applied, and its record in the manifest.
 
-What was done from outside is kept with its step, so that a run is done again from its manifest.
-What the scenario's script did is kept with its place there, for readers: the scenario itself does
-it again.
+Interventions from outside are recorded with their steps, so that a run can be repeated from its
+manifest. Those of the scenario's script are recorded for readers, with their place in the script:
+when the run is repeated, the scenario applies them again.
 """
 
 from bisect import insort
@@ -21,19 +21,19 @@ from fleet2d.interventions.intervention import (
 from fleet2d.interventions.when import Trigger
 from fleet2d.units import micros
 
-# The order of what is due at one step.
+# The order at one step: first the ends of interventions, then those of the script and from outside.
 ENDS, SCRIPT, OUTSIDE = range(3)
 
 
 class Due(NamedTuple):
-    """Something that is to be done at a step.
+    """An intervention that begins or ends at a step.
 
     Attributes:
         step: The step.
-        rank: First what is over ends, then comes the scenario's script, then what is outside.
-        number: Among those of a rank: the place in the script, or the order of asking.
-        act: What is done, or ends.
-        by: Where in the scenario it stands, like "script.0"; empty for what comes from outside.
+        rank: ENDS, SCRIPT or OUTSIDE.
+        number: Its order within a rank: its place in the script, or the order of requests.
+        act: The intervention.
+        by: Its place in the scenario, like "script.0"; empty for one from outside.
     """
 
     step: int
@@ -44,12 +44,12 @@ class Due(NamedTuple):
 
     @property
     def ends(self) -> bool:
-        """Whether it is over at that step, and doesn't begin."""
+        """Whether it ends at that step, and doesn't begin."""
         return self.rank == ENDS
 
     @property
     def record(self) -> dict[str, Any]:
-        """What the manifest keeps of it.
+        """The entry of the manifest.
 
         Example:
             >>> Due(60, OUTSIDE, 0, read_intervention({"replan": "astro"})[1]).record
@@ -66,15 +66,15 @@ class Waiting:
 
     Attributes:
         trigger: The event.
-        each: Whether it is done every time that it happens.
-        delay_us: How long after it [us].
-        act: What is done.
+        repeats: Whether it is applied at every such event, not only at the first.
+        delay_us: Time from the event to the intervention [us].
+        act: The intervention.
         rank, number, by: See `Due`.
-        last: The step for which it was put into the queue last; -1: never.
+        last: The last step for which it was put into the queue; -1: none.
     """
 
     trigger: Trigger
-    each: bool
+    repeats: bool
     delay_us: int
     act: Intervention
     rank: int
@@ -84,17 +84,17 @@ class Waiting:
 
     @property
     def is_over(self) -> bool:
-        """Whether it waits no longer."""
-        return self.last >= 0 and not self.each
+        """Whether it no longer waits."""
+        return self.last >= 0 and not self.repeats
 
 
 class Interventions:
-    """What is done to a run.
+    """The interventions on a run.
 
     Attributes:
-        done: What was done, in order, as the manifest keeps it.
-        waiting: What waits for an event.
-        lasting: What was begun and isn't over, in order.
+        done: Records of those that were applied, in order, for the manifest.
+        waiting: Those that wait for an event.
+        lasting: Those with a duration that are active, in the order of their begin.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -106,12 +106,12 @@ class Interventions:
         self._count = 0
 
     def next_number(self) -> int:
-        """Return a number that is above all before."""
+        """Return a number above all earlier ones."""
         self._count += 1
         return self._count
 
     def repeat(self, records: Sequence[Mapping[str, Any]]) -> None:
-        """Let be done again what records of another run say."""
+        """Schedule the interventions in the records of another run."""
         for record in records:
             step, intervention = read_intervention(record)
             self.add(intervention, step)
@@ -124,16 +124,16 @@ class Interventions:
         number: int | None = None,
         by: str = "",
     ) -> None:
-        """Let something be done at a step, after all of its rank that was added before."""
+        """Schedule an intervention at a step, after those of its rank that were added before."""
         number = self.next_number() if number is None else number
         insort(self._queue, Due(step, rank, number, act, by), key=lambda due: due[:3])
 
     def next_due(self) -> int | None:
-        """Return the step at which something is done next."""
+        """Return the step of the next intervention; None if none is scheduled."""
         return self._queue[0].step if self._queue else None
 
     def take(self, step: int) -> Iterator[Due]:
-        """Yield what is due by a step, in order; keep what is begun, and let it end in time."""
+        """Yield what is due by a step, in order, and schedule the end of what begins."""
         while self._queue and self._queue[0].step <= step:
             due = self._queue.pop(0)
             if isinstance(due.act, Lasting):
@@ -149,27 +149,25 @@ class Interventions:
                 ends = due.step * self._clock.step_us + micros(due.act.lasts)
                 self.add(due.act, max(self._clock.step_at_or_after(ends), due.step + 1), ENDS)
 
-    def undo(self, is_meant: Callable[[Lasting], bool]) -> list[Lasting]:
-        """Take what is under way and meant out of it, and return it."""
-        meant = [act for act in self.lasting if is_meant(act)]
-        for act in meant:
+    def undo(self, applies: Callable[[Lasting], bool]) -> list[Lasting]:
+        """Remove the active interventions to which a condition applies, and return them."""
+        removed = [act for act in self.lasting if applies(act)]
+        for act in removed:
             self._forget(act)
             self._queue = [due for due in self._queue if not (due.ends and due.act is act)]
-        return meant
+        return removed
 
     def _forget(self, act: Lasting) -> None:
-        """Drop what is over: that very one, for another may be just like it."""
-        place = next((i for i, other in enumerate(self.lasting) if other is act), None)
-        if place is not None:
-            del self.lasting[place]
+        """Remove an active intervention, by identity: another may be equal to it."""
+        self.lasting = [active for active in self.lasting if active is not act]
 
     @property
     def kinds(self) -> frozenset[str]:
-        """The kinds of events that something waits for."""
+        """The kinds of events that interventions wait for."""
         return frozenset(w.trigger.event for w in self.waiting if not w.is_over)
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Put what waits for one of these events into the queue: for the step after it, or later.
+        """Schedule what waits for one of these events at the step after it, or later by its delay.
 
         Of several such events at one step, only the first counts.
         """
@@ -185,12 +183,12 @@ class Interventions:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """What was done, and what is to be done from outside at a known step."""
+        """Records of what was applied, and of what is scheduled from outside."""
         return [*self.done, *(due.record for due in self._queue if due.rank == OUTSIDE)]
 
 
 def read_intervention(content: Mapping[str, Any]) -> tuple[int, Intervention]:
-    """Return the step and the intervention that a manifest has.
+    """Return the step and the intervention of a record in a manifest.
 
     Example:
         >>> read_intervention({"do": "replan", "step": 60, "entity": "astro"})[0]
@@ -201,5 +199,5 @@ def read_intervention(content: Mapping[str, Any]) -> tuple[int, Intervention]:
 
 
 def is_from_outside(content: Mapping[str, Any]) -> bool:
-    """Tell whether an intervention of a manifest is none of the scenario's own script."""
+    """Whether a record in a manifest is not of the scenario's own script."""
     return "by" not in content

@@ -1,4 +1,4 @@
-"""Expecting something of a simulation, and asking what has become of it."""
+"""Expectations of a simulation from outside, and their verdicts."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,21 +13,21 @@ from fleet2d.expectations.verdict import Verdict
 
 
 class Judging(Steering):
-    """What is expected of a simulation, and what became of it."""
+    """The part of a simulation that adds and judges expectations."""
 
     def expect(self, expectation: Expectation | str, name: str = "") -> str:
-        """Expect something from the next step on; what became of it is in the run's manifest.
+        """Expect something from the next step on; the verdict is in the run's manifest.
 
         Args:
-            expectation: What; text is read as in a scenario.
-            name: What it is called; left out: its text.
+            expectation: The expectation, or its text as in a scenario.
+            name: Its name; empty: its text.
 
         Returns:
             The name.
 
         Raises:
-            InputError: It can't be expected of this run: it names what isn't there, or what can
-                never happen, or its time is beyond the run.
+            InputError: It names something unknown or an impossible event, or its time is beyond
+                the run.
 
         Example:
             >>> import fleet2d
@@ -40,16 +40,17 @@ class Judging(Steering):
         """
         if self._run is not None or self.done:
             raise InputError("the run is over: expect something of a new one, or judge(…) this run")
-        whole = parse_expectation(expectation) if isinstance(expectation, str) else expectation
+        if isinstance(expectation, str):
+            expectation = parse_expectation(expectation)
         self._state.settle(self.step)
-        name = name or str(whole)
-        expect(self._state, self.scenario, self.clock, name, whole, self.step)
+        name = name or str(expectation)
+        expect(self._state, self.scenario, self.clock, name, expectation, self.step)
         return name
 
     def verdicts(self) -> dict[str, Verdict]:
-        """Return what has become of all that is expected, up to now, by name.
+        """Return the present verdicts on all expectations, by name.
 
-        What nothing can change any more is `decided`; a test may end there.
+        A verdict that can't change any more is `decided`; a test may end then.
         """
         if self._state.expecting is None:
             return {}
@@ -58,26 +59,27 @@ class Judging(Steering):
         return self._state.expecting.verdicts(ended=self.done)
 
     def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
-        """Return what has become of an expectation since it was first asked for.
+        """Return the verdict on an expectation from the step on at which it was first requested.
 
         Raises:
             InputError: See `expect`; or no step has been simulated since.
         """
-        whole = parse_expectation(expectation) if isinstance(expectation, str) else expectation
-        name = name or str(whole)
-        known = self._state.expecting
-        if known is None or name not in known.entries:
-            self.expect(whole, name)
+        if isinstance(expectation, str):
+            expectation = parse_expectation(expectation)
+        name = name or str(expectation)
+        expecting = self._state.expecting
+        if expecting is None or name not in expecting.entries:
+            self.expect(expectation, name)
         verdict = self.verdicts().get(name)
         if verdict is None:
             raise InputError(
                 f"{name} is expected from now on, and no step has been simulated since: run the"
-                " simulation, and ask again"
+                " simulation, and call judge() again"
             )
         return verdict
 
     def _store_verdicts(self, results: Mapping[str, Any], status: Status) -> None:
-        """Store what has become of all that was expected."""
+        """Store the verdicts on all expectations."""
         expecting = self._state.expecting
         if expecting is not None and status != "failed":
             store = self._state.store
@@ -85,8 +87,9 @@ class Judging(Steering):
             store.manifest.expectations = expecting.finish(results, store, ended=ended)
 
     def _expect_again(self, expectations: Mapping[str, Mapping[str, Any]]) -> None:
-        """Expect what was expected of a stored run besides what its scenario says."""
+        """Add the expectations of a stored run that are not in its scenario."""
         for name, content in expectations.items():
             if name not in self.scenario.expect:
-                whole, since = parse_expectation(content["expectation"]), content["first"]
-                expect(self._state, self.scenario, self.clock, name, whole, since)
+                expectation = parse_expectation(content["expectation"])
+                first = content["first"]
+                expect(self._state, self.scenario, self.clock, name, expectation, first)

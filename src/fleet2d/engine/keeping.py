@@ -1,4 +1,4 @@
-"""What a run keeps besides its tables: the manifest, the floor plan, a way to be stopped."""
+"""The manifest and the floor plan of a run, and its end by a signal."""
 
 import json
 import os
@@ -23,20 +23,19 @@ from fleet2d.runs.run import FLOORPLAN_NAME
 from fleet2d.scenario.model import Scenario
 
 SLOW = "simulation.speedup asked for"
-"""How the note begins that a run was slower than it should be."""
+"""Beginning of the note that a run was slower than its speedup."""
 
-# Ctrl-C, and what systemd, Docker and Slurm send before they kill.
-_STOPPING = (signal.SIGINT, signal.SIGTERM)
-_HEARD = {
+# The messages of Ctrl-C, and of the signal that systemd, Docker and Slurm send before they kill.
+_MESSAGES = {
     signal.SIGINT: b"interrupted: storing what was simulated; Ctrl-C again stops at once\n",
-    signal.SIGTERM: b"told to stop: storing what was simulated\n",
+    signal.SIGTERM: b"terminated: storing what was simulated\n",
 }
 
 
 def describe_start(
     manifest: Manifest, scenario: Scenario, seed: int, clock: Clock, plan: FloorPlan
 ) -> None:
-    """Fill in what is known before the first step."""
+    """Set the fields of a manifest that are known before the first step."""
     manifest.scenario = scenario.resolved()
     manifest.scenario["simulation"]["seed"] = seed
     manifest.seed = seed
@@ -62,31 +61,31 @@ def describe_end(
     wall_s: Mapping[str, float],
     pace: Pace | None,
 ) -> None:
-    """Fill in what is known after the last step."""
+    """Set the fields of a manifest that are known after the last step."""
     manifest.steps = step
     manifest.simulated_s = step * clock.step_us / 1e6
     manifest.metrics = dict(results)
     manifest.wall_s = dict(wall_s)
-    reached = pace.reached(manifest.simulated_s) if pace else 0.0
-    if pace and reached < 0.98 * pace.speedup:
+    speedup = pace.speedup_until(manifest.simulated_s) if pace else 0.0
+    if pace and speedup < 0.98 * pace.speedup:
         manifest.notes.append(
             f"{SLOW} {pace.speedup:g} times real time;"
-            f" {reached:.0f} was reached, for computing took that long"
+            f" {speedup:.0f} was reached, because computing took longer"
         )
 
 
 def open_store(store: RunStore, home: Home) -> None:
-    """Make the run directory, and put the floor plan in it.
+    """Create the run directory, and store the floor plan in it.
 
     Raises:
-        RunDirectoryError: The directory can't be used; nothing is left behind.
-        ArtifactError: The disk is full; nothing is left behind.
+        RunDirectoryError: The directory can't be used; no new file remains.
+        ArtifactError: The disk is full; no new file remains.
     """
     store.open()
     if store.directory is None:
         return
     try:
-        keep_plan(store, home)
+        store_plan(store, home)
     except ArtifactError as error:
         store.discard()
         reason = error.__cause__
@@ -95,8 +94,8 @@ def open_store(store: RunStore, home: Home) -> None:
         ) from reason
 
 
-def keep_plan(store: RunStore, home: Home) -> None:
-    """Put the floor plan into the run directory.
+def store_plan(store: RunStore, home: Home) -> None:
+    """Store the floor plan in the run directory.
 
     Raises:
         ArtifactError: It can't be written.
@@ -107,30 +106,30 @@ def keep_plan(store: RunStore, home: Home) -> None:
 
 @contextmanager
 def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
-    """Call `stop` on the first Ctrl-C or SIGTERM, so that no row is half stored.
+    """Call `stop` on the first Ctrl-C or SIGTERM, so that no row is stored partially.
 
-    It says on stderr that it was heard; a second one acts at once.
+    A message on stderr confirms the signal; a second signal has its usual effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in _STOPPING}
+    handlers = {number: signal.getsignal(number) for number in _MESSAGES}
 
-    def put_back() -> None:
+    def restore() -> None:
         blame.interrupts = True
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
     def on_signal(number: int, _: Any) -> None:
         stop()
-        put_back()
-        with suppress(OSError):  # not by sys.stderr, which may be at work just now
-            os.write(2, _HEARD[signal.Signals(number)])
+        restore()
+        with suppress(OSError):  # not by sys.stderr, whose methods the signal may have interrupted
+            os.write(2, _MESSAGES[signal.Signals(number)])
 
-    for number in _STOPPING:
+    for number in _MESSAGES:
         signal.signal(number, on_signal)
     blame.interrupts = False
     try:
         yield
     finally:
-        put_back()
+        restore()

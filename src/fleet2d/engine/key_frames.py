@@ -1,4 +1,4 @@
-"""Key frames: the few poses from which every pose of a run can be rebuilt."""
+"""Key frames: the few poses from which all poses of a run can be rebuilt."""
 
 from collections.abc import Sequence
 
@@ -16,12 +16,12 @@ from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.runs.key_kinds import PLANNED, TRACK, WALK
 
-# A random walk is rebuilt from the last hour's key frame.
+# Time between the key frames of a random walk [us].
 WALK_KEY_US = 3_600_000_000
 
 
 class KeyFrames:
-    """Gathers the key frames of a run."""
+    """Collects the key frames of a run."""
 
     def __init__(
         self,
@@ -32,37 +32,37 @@ class KeyFrames:
         bodies: Bodies,
         changes: bool,
     ) -> None:
-        """Prepare to gather.
+        """Start without key frames.
 
         Args:
-            store: Takes the rows.
-            clock: Of the run.
-            home: Of the run.
+            store: The store for the rows.
+            clock: The clock of the run.
+            home: The home.
             actors: Users, then robots.
-            bodies: How they move.
+            bodies: Their poses.
             changes: Whether walls may change during the run.
         """
         self._store, self._clock, self._home = store, clock, home
         self._actors, self._bodies = actors, bodies
-        # A random walk is rebuilt by walking it again between walls that haven't changed since;
-        # where they may have, it is kept step by step.
+        # A random walk is rebuilt by repeating it between the same walls; where these may change,
+        # each of its steps is a key frame.
         self._walk_kind = TRACK if changes else WALK
         self._walk_every = 1 if changes else max(1, WALK_KEY_US // clock.step_us)
-        # Breakpoints of the present plan already gathered; the plan before the first has none.
+        # Collected breakpoints of the present plan; the plan before the first has none.
         self._emitted = [2] * len(actors)
-        self._complete_until = [-1] * len(actors)  # where the plan before was followed to its end
-        self._walked = [1] * len(actors)  # the step before which a random walk is gathered
+        self._complete_until = [-1] * len(actors)  # the end of the last plan, if it was reached
+        self._walked = [1] * len(actors)  # the step before which a random walk is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
         self._blocks: list[NDArray[np.int64]] = []
         self._rows = 0
 
     @property
-    def gathered(self) -> int:
-        """About how many rows wait to be stored; many small blocks take more than their rows."""
+    def count(self) -> int:
+        """Number of rows that are not stored yet, about; many small blocks take more memory."""
         return self._rows + 8 * len(self._blocks)
 
     def end_plan(self, row: int, step: int) -> None:
-        """Gather the end of the plan that is about to be replaced at `step`."""
+        """Collect the end of the plan that is replaced at `step`."""
         self.pass_by(row, step)
         self._walk_on(row, step)
         self.break_off(row, step)
@@ -75,12 +75,12 @@ class KeyFrames:
         )
 
     def begin_plan(self, row: int, step: int) -> None:
-        """Gather the beginning of the plan that was just made at `step`."""
+        """Collect the begin of the plan that was made at `step`."""
         moment = step * self._clock.step_us
-        # A plan that takes over just where the last one ended needs no key frame to begin.
+        # A plan that begins at the end of the last one needs no key frame there.
         self._walked[row] = step + 1
-        goes_on = self._complete_until[row] == moment and step > 0 and row not in self._moved
-        self._emitted[row] = int(goes_on)
+        is_joined = self._complete_until[row] == moment and step > 0 and row not in self._moved
+        self._emitted[row] = int(is_joined)
         self._moved.discard(row)
         actor = self._actors[row]
         if not isinstance(actor.motion, Track):
@@ -88,11 +88,11 @@ class KeyFrames:
         self.pass_by(row, step)
 
     def move_body(self, row: int) -> None:
-        """Begin the next plan of a body with a key frame, for it doesn't go on from the last."""
+        """Begin the next plan of a body with a key frame, as it doesn't continue the last one."""
         self._moved.add(row)
 
     def pass_by(self, row: int, step: int) -> None:
-        """Gather the breakpoints of the present plan that are reached up to a step."""
+        """Collect the breakpoints of the present plan that are reached up to a step."""
         motion = self._actors[row].motion
         if not isinstance(motion, Track):
             return
@@ -105,7 +105,7 @@ class KeyFrames:
             self._emitted[row] = end
 
     def break_off(self, row: int, step: int) -> None:
-        """Gather where the present segment would have ended."""
+        """Collect the planned end of the present segment."""
         motion = self._actors[row].motion
         if isinstance(motion, Track):
             begin = self._emitted[row]
@@ -117,13 +117,13 @@ class KeyFrames:
                 self._blocks.append(planned)
 
     def take(self, end: int) -> None:
-        """Gather what everybody reached up to step `end` - 1."""
+        """Collect the key frames of all bodies up to step `end` - 1."""
         for row in range(len(self._actors)):
             self.pass_by(row, end - 1)
             self._walk_on(row, end)
 
     def _walk_on(self, row: int, end: int) -> None:
-        """Gather the states of a random walk up to step `end` - 1."""
+        """Collect the states of a random walk up to step `end` - 1."""
         if isinstance(self._actors[row].motion, Track):
             return
         every, first = self._walk_every, self._walked[row]
@@ -134,7 +134,7 @@ class KeyFrames:
         self._walked[row] = max(first, end)
 
     def store(self) -> None:
-        """Hand everything gathered to the store."""
+        """Append all collected key frames to the store."""
         if not self._blocks:
             return
         rows = in_order(self._blocks)

@@ -1,4 +1,4 @@
-"""The layers of a run: those that it keeps itself, and when each is stored."""
+"""The layers of a run: those of what robots have seen, and when each layer is stored."""
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
 from fleet2d.units import whole_steps
 
@@ -34,23 +34,25 @@ NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 
 
 def lay_layers(home: Home, source: FloorPlanSource) -> None:
-    """Add the layers to a home that a scenario asks for, but those of what robots see."""
+    """Add the layers of a scenario to a home, except those of what robots have seen."""
     layers = dict(source.layers)
     costs = layers.pop(COSTMAP, None)
     if source.costmap is not None or costs is not None:
-        layer = home.layers.add_layer(COSTMAP, _kept(_COSTS, costs or LayerSettings(store=False)))
-        solid = [thing.footprint for thing in home.objects if thing.blocks != "nothing"]
-        layer.values = costs_of(home.plan, source.costmap or CostmapSettings(), solid)
+        layer = home.layers.add_layer(
+            COSTMAP, _with_storage(_COSTS, costs or LayerSettings(store=False))
+        )
+        footprints = [item.footprint for item in home.objects if item.blocks != "nothing"]
+        layer.values = costs_of(home.plan, source.costmap or CostmapSettings(), footprints)
     for name, settings in layers.items():
         if name not in SEEN_LAYERS:
             home.layers.add_layer(name, settings)
 
 
 class LayerBook:
-    """The layers of a run: it keeps what robots have seen, and stores all layers when they are due.
+    """The layers of a run: it records what robots have seen, and stores layers at their times.
 
     Attributes:
-        areas: What each robot with a camera has seen; empty if nobody wants to know.
+        areas: The area that each robot with a camera has seen; empty if no component needs it.
     """
 
     def __init__(
@@ -62,19 +64,19 @@ class LayerBook:
         store: RunStore,
         clock: Clock,
     ) -> None:
-        """Add the layers that the scenario asks for to the home.
+        """Add the layers of what robots have seen to the home, if they are needed.
 
         Args:
-            scenario: What is simulated.
-            home: Gets the layers.
-            actors: Everybody, in the order of their rows.
-            bodies: How they move.
-            store: Gets the tables.
+            scenario: The scenario.
+            home: The home, which the layers are added to.
+            actors: All bodies, in the order of their rows.
+            bodies: Their poses.
+            store: The store for the tables of layers.
             clock: The steps of the run.
 
         Raises:
             ScenarioError: A period is no multiple of the step.
-            ComponentError: A component needs something that there isn't.
+            ComponentError: A component has an unknown need.
         """
         self._home, self._store, self._clock = home, store, clock
         self._stored_at: dict[str, int] = {}
@@ -83,27 +85,27 @@ class LayerBook:
             **{f"algorithms.{name}": learner for name, learner in scenario.algorithms.items()},
             **{f"metrics.{name}": learner for name, learner in scenario.metrics.items()},
         }
-        needed = {need for path, learner in learners.items() for need in _needs_of(path, learner)}
+        needs = {need for path, learner in learners.items() for need in _needs_of(path, learner)}
         behaviors = [behavior for actor in actors for behavior in actor.behaviors]
-        needed |= {need for behavior in behaviors for need in behavior.needs}
-        wanted = {*needed, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
-        self._exposes = "exposure" in needed
-        self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needed else 0
-        self._taken_bins = 0
+        needs |= {need for behavior in behaviors for need in behavior.needs}
+        names = {*needs, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
+        self._exposes = "exposure" in needs
+        self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needs else 0
+        self._logged_bins = 0
         self._patches = _patches(home, "patches" if self._bin_steps else "rooms")
-        self.areas = self._open_areas(scenario, actors, bodies, wanted) if wanted else []
-        self._lay_seen(scenario, needed)
+        self.areas = self._open_areas(scenario, actors, bodies, names) if names else []
+        self._add_seen_layers(scenario, needs)
         self.next_due(0)
 
     def expose(self, step: int, log: Log) -> None:
-        """Add to the log how much of each room each robot has had in view before `step`."""
+        """Add the parts of rooms that each robot has had in view before `step` to the log."""
         if self._bin_steps:
             log.bin_steps, log.patches = self._bin_steps, self._patches
-            taken = [area.take_bins(step) for area in self.areas]
-            count = step // self._bin_steps - self._taken_bins
-            self._taken_bins += count
+            bins_of_areas = [area.take_bins(step) for area in self.areas]
+            count = step // self._bin_steps - self._logged_bins
+            self._logged_bins += count
             bins = np.zeros((count, self._robots, 2, len(self._patches.room)), np.int64)
-            for area, rows in zip(self.areas, taken, strict=True):
+            for area, rows in zip(self.areas, bins_of_areas, strict=True):
                 bins[:, area.row - self._first_robot] = rows
             log.expose_bins(bins)
         if self._exposes:
@@ -114,7 +116,7 @@ class LayerBook:
 
     def next_due(self, step: int) -> int | None:
         """Return the next step after `step` before which a layer is stored; None for none."""
-        if not self._home.layers:  # asked for at every span
+        if not self._home.layers:  # a quick answer, as every span needs it
             return None
         periods = [self._period(layer) for layer in self._home.layers.values()]
         return min((every * (step // every + 1) for every in periods if every), default=None)
@@ -127,17 +129,17 @@ class LayerBook:
                 self._put(layer, end - 1)
 
     def finish(self, end: int) -> None:
-        """Store all layers that are to be stored, as they are after the step before `end`."""
+        """Store all layers with `store`, as they are after the step before `end`."""
         for layer in self._home.layers.values():
             if layer.store and end > 0 and self._stored_at.get(layer.name) != end - 1:
                 self._put(layer, end - 1)
 
     def _open_areas(
-        self, scenario: Scenario, actors: Sequence[Actor], bodies: Bodies, wanted: Set[str]
+        self, scenario: Scenario, actors: Sequence[Actor], bodies: Bodies, names: Set[str]
     ) -> list[SeenArea]:
-        """Return what each robot with a camera has seen, before the first step."""
+        """Return the area that each robot with a camera has seen, before the first step."""
         every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
-        keeps_last = bool({"last_seen", "time_since_seen"} & wanted)
+        keeps_last = bool({"last_seen", "time_since_seen"} & names)
         return [
             SeenArea(
                 actor,
@@ -152,20 +154,20 @@ class LayerBook:
             if isinstance(actor.entity, Robot) and actor.entity.eyes
         ]
 
-    def _lay_seen(self, scenario: Scenario, needed: Set[str]) -> None:
-        """Add the layers of what robots have seen that are asked for to the home."""
+    def _add_seen_layers(self, scenario: Scenario, needs: Set[str]) -> None:
+        """Add the layers of what robots have seen to the home, if they are needed."""
         for name, cells in _SEEN.items():
-            configured = scenario.floorplan.layers.get(name)
-            if configured is None and name not in needed:
+            storage = scenario.floorplan.layers.get(name)
+            if storage is None and name not in needs:
                 continue
-            settings = _kept(cells, configured or LayerSettings(store=False))
+            settings = _with_storage(cells, storage or LayerSettings(store=False))
             for area in self.areas:
                 self._home.layers.add_layer(
                     f"{name}.{area.robot.name}", settings, _Cells(area, name)
                 )
 
     def _period(self, layer: Layer) -> int:
-        """Return how many steps lie between two times that a layer is stored; 0 for none."""
+        """Return the steps between two times at which a layer is stored; 0 for never."""
         if not layer.store:
             return 0
         name = layer.name.partition(".")[0]
@@ -187,14 +189,14 @@ class LayerBook:
 
 
 def _patches(home: Home, cut_by: Literal["patches", "rooms"]) -> Patches:
-    """Return the parts of rooms that are told apart, the same for all runs in the home."""
+    """Return the parts of rooms to distinguish, computed once for a home."""
     of = patches_of if cut_by == "patches" else whole_rooms
     return home.cached((cut_by,), lambda: of(home.plan))
 
 
 @dataclass(frozen=True)
 class _Cells:
-    """The values of a layer of what a robot has seen, worked out when they are asked for."""
+    """The values of a layer of what a robot has seen, computed when they are read."""
 
     area: SeenArea
     name: str
@@ -204,37 +206,44 @@ class _Cells:
         return values
 
 
-def _kept(cells: LayerSettings, configured: LayerSettings) -> LayerSettings:
-    """Return what the cells of a layer of the run's own hold, stored as the scenario says."""
-    return cells.model_copy(update={"store": configured.store, "every": configured.every})
+def _with_storage(cells: LayerSettings, storage: LayerSettings) -> LayerSettings:
+    """Return the settings of cells, with those of the storage of another layer."""
+    return cells.model_copy(update={"store": storage.store, "every": storage.every})
 
 
-def _seen(dtype: LayerType, fill: float, description: str, unit: str = "") -> LayerSettings:
+def _cell_settings(
+    dtype: LayerType, fill: float, description: str, unit: str = ""
+) -> LayerSettings:
     return LayerSettings.model_construct(
         dtype=dtype, fill=fill, unit=unit, description=description, store=False, every=None
     )
 
 
 _SEEN = {
-    "explored": _seen("bool", 0, "whether the robot has had the cell in view"),
-    "first_seen": _seen("int64", -1, "first step with the cell in view of the robot, -1 for none"),
-    "last_seen": _seen("int64", -1, "last step with the cell in view of the robot, -1 for none"),
-    "time_since_seen": _seen("float64", np.nan, "since the robot had the cell in view", "s"),
+    "explored": _cell_settings("bool", 0, "whether the robot has had the cell in view"),
+    "first_seen": _cell_settings(
+        "int64", -1, "first step with the cell in view of the robot, -1 for none"
+    ),
+    "last_seen": _cell_settings(
+        "int64", -1, "last step with the cell in view of the robot, -1 for none"
+    ),
+    "time_since_seen": _cell_settings(
+        "float64", np.nan, "since the robot had the cell in view", "s"
+    ),
 }
-_COSTS = _seen("int32", 0, "what a way costs besides its length, -1 where none leads", "%")
+_COSTS = _cell_settings("int32", 0, "what a way costs besides its length, -1 where none leads", "%")
 
 
 def _needs_of(path: str, learner: Component) -> Set[str]:
     """Return what an algorithm or a metric needs.
 
     Raises:
-        ComponentError: There is no such thing.
+        ComponentError: A need is unknown.
     """
     assert isinstance(learner, Algorithm | Metric)
     for need in learner.needs:
         if need not in NEEDS:
             raise ComponentError(
-                f"{path}: {type(learner).__name__} needs {need!r}{did_you_mean(need, NEEDS)} There"
-                f" are: {', '.join(NEEDS)}"
+                f"{path}: {type(learner).__name__} needs {need!r}{suggest(need, NEEDS)}"
             )
     return set(learner.needs)

@@ -1,4 +1,4 @@
-"""Algorithms and metrics in a run: their order, when they are due, and what they put out."""
+"""Algorithms and metrics in a run: their order, their updates, and their outputs."""
 
 import copy
 import math
@@ -23,7 +23,7 @@ from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.events import HOME, Event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.units import micros, whole_steps
 
 KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
@@ -34,14 +34,16 @@ class Learner:
     """An algorithm or a metric in a run.
 
     Attributes:
+        name: Its name in the scenario.
+        path: Its path in the scenario.
         component: The component with what it has learned.
-        origin: The component as the scenario has it.
+        origin: The component before the first step.
         every: Steps between two updates; 0 if events update it.
-        table: The name of the table of what it puts out.
+        table: The name of the table of its outputs.
         kinds: The kinds of that table's columns; empty before the first output.
         since: First step of its next history.
-        back: How many steps before that it may look back.
-        heard: Whether an event that it waits for has happened.
+        back: Number of steps before that which it may also read.
+        is_updated: Whether it has been updated.
     """
 
     name: str
@@ -53,18 +55,18 @@ class Learner:
     kinds: dict[str, Kind] = field(default_factory=dict)
     since: int = 0
     back: int = 0
-    heard: bool = False
+    is_updated: bool = False
 
     @property
     def oldest(self) -> int:
-        """The first step that it may still ask for."""
+        """The first step that it may still read."""
         return max(0, self.since - self.back)
 
     @property
     def due(self) -> int | None:
         """The step before which it is updated next: its history ends with the step before.
 
-        None if that isn't known beforehand, as events update it.
+        None if events update it.
         """
         return self.since + self.every if self.every else None
 
@@ -73,9 +75,9 @@ class Learners:
     """All algorithms, in the order of their dependencies, and then all metrics.
 
     Attributes:
-        outputs: The newest output of each algorithm.
-        fresh: Those of the last update.
-        replaced: What all but metrics read of an algorithm instead; WITHHELD for nothing.
+        outputs: The latest output of each algorithm, by name.
+        fresh: The outputs of the last update.
+        replaced: Outputs that all but metrics read instead, by name; WITHHELD for none.
     """
 
     def __init__(
@@ -106,7 +108,7 @@ class Learners:
 
     @property
     def readable(self) -> Mapping[str, Any]:
-        """The outputs, for others to read."""
+        """The outputs for behaviors."""
         return Outputs(self._as_read(self.outputs), self._known)
 
     @property
@@ -118,16 +120,16 @@ class Learners:
         """Return outputs as all but metrics read them."""
         if not self.replaced:
             return outputs
-        seen = {**outputs, **self.replaced}
-        return {name: output for name, output in seen.items() if not _is(output, WITHHELD)}
+        merged = {**outputs, **self.replaced}
+        return {name: output for name, output in merged.items() if not _is(output, WITHHELD)}
 
     def replace(self, name: str, output: Any) -> None:
-        """Let all but metrics read something else of an algorithm from now on.
+        """Let all but metrics read another output of an algorithm from now on.
 
         Args:
             name: The algorithm.
-            output: What they read; FROZEN: its newest output, as it is now; WITHHELD: nothing;
-                None: what it puts out, as before.
+            output: The output; FROZEN: its present one; WITHHELD: none; None: its real outputs
+                again.
         """
         self.replaced = {key: value for key, value in self.replaced.items() if key != name}
         if _is(output, FROZEN):
@@ -136,12 +138,12 @@ class Learners:
             self.replaced[name] = output
 
     def reset(self, name: str, learned: Path | None) -> None:
-        """Let an algorithm begin anew, with what a file holds.
+        """Restart an algorithm with nothing learned, or with the content of a file.
 
         Raises:
-            InputError: The file holds nothing that it can begin with.
+            InputError: The algorithm can't use the file.
         """
-        learner = next(each for each in self.all if each.path == f"algorithms.{name}")
+        learner = next(learner for learner in self.all if learner.path == f"algorithms.{name}")
         component = learner.origin.model_copy(deep=True)
         assert isinstance(component, Algorithm)
         with blame(learner.path, None):
@@ -151,47 +153,47 @@ class Learners:
         learner.component = component
 
     def next_due(self) -> int | None:
-        """Return the step before which somebody is due; None if there is nobody."""
-        return self._due  # asked for at every span
+        """Return the step before which the next update is due; None if none is."""
+        return self._due  # precomputed, as every span needs it
 
     def _earliest_due(self) -> int | None:
         dues = (learner.due for learner in self.all)
         return min((due for due in dues if due is not None), default=None)
 
     def earliest_needed(self) -> int:
-        """Return the first step that is still part of somebody's next history."""
+        """Return the first step that a next history still contains."""
         return min(learner.oldest for learner in self.all)
 
-    def update(self, end: int, log: Log, happened: Sequence[Event] = ()) -> None:
-        """Update everybody whose period ends before step `end`, or who waits for what happened."""
+    def update(self, end: int, log: Log, events: Sequence[Event] = ()) -> None:
+        """Update all whose period ends before step `end`, or that wait for one of these events."""
         fresh: dict[str, Any] = {}
         for learner in self.all:
-            if learner.due == end or self._hears(learner, happened):
-                learner.heard = True
-                component = learner.component  # metrics come last, and see all
+            if learner.due == end or self._waits_for(learner, events):
+                learner.is_updated = True
+                component = learner.component  # metrics come last, and read all
                 reads = component.reads if isinstance(component, Algorithm) else fresh
-                seen = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
+                inputs = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
                 if isinstance(component, Algorithm):
-                    seen = dict(self._as_read(seen))
-                output = self._update(learner, end, log, seen)
+                    inputs = dict(self._as_read(inputs))
+                output = self._update(learner, end, log, inputs)
                 learner.since = end
                 if isinstance(learner.component, Algorithm) and output is not None:
-                    # A copy: a component may go on with its own arrays.
+                    # A copy: a component may continue to change its arrays.
                     fresh[learner.name] = copy.deepcopy(output)
         self.fresh, self._due = fresh, self._earliest_due()
-        self.outputs = {**self.outputs, **fresh}  # a new one: who kept the old sees the old
+        self.outputs = {**self.outputs, **fresh}  # a new mapping: others may hold the old one
 
-    def _hears(self, learner: Learner, happened: Sequence[Event]) -> bool:
-        """Tell whether one of these events updates an algorithm or a metric."""
-        everybody = isinstance(learner.component, Metric)
+    def _waits_for(self, learner: Learner, events: Sequence[Event]) -> bool:
+        """Whether one of these events updates an algorithm or a metric."""
+        is_metric = isinstance(learner.component, Metric)
         return any(
             event.event in learner.component.on
-            and (everybody or event.entity == HOME or event.entity in self.robots)
-            for event in happened
+            and (is_metric or event.entity == HOME or event.entity in self.robots)
+            for event in events
         )
 
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
-        """Give metrics what is left of a period; return the results of all metrics by name."""
+        """Update metrics with the rest of their period; return the results of all by name."""
         results = {}
         for learner in self.all:
             if isinstance(learner.component, Metric):
@@ -199,19 +201,19 @@ class Learners:
                     self._update(learner, end, log, self.outputs)
                     learner.since = end
                 with blame(learner.path, end):
-                    results[learner.name] = checked_result(learner.component.result())
+                    results[learner.name] = check_result(learner.component.result())
         return results
 
-    def unheard(self) -> list[str]:
-        """Say who waited for events of which none happened."""
+    def idle_notes(self) -> list[str]:
+        """Return notes about learners that were never updated, because no event happened."""
         return [
             f"{learner.path} was never updated: no {' or '.join(learner.component.on)} happened"
             for learner in self.all
-            if learner.component.on and not learner.heard
+            if learner.component.on and not learner.is_updated
         ]
 
     def remember(self, directory: Path) -> list[str]:
-        """Write what each algorithm has learned to a file of its own; return what can't be kept."""
+        """Write what each algorithm has learned to a file of its own; return notes on failures."""
         notes = []
         for learner in self.all:
             if isinstance(learner.component, Algorithm):
@@ -233,17 +235,17 @@ class Learners:
             if isinstance(component, Algorithm) and component.learned is not None:
                 component.recall(load_learned(component.learned))
                 component.check_learned(self.users, self.clock.start)
-        # Metrics and algorithms may share a name; some file systems take A and a for one.
-        taken = {*_FIXED, *(learner.table.casefold() for learner in self.all)}
+        # Metrics and algorithms may share a name; some file systems don't distinguish A and a.
+        tables = {*_RUN_TABLES, *(learner.table.casefold() for learner in self.all)}
         table = name
-        while table.casefold() in taken:
+        while table.casefold() in tables:
             table = f"{path.partition('.')[0]}_{table}"
         back = -(micros(component.looks_back) // -self.clock.step_us)
         self.all.append(Learner(name, path, component, origin, every, table, back=back))
 
     def _update(self, learner: Learner, end: int, log: Log, outputs: Mapping[str, Any]) -> Any:
-        knows_truth = isinstance(learner.component, Metric)
-        visible = frozenset((*self.users, *self.robots) if knows_truth else self.robots)
+        is_metric = isinstance(learner.component, Metric)
+        visible = frozenset((*self.users, *self.robots) if is_metric else self.robots)
         step_s = self.clock.step_us / 1e6
         needs = frozenset(learner.component.needs)
         history = History(log, learner.since, end, step_s, visible, learner.oldest, needs)
@@ -263,42 +265,41 @@ class Learners:
             return
         kinds = {name: KINDS[values.dtype.kind] for name, values in columns.items()}
         if not len(next(iter(columns.values()))):
-            return  # nothing yet, not even the kinds of its columns
+            return  # without values even the kinds of the columns are unknown
         if not learner.kinds:
             learner.kinds = kinds
-            added = [Column(name, kind) for name, kind in kinds.items()]
-            self.store.add_table(
-                TableSpec(learner.table, (Column("step", "step"), Column("time", "time"), *added))
-            )
+            specs = [Column(name, kind) for name, kind in kinds.items()]
+            first = (Column("step", "step"), Column("time", "time"))
+            self.store.add_table(TableSpec(learner.table, (*first, *specs)))
         _check_kinds(learner, kinds)
         steps = np.full(len(next(iter(columns.values()))), step, np.int64)
         self.store.append(learner.table, step=steps, time=self.clock.times(steps), **columns)
 
 
-def checked_result(result: Any, where: str = "result()") -> Any:
-    """Return what sums up a metric: numbers and texts, in mappings and lists of any depth.
+def check_result(result: Any, where: str = "result()") -> Any:
+    """Return the result of a metric: numbers and texts, in mappings and lists of any depth.
 
     Raises:
-        ComponentError: It holds something else, or a number that isn't finite.
+        ComponentError: It contains something else, or a number that isn't finite.
     """
     if isinstance(result, Mapping):
-        return {str(k): checked_result(value, f"{where}[{k!r}]") for k, value in result.items()}
+        return {str(k): check_result(value, f"{where}[{k!r}]") for k, value in result.items()}
     if isinstance(result, list | tuple):
-        return [checked_result(value, f"{where}[{i}]") for i, value in enumerate(result)]
+        return [check_result(value, f"{where}[{i}]") for i, value in enumerate(result)]
     if isinstance(result, np.generic):
         result = result.item()
     if isinstance(result, float) and not math.isfinite(result):
-        raise ComponentError(f"{where} is {result}: leave out what can't be told")
+        raise ComponentError(f"{where} is {result}: leave out values that are undefined")
     if not isinstance(result, bool | int | float | str):
         raise ComponentError(f"{where} is {result!r}; numbers and texts are wanted")
     return result
 
 
-_FIXED = {"trajectories", "key_frames", "observations", "events", "sensors", "violations"}
+_RUN_TABLES = {"trajectories", "key_frames", "observations", "events", "sensors", "violations"}
 
 
 def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
-    """Refuse columns that don't fit the table that the first output made."""
+    """Refuse columns that don't fit the table of the first output."""
     if kinds.keys() != learner.kinds.keys():
         raise ComponentError(
             f"{learner.path} put out {', '.join(kinds)}, but {', '.join(learner.kinds)} before: the"
@@ -313,28 +314,28 @@ def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
 
 
 def _check_reads(metrics: Mapping[str, Metric], algorithms: Mapping[str, Algorithm]) -> None:
-    """Refuse metrics that measure an algorithm that there isn't."""
+    """Refuse metrics that measure an unknown algorithm."""
     for name, metric in metrics.items():
-        for read in metric.reads():
-            if read not in algorithms:
+        for algorithm in metric.reads():
+            if algorithm not in algorithms:
                 raise ScenarioError(
-                    f"metrics.{name} measures {read!r}, which is no algorithm of the scenario"
-                    f"{did_you_mean(read, algorithms)} There are: {', '.join(algorithms) or 'none'}"
+                    f"metrics.{name} measures {algorithm!r}, which is no algorithm of the scenario"
+                    f"{suggest(algorithm, algorithms)}"
                 )
 
 
 def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
-    """Return the algorithms so that each stands behind those it reads; else as in the scenario.
+    """Return the algorithms in an order in which each follows those that it reads.
 
     Raises:
-        ScenarioError: One reads something that doesn't exist, or they read each other in a circle.
+        ScenarioError: One reads an unknown algorithm, or they read each other in a circle.
     """
     for name, algorithm in algorithms.items():
-        for read in algorithm.reads:
-            if read not in algorithms:
+        for source in algorithm.reads:
+            if source not in algorithms:
                 raise ScenarioError(
-                    f"algorithms.{name}.reads names {read!r}, which is no algorithm of the"
-                    f" scenario; there are: {', '.join(algorithms)}{did_you_mean(read, algorithms)}"
+                    f"algorithms.{name}.reads names {source!r}, which is no algorithm of the"
+                    f" scenario{suggest(source, algorithms)}"
                 )
     sorter = TopologicalSorter({name: algorithm.reads for name, algorithm in algorithms.items()})
     try:
@@ -345,5 +346,5 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
 
 
 def _is(output: Any, word: str) -> bool:
-    """Tell whether an output is a word: no algorithm puts out a bare text."""
+    """Whether an output is FROZEN or WITHHELD; outputs of algorithms are never bare text."""
     return isinstance(output, str) and output == word

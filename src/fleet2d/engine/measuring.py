@@ -1,4 +1,4 @@
-"""Which gauge measures which signal, and the gauges that need more than where bodies are."""
+"""The gauge for each signal, and the gauges of batteries and of cameras."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -16,12 +16,12 @@ from fleet2d.engine.gauges import (
     DoorGauge,
     EventGauge,
     Gauge,
-    NotedGauge,
     PerceivedGauge,
     RoomGauge,
     SeenGauge,
     SensorGauge,
     SpeedGauge,
+    ValueGauge,
     outline,
 )
 from fleet2d.engine.state import State
@@ -34,19 +34,19 @@ from fleet2d.expectations.trace import Trace, shortest
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
 from fleet2d.kernels.look import Memory
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 I64 = NDArray[np.int64]
 
-# A battery is told in thousandths; rounding of sums must not make a whole one less.
+# The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000
 ROUNDING = 1e-9
-# The chance of a lens that notices everybody in view.
+# The chance of a lens that notices all bodies in view.
 CERTAIN = 2**53
 
 
 class BatteryGauge(Gauge):
-    """Tells the charge of a robot, from one plan to the next."""
+    """Measures the charge of a robot, plan by plan."""
 
     def __init__(self, actor: Actor) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class BatteryGauge(Gauge):
         self.begin_plan(actor)
 
     def begin_plan(self, actor: Actor) -> None:
-        """Take in that the robot follows a new plan."""
+        """Add the course of the charge along a new plan."""
         if actor.charge is not None and hasattr(actor, "motion"):
             course = actor.charge.course(actor.motion)
             self._courses = [c for c in self._courses if c.begins[0] < course.begins[0]]
@@ -69,13 +69,13 @@ class BatteryGauge(Gauge):
             course.levels(np.maximum(moments[a:b], course.begins[0]))
             for course, a, b in zip(self._courses, edges, edges[1:], strict=False)
         ]
-        level = np.floor(np.concatenate(pieces) * PARTS + ROUNDING) / PARTS
+        charge = np.floor(np.concatenate(pieces) * PARTS + ROUNDING) / PARTS
         self._courses = self._courses[-1:]
-        return shortest(np.arange(block.first, block.end), level, block.end)
+        return shortest(np.arange(block.first, block.end), charge, block.end)
 
 
 class PerfectCameras(Cameras):
-    """Cameras that look at every step, and notice everybody who is in view, at once."""
+    """Cameras that look at every step, and notice all bodies in view at once."""
 
     def _set_up(self) -> Memory:
         memory = super()._set_up()
@@ -91,32 +91,32 @@ class PerfectCameras(Cameras):
 
 
 class InViewGauge(Gauge):
-    """Tells whether somebody is in view of a camera, by a look of its own."""
+    """Measures whether a body is in view of a camera, by perfect cameras at the same place."""
 
     def __init__(self, state: State, cameras: Cameras, body: str) -> None:
         super().__init__()
         actors, users = state.actors, state.bodies.users
         self._cameras = PerfectCameras(cameras.row, actors, users, cameras.method, cameras.radii)
         self._cameras.taken = state.settled
-        self._body, self._seen = body, False
+        self._body, self._is_seen = body, False
 
     def _measure(self, block: Block) -> Trace:
         events = self._cameras.take(block.bodies, block.end)
         self._cameras.collect()
         _, seen = self._cameras.event_names
-        start, value = [block.first], [float(self._seen)]
+        start, value = [block.first], [float(self._is_seen)]
         for event in events:
             if event.detail == self._body:
-                self._seen = event.event == seen
+                self._is_seen = event.event == seen
                 if event.step == start[-1]:
-                    value[-1] = float(self._seen)
+                    value[-1] = float(self._is_seen)
                 else:
                     start.append(event.step)
-                    value.append(float(self._seen))
+                    value.append(float(self._is_seen))
         return shortest(np.array(start, np.int64), np.array(value), block.end)
 
 
-# Which gauge
+# The gauge for each signal
 
 
 def gauge_of(signal: Measurement, state: State, step_us: int) -> Gauge:
@@ -141,38 +141,38 @@ def _distance(signal: quantities.DistanceSignal, state: State, _: int) -> Gauge:
 
 
 class Shape:
-    """The outline of a room, an object or a point, as it is at present."""
+    """The present outline of a room, an object or a point."""
 
     def __init__(self, place: str | tuple[float, float]) -> None:
         self._place = place
-        self._known: tuple[object, I64] | None = None
+        self._outline: tuple[object, I64] | None = None
 
     def __call__(self, home: Home) -> I64:
-        """Return its edges: int64 (n, 4) [lattice units]."""
+        """Return its edges, int64 (n, 4) [lattice units]."""
         plan, place = home.plan, self._place
         if not isinstance(place, str):
             x, y = plan.lattice.to_lattice(place).tolist()
             return np.array([[x, y, x, y]], np.int64)
         rooms = [room.index for room in home.rooms if place in (room.name, room.type)]
-        thing = None if rooms else home.object(place)
-        if self._known is None or self._known[0] is not thing:
-            if thing is None:
+        item = None if rooms else home.object(place)
+        if self._outline is None or self._outline[0] is not item:
+            if item is None:
                 edges = outline(np.isin(plan.room_of_place, rooms), UNITS_PER_CELL)
             else:
-                ring = np.array(lattice_footprint(plan, thing).exterior.coords).round()
+                ring = np.array(lattice_footprint(plan, item).exterior.coords).round()
                 edges = np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
-            self._known = thing, edges
-        return self._known[1]
+            self._outline = item, edges
+        return self._outline[1]
 
 
 def _speed(signal: quantities.SpeedSignal | states.IsMoving, state: State, step_us: int) -> Gauge:
     row, step = row_of(state, signal.body), state.settled
-    before: tuple[int, ...] = ()
+    last_pose: tuple[int, ...] = ()
     if step > 0 and hasattr(state.actors[row], "motion"):
-        # Where it is now counts as where it was: the step before may be forgotten.
+        # The present pose stands for the one before, which may be forgotten.
         pose = state.bodies.pose_at(row, step)
-        before = (pose.x, pose.y, pose.away)
-    return SpeedGauge(row, before, step_us)
+        last_pose = (pose.x, pose.y, pose.away)
+    return SpeedGauge(row, last_pose, step_us)
 
 
 def _seen(signal: states.IsSeen, state: State, _: int) -> Gauge:
@@ -190,11 +190,11 @@ def _perceived(signal: states.IsPerceived, state: State, _: int) -> Gauge:
     return PerceivedGauge(cameras.index, names.index(signal.body))
 
 
-def _noted(
+def _value(
     signal: quantities.OutputSignal | quantities.MetricSignal, state: State, _: int
 ) -> Gauge:
-    reading = OutputReading if isinstance(signal, quantities.OutputSignal) else MetricReading
-    return NotedGauge(state.settled, reading(signal.path, state.home))
+    reader = OutputReader if isinstance(signal, quantities.OutputSignal) else MetricReader
+    return ValueGauge(state.settled, reader(signal.path, state.home))
 
 
 def _activity(signal: states.ActivitySignal, state: State, _: int) -> Gauge:
@@ -202,8 +202,8 @@ def _activity(signal: states.ActivitySignal, state: State, _: int) -> Gauge:
     return ActivityGauge(signal.user, now)
 
 
-class OutputReading:
-    """Reads a number out of what an algorithm put out, by its path."""
+class OutputReader:
+    """Reads a number from the output of an algorithm, by its path."""
 
     def __init__(self, path: str, home: Home) -> None:
         self._path = path
@@ -225,14 +225,13 @@ class OutputReading:
             if part in columns and part not in words:
                 number = part
                 continue
-            wanted = {part, self._names.get(part, part)}
-            match = [np.isin(column.astype(str), list(wanted)) for column in words.values()]
-            rows = np.any(match, axis=0) if match else np.zeros_like(keep)
+            names = [part, self._names.get(part, part)]
+            matches = [np.isin(column.astype(str), names) for column in words.values()]
+            rows = np.any(matches, axis=0) if matches else np.zeros_like(keep)
             if not rows.any():
                 known = [*columns, *dict.fromkeys(w for c in words.values() for w in c.tolist())]
                 raise ScenarioError(
-                    f'output("{self._path}"): there is no {part!r} in it'
-                    f"{did_you_mean(part, known)} There are: {', '.join(map(str, known))}"
+                    f'output("{self._path}"): there is no {part!r} in it{suggest(part, known)}'
                 )
             keep &= rows
         if keep.sum() != 1 or number is None:
@@ -243,8 +242,8 @@ class OutputReading:
         return float(columns[number][keep][0])
 
 
-class MetricReading:
-    """Reads a number out of a metric's result, by its path; missing while it isn't there."""
+class MetricReader:
+    """Reads a number from the result of a metric, by its path; NaN while the result is empty."""
 
     def __init__(self, path: str, home: Home) -> None:
         self._path = path
@@ -261,16 +260,15 @@ class MetricReading:
                     return float("nan")
                 known = list(result) if isinstance(result, Mapping) else []
                 raise ScenarioError(
-                    f'metric("{self._path}"): there is no {part!r} in it'
-                    f"{did_you_mean(part, known)} There are: {', '.join(known) or 'none'}"
+                    f'metric("{self._path}"): there is no {part!r} in it{suggest(part, known)}'
                 )
             result = result[part]
         if isinstance(result, bool | int | float):
             return float(result)
         if isinstance(result, Mapping) and not result:
             return float("nan")
-        more = ", ".join(result) if isinstance(result, Mapping) else repr(result)
-        raise ScenarioError(f'metric("{self._path}") is no number: go on with one of {more}')
+        keys = ", ".join(result) if isinstance(result, Mapping) else repr(result)
+        raise ScenarioError(f'metric("{self._path}") is no number: extend it by one of {keys}')
 
 
 _MAKERS: Mapping[type, Callable[[Any, State, int], Gauge]] = {
@@ -285,9 +283,9 @@ _MAKERS: Mapping[type, Callable[[Any, State, int], Gauge]] = {
     states.IsInView: lambda signal, state, _: InViewGauge(
         state, _cameras_of(state, signal.by), signal.body
     ),
-    quantities.MetricSignal: _noted,
+    quantities.MetricSignal: _value,
     states.IsMoving: _speed,
-    quantities.OutputSignal: _noted,
+    quantities.OutputSignal: _value,
     states.IsPerceived: _perceived,
     states.RoomSignal: lambda signal, state, _: RoomGauge(row_of(state, signal.body), state.home),
     states.IsSeen: _seen,

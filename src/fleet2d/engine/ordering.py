@@ -1,11 +1,11 @@
-"""The order of rows, the same however a run was cut into spans."""
+"""The order of rows, which doesn't depend on the spans of a run."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def in_order(blocks: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    """Join blocks of rows (step, entity, …) and sort them; ties stay in the order gathered.
+    """Join blocks of rows (step, entity, …) and sort them; equal rows keep their order.
 
     Example:
         >>> in_order([np.array([[1, 1, 5]]), np.array([[1, 0, 6], [0, 1, 7]])]).tolist()

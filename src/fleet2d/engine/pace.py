@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class Pace:
-    """Holds a run at `speedup` times real time, by sleeping when it is ahead.
+    """Slows a run down to `speedup` times real time, by sleeping when it is ahead.
 
     Example:
         >>> pace = Pace(speedup=1000.0)
@@ -13,9 +13,9 @@ class Pace:
         50.0
     """
 
-    # Wall time between two looks at the clock: short enough to watch, long enough to cost nothing.
+    # Wall time between two looks at the clock: short for a viewer, long enough to cost nothing [s].
     LOOK_S = 0.05
-    # A sleep goes on after Ctrl-C, so no single one is long.
+    # The longest single sleep: Ctrl-C takes effect after it [s].
     NAP_S = 0.1
 
     def __init__(self, speedup: float) -> None:
@@ -28,15 +28,15 @@ class Pace:
         return max(1, int(self.slice_s * 1e6 / step_us))
 
     def resume(self, simulated_s: float) -> None:
-        """Go on after a pause, as if no time had passed since `simulated_s`."""
+        """Continue after a pause, as if no time had passed since `simulated_s`."""
         self._began = max(self._began, time.perf_counter() - simulated_s / self.speedup)
 
     def hold(self, simulated_s: float, stop: Callable[[], bool] = lambda: False) -> None:
-        """Sleep until `simulated_s` of simulated time are due, or until `stop` says so."""
+        """Sleep until `simulated_s` of simulated time are due, or until `stop` returns True."""
         due = self._began + simulated_s / self.speedup
         while (ahead := due - time.perf_counter()) > 0 and not stop():
             time.sleep(min(ahead, self.NAP_S))
 
-    def reached(self, simulated_s: float) -> float:
-        """Return the factor reached over the whole run so far."""
+    def speedup_until(self, simulated_s: float) -> float:
+        """Return the real speedup of the run so far."""
         return simulated_s / max(1e-9, time.perf_counter() - self._began)

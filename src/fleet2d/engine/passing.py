@@ -1,4 +1,4 @@
-"""When and where the ways of bodies lead through a door."""
+"""The routes of bodies through doors."""
 
 import numpy as np
 from shapely import LineString
@@ -10,19 +10,19 @@ from fleet2d.kernels.motion import Breakpoints
 
 
 def crossings(track: Breakpoints, line: Segment) -> list[int]:
-    """Return the moments [us] at which a track goes through a segment, to the microsecond.
+    """Return the times [us] at which a track crosses a segment.
 
     A leg that only touches the line counts once; one along the line doesn't.
 
     Args:
-        track: The motion [lattice].
-        line: From jamb to jamb [lattice].
+        track: The motion [lattice units].
+        line: The segment from jamb to jamb [lattice units].
     """
     (ax, ay), (bx, by) = line
     x, y = track.x, track.y
     side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     legs = np.flatnonzero((side[:-1] > 0) != (side[1:] > 0))
-    found: list[int] = []
+    times: list[int] = []
     for i in legs.tolist():
         px, py, qx, qy = int(x[i]), int(y[i]), int(x[i + 1]), int(y[i + 1])
         a = (qx - px) * (ay - py) - (qy - py) * (ax - px)
@@ -30,12 +30,12 @@ def crossings(track: Breakpoints, line: Segment) -> list[int]:
         if (a > 0) != (b > 0) or 0 in (a, b):
             near, far = abs(int(side[i])), abs(int(side[i + 1]))
             begin, end = int(track.time[i]), int(track.time[i + 1])
-            found.append(begin + (end - begin) * near // max(near + far, 1))
-    return found
+            times.append(begin + (end - begin) * near // max(near + far, 1))
+    return times
 
 
 def way_ahead(actor: Actor, now_us: int) -> LineString | None:
-    """Return what is left of a body's way [lattice], or None when it only stays where it is."""
+    """Return the rest of a body's route [lattice units]; None if it stays where it is."""
     assert isinstance(actor.motion, Track)
     track = actor.motion.breakpoints
     ahead = track.time > now_us

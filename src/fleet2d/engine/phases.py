@@ -1,8 +1,8 @@
 """The phases of a span, in the order that every step has (Fig. 5 of the paper).
 
-In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps at which
-somebody must decide, nothing but arithmetic happens, so a run goes from decision to decision. What
-a span is never shows in a result: every draw is addressed by step, and every plan by time.
+In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps with
+decisions the poses follow from the plans, so a run is simulated in spans from decision to decision.
+Spans never change a result: draws are addressed by step, and plans by time.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ class Span:
     Attributes:
         first: The step at which decisions are due.
         end: The step before which it ends at the latest.
-        settles: Whether all watchers take it in now, or later, with others.
+        settles: Whether all watchers take it in now, or later with other spans.
     """
 
     first: int
@@ -32,22 +32,22 @@ class Span:
 
 
 def intervene(state: State, span: Span) -> None:
-    """Do what a script, a test or a person does at this step."""
+    """Apply the interventions that are due at this step."""
     due = state.interventions.next_due()
     if due is None or due > span.first:
         return
     world = EngineWorld(state, span.first)
-    for each in state.interventions.take(span.first):
-        if each.ends:
-            each.act.end(world)
+    for item in state.interventions.take(span.first):
+        if item.ends:
+            item.act.end(world)
         else:
-            each.act.begin(world)
-    if state.interventions.waiting:  # for fewer events, maybe
-        state.wait_for(state.wanted)
+            item.act.begin(world)
+    if state.interventions.waiting:  # maybe for fewer events now
+        state.wait_for(state.requested)
 
 
 def change_home(state: State, span: Span) -> None:
-    """Let the home change as it is due: the floor plan comes first in a step."""
+    """Make the changes of the home that are due."""
     due = state.changes.next_due()
     if due is not None and due <= span.first:
         state.settle(span.first)
@@ -56,7 +56,7 @@ def change_home(state: State, span: Span) -> None:
 
 
 def decide(state: State, span: Span) -> None:
-    """Ask everybody whose plan is over, or who would drive at somebody: users, then robots."""
+    """Let bodies decide whose plan is over, and robots that would drive at a person."""
     step, clearance, blocking = span.first, state.clearance, state.blocking
     rows = {*state.bodies.due(step), *clearance.robots, *blocking.rows}
     for row in sorted(rows):
@@ -112,7 +112,7 @@ def _mind_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
 
 
 def move(state: State, span: Span) -> None:
-    """Find the next step at which somebody decides or something is due: all move until then."""
+    """End the span at the next step at which a body decides or something is due."""
     end = min(span.end, state.bodies.next_decision(), state.settled + state.capacity)
     if state.max_span is not None:
         end = min(end, span.first + state.max_span)
@@ -133,18 +133,18 @@ def move(state: State, span: Span) -> None:
 
 
 def watch(state: State, span: Span) -> None:
-    """Let those look ahead who may end the span, and interrupt plans by what happens in it."""
-    waiting = [watcher for watcher in state.watchers if watcher.waits]
-    for watcher in waiting:
+    """Let watchers look ahead that may end the span, and interrupt plans by their events."""
+    watchers = [watcher for watcher in state.watchers if watcher.waits]
+    for watcher in watchers:
         state.take(watcher, span.first)
         span.end = watcher.limit(state.bodies, span.end)
     state.bodies.step = span.end
-    for watcher in waiting:
+    for watcher in watchers:
         state.interrupt(watcher, state.take(watcher, span.end))
 
 
 def record(state: State, span: Span) -> None:
-    """Take the span in, with those before it, if somebody needs to know now."""
+    """Let watchers take in this span and earlier ones, if something is due after it."""
     due = (state.learners.next_due(), state.layers.next_due(span.first))
     span.settles = (
         state.max_span is not None
@@ -157,7 +157,7 @@ def record(state: State, span: Span) -> None:
 
 
 def learn(state: State, span: Span) -> None:
-    """Update the algorithms and metrics that are due, and store the layers that are."""
+    """Update the algorithms and metrics that are due, and store the layers that are due."""
     if not span.settles:
         return
     if state.log is not None:
@@ -167,10 +167,10 @@ def learn(state: State, span: Span) -> None:
 
 def _update(state: State, log: Log, end: int) -> None:
     learners, awaited = state.learners, state.learners.awaited
-    happened = log.happened(end - 1) if awaited else []
-    if learners.next_due() == end or any(event.event in awaited for event in happened):
+    events = log.happened(end - 1) if awaited else []
+    if learners.next_due() == end or any(event.event in awaited for event in events):
         state.count_looks()
-        learners.update(end, log, happened)
+        learners.update(end, log, events)
         if state.expecting is not None:
             state.expecting.learned(end, state)
         for name, output in learners.fresh.items():
@@ -183,4 +183,4 @@ def _update(state: State, log: Log, end: int) -> None:
 Phase = Callable[[State, Span], None]
 
 PHASES: tuple[Phase, ...] = (intervene, change_home, decide, move, watch, record, learn)
-"""What happens in a span, in order."""
+"""The phases of a span, in order."""

@@ -1,7 +1,7 @@
-"""What a run writes down: samples, key frames, observations and events, in an order of their own.
+"""The recorder of a run: samples, key frames, observations, events and readings for the tables.
 
-Rows are gathered over spans and handed to the store sorted by (step, entity), so that a table is
-the same however the run was cut into spans.
+Rows are collected over spans and stored in the order of (step, entity), so that the tables don't
+depend on the spans of a run.
 """
 
 import time
@@ -27,27 +27,28 @@ from fleet2d.entities.actor import Actor
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.home.home import Home
 
-# Events whose detail is a user, which has a column of its own.
+# Events whose detail is a user, who has a column of their own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
-# Rows gathered before they go to the store.
-GATHERED = 1 << 15
+# Rows that are collected before they are stored.
+MOST_ROWS = 1 << 15
 
 
 def activities_of(cameras: Sequence[Cameras], users: int) -> Activities:
-    """Return what users do, and what each camera takes it for: nothing known yet."""
+    """Return the activities of users, and how each camera perceives them, before the first one."""
     senses = {
-        (those.index, c): sense
-        for those in cameras
-        for c, sense in enumerate(those.activity_senses)
+        (group.index, c): sense
+        for group in cameras
+        for c, sense in enumerate(group.activity_senses)
     }
     return Activities(users, senses)
 
 
 class Recorder:
-    """Gathers the rows of a run.
+    """Collects the rows of a run.
 
     Attributes:
-        wall_s: Time spent on storing [s].
+        activities: The activities of users so far.
+        wall_s: Wall time of storing [s].
     """
 
     def __init__(  # noqa: PLR0913 - the parts of a run that it records, by name
@@ -67,15 +68,15 @@ class Recorder:
         """Prepare to record.
 
         Args:
-            store: Takes the rows.
-            settings: What is stored.
-            clock: Of the run.
-            home: Of the run.
+            store: The store for the rows.
+            settings: Which tables are stored, and how finely.
+            clock: The clock of the run.
+            home: The home.
             actors: Users, then robots.
-            bodies: How they move.
+            bodies: Their poses.
             objects: The names of the home's objects.
             changes: Whether walls may change during the run.
-            cameras: Those of robots.
+            cameras: The cameras of robots.
             sensors: The sensors of the home.
         """
         self.store, self.clock, self.home, self.bodies = store, clock, home, bodies
@@ -91,25 +92,25 @@ class Recorder:
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(home.plan)
         self._camera_codes = _codes_of(cameras)
-        self._gathered = 0  # observations and readings
+        self._count = 0  # observations and readings
         self.wall_s = 0.0
 
     def before_plan(self, row: int, step: int) -> None:
-        """Gather the end of the plan that is about to be replaced at `step`."""
+        """Collect the end of the plan that is replaced at `step`."""
         if "key_frames" in self._tables:
             self._keys.end_plan(row, step)
 
     def after_plan(self, row: int, step: int) -> None:
-        """Gather the beginning of the plan that was just made at `step`."""
+        """Collect the begin of the plan that was made at `step`."""
         if "key_frames" in self._tables:
             self._keys.begin_plan(row, step)
 
     def move_body(self, row: int) -> None:
-        """Take note that a body is put elsewhere: its next plan doesn't go on from its last one."""
+        """Note that a body was put elsewhere, so that its next plan begins with a key frame."""
         self._keys.move_body(row)
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Gather events."""
+        """Collect events."""
         if "events" in self._tables:
             self._events += events
         for event in events:
@@ -119,13 +120,13 @@ class Recorder:
     def take(
         self, first: int, end: int, observations: NDArray[np.int64], readings: Sequence[SensorRow]
     ) -> None:
-        """Gather the steps from `first` to `end` - 1.
+        """Collect the rows of the steps from `first` to `end` - 1.
 
         Args:
             first: First step.
             end: One past the last step.
-            observations: What robots perceived, (n, OBSERVATION), in order.
-            readings: What sensors reported, in order.
+            observations: Observations of robots, (n, OBSERVATION), in order.
+            readings: Readings of sensors, in order.
         """
         self._samples.take(self.bodies, first, end)
         if "key_frames" in self._tables:
@@ -133,29 +134,28 @@ class Recorder:
         if "observations" in self._tables and len(observations):
             self._observations.append(observations)
         self._readings += readings
-        self._gathered += len(observations) + len(readings)
-        gathered = self._gathered + self._samples.gathered + self._keys.gathered
-        if gathered + len(self._events) > GATHERED:
+        self._count += len(observations) + len(readings)
+        count = self._count + self._samples.count + self._keys.count
+        if count + len(self._events) > MOST_ROWS:
             self.drain()
 
     def end(self, step: int, rows: int) -> None:
-        """Gather what is under way when the run ends before `step`, and hand over everything."""
+        """Collect the ends of the present plans, as the run ends before `step`; store all rows."""
         if "key_frames" in self._tables:
             for row in range(rows):
-                # Not at the last step, whose rows may be with the store already: order would be
-                # lost.
+                # Not at the last step, whose rows may be stored already: the order would be wrong.
                 self._keys.break_off(row, step)
         self.drain()
 
     def drain(self) -> None:
-        """Hand everything gathered to the store."""
+        """Append all collected rows to the store."""
         began = time.perf_counter()
         self._samples.store()
         self._keys.store()
         self._store_observations()
         self._store_events()
         self._store_readings()
-        self._gathered = 0
+        self._count = 0
         self.wall_s += time.perf_counter() - began
 
     def _store_observations(self) -> None:
@@ -164,7 +164,7 @@ class Recorder:
         rows, self._observations = Rows(self._observations), []
         o = Observations(self.home.plan, self._rooms, rows, self.activities)
         columns: dict[str, Any] = {
-            **self._when(o.step),
+            **self._times(o.step),
             "robot": o.robot,
             "user": o.user,
             "x": o.x,
@@ -173,30 +173,30 @@ class Recorder:
         }
         if self._camera_codes:
             t = truth(self.home.plan, rows.whole, self.activities)
-            real = t.user >= 0
+            is_user = t.user >= 0
             columns |= {
                 "heading": o.heading,
                 "posture": o.posture.astype(np.int32),
                 "camera": self._cameras(o.robot, o.camera),
                 "true_user": t.user,
-                "true_x": np.where(real, t.x, np.nan),
-                "true_y": np.where(real, t.y, np.nan),
-                "true_heading": np.where(real, t.heading, np.nan),
-                "true_posture": np.where(real, t.posture, -1).astype(np.int32),
+                "true_x": np.where(is_user, t.x, np.nan),
+                "true_y": np.where(is_user, t.y, np.nan),
+                "true_heading": np.where(is_user, t.heading, np.nan),
+                "true_posture": np.where(is_user, t.posture, -1).astype(np.int32),
             }
             if self.activities.are_perceived:
                 columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
         self.store.append("observations", **columns)
 
     def _cameras(self, robot: NDArray[np.int32], camera: NDArray[np.int8]) -> NDArray[np.int32]:
-        """Return the codes of cameras that are given by their index among their robot's."""
+        """Return the codes of cameras from their indices among the cameras of their robot."""
         codes = np.zeros(
             (len(self.bodies), 1 + max(map(len, self._camera_codes.values()))), np.int32
         )
         for index, names in self._camera_codes.items():
             codes[index, : len(names)] = names
-        found: NDArray[np.int32] = codes[robot, camera]
-        return found
+        camera_codes: NDArray[np.int32] = codes[robot, camera]
+        return camera_codes
 
     def _store_events(self) -> None:
         if not self._events:
@@ -204,12 +204,12 @@ class Recorder:
         rows, users = self._rows, self._users
         events = sorted(self._events, key=lambda e: (e.step, rows[e.entity], e.rank))
         self._events = []
-        of_user = [event.event in OF_USERS for event in events]
-        columns: dict[str, Any] = self._when(np.array([event.step for event in events], np.int64))
+        is_of_user = [event.event in OF_USERS for event in events]
+        columns: dict[str, Any] = self._times(np.array([event.step for event in events], np.int64))
         if users:
             user = [
-                users.get(event.detail, -1) if seen else -1
-                for event, seen in zip(events, of_user, strict=True)
+                users.get(event.detail, -1) if is_user else -1
+                for event, is_user in zip(events, is_of_user, strict=True)
             ]
             columns["user"] = np.array(user, np.int32)
         self.store.append(
@@ -218,7 +218,8 @@ class Recorder:
             entity=np.array([rows[event.entity] for event in events], np.int32),
             event=[str(event.event) for event in events],
             detail=[
-                "" if seen else event.detail for event, seen in zip(events, of_user, strict=True)
+                "" if is_user else event.detail
+                for event, is_user in zip(events, is_of_user, strict=True)
             ],
         )
 
@@ -230,20 +231,20 @@ class Recorder:
         rooms, words = self._sensors.rooms, self._sensors.words
         self.store.append(
             "sensors",
-            **self._when(np.array(step, np.int64)),
+            **self._times(np.array(step, np.int64)),
             room=[rooms[number] for number in sensor],
             sensor=np.array(sensor, np.int32),
             state=[words[number][not is_on] for number, is_on in zip(sensor, on, strict=True)],
             activity=list(activity),
         )
 
-    def _when(self, step: NDArray[np.int64]) -> dict[str, Any]:
+    def _times(self, step: NDArray[np.int64]) -> dict[str, Any]:
         return {"step": step, "time": self.clock.times(step)}
 
 
 def _codes_of(cameras: Sequence[Cameras]) -> dict[int, list[int]]:
-    """Return the code of each camera of each robot; none where the run doesn't tell them apart."""
+    """Return the code of each camera of each robot; none if observations don't name cameras."""
     names = camera_names(cameras)
     if not names:
         return {}
-    return {those.index: [names.index(name) for name in those.names] for those in cameras}
+    return {group.index: [names.index(name) for name in group.names] for group in cameras}

@@ -1,4 +1,4 @@
-"""Running a stored run again, and comparing all that it stored."""
+"""Repeat a stored run, and compare all that both runs stored."""
 
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -20,24 +20,26 @@ from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import Trust, refuse_untrusted, restrict
 
-# Fields of the manifest that running again says nothing about.
+# Fields of the manifest that differ between repetitions.
 NOT_COMPARED = ("inputs", "resumed", "versions", "wall_s")
-# Compared by itself, or for every run the same.
-_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
+# Fields that are compared in another way, or are the same for all runs.
+_COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
 
-# What an expectation is called while a run is judged by it; no name in a scenario has a space.
+# The name of an expectation while a run is judged by it; names in scenarios have no spaces.
 JUDGED = "what is judged"
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What running a stored run again showed.
+    """The result of repeating a stored run.
 
     Attributes:
-        differing: Tables, files and fields of the manifest that came out otherwise, or aren't as
+        stored: The digest in the manifest of the stored run.
+        digest: The digest of the repeated run.
+        differing: Tables, files and fields of the manifest that differ, or have been changed since
             they were stored; empty if the run was reproduced.
-        causes: What is different about this attempt, in plain words.
-        not_compared: What running it again says nothing about.
+        causes: Possible causes of differences, in sentences.
+        not_compared: Fields of the manifest that were not compared.
     """
 
     stored: str | None
@@ -48,17 +50,17 @@ class Reproduction:
 
     @property
     def same(self) -> bool:
-        """Whether all that was compared is as it was stored, and came out the same."""
+        """Whether all that was compared is unchanged and the same in both runs."""
         return self.stored == self.digest and not self.differing
 
 
 def reproduce(directory: str | Path, trust: Iterable[str | Path] = ()) -> Reproduction:
-    """Run a stored run again from its manifest, and compare all that both stored.
+    """Repeat a stored run from its manifest, and compare all that both stored.
 
     Args:
-        directory: Of the run.
-        trust: Files and folders of code that may be run, if the scenario has components of its
-            own that aren't loaded yet.
+        directory: The run directory.
+        trust: Files and folders of code that may run, if the scenario has components of its own
+            that aren't loaded yet.
 
     Raises:
         RunDirectoryError: There is no such run, it was not completed, or its code isn't trusted.
@@ -68,40 +70,42 @@ def reproduce(directory: str | Path, trust: Iterable[str | Path] = ()) -> Reprod
 
 def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
     """See `reproduce`."""
-    stored = open_run(directory)
-    if stored.status != "complete":
+    old = open_run(directory)
+    if old.status != "complete":
         raise RunDirectoryError(
-            f"{directory} holds a run that is {stored.status}: only a complete run can be compared"
+            f"{directory} holds a run that is {old.status}: only a complete run can be compared"
         )
-    root, content = Path(directory), stored.manifest
+    root, content = Path(directory), old.manifest
     causes = [f"{path} has changed since" for path in changed_inputs(Manifest.read(root))]
     refuse_untrusted(root, content["scenario"], trust)
     seal = verify_run(root)
-    damaged = [_short(name) for name in seal.differing]
-    causes += [f"{name} in {directory} {how} after the run" for name, how in seal.differing.items()]
+    causes += [
+        f"{name} in {directory} {change} after the run" for name, change in seal.differing.items()
+    ]
     causes += seal.notes
     causes += [f"{name} in {directory} is no part of the run" for name in seal.foreign]
     with tempfile.TemporaryDirectory() as folder:
         with restrict(trust):
-            again = _run_again(content, Path(folder) / "run")
-        after = again.manifest
-        causes += _other_versions(content["versions"], after["versions"])
-        differing = {*damaged, *_tables(content["tables"], after["tables"])}
-        differing |= set(_fields(content, after)) | set(_files(root, Path(folder) / "run"))
-    return Reproduction(stored.digest, again.digest, sorted(differing), causes)
+            new = _simulation(content, Path(folder) / "run").run()
+        causes += _other_versions(content["versions"], new.manifest["versions"])
+        differing = {_short(name) for name in seal.differing}
+        differing |= set(_tables(content["tables"], new.manifest["tables"]))
+        differing |= set(_fields(content, new.manifest))
+        differing |= set(_files(root, Path(folder) / "run"))
+    return Reproduction(old.digest, new.digest, sorted(differing), causes)
 
 
 def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Verdict:
-    """Judge a finished run: it is run again from its manifest, and what is expected is measured.
+    """Judge a finished run by an expectation; the run is repeated for this from its manifest.
 
     Raises:
         InputError: See `Simulation.expect`; or the run isn't complete, or its code isn't trusted.
-        ArtifactError: The run comes out otherwise now.
+        ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
     """
     if run.status != "complete":
         raise RunDirectoryError(
-            f"the run is {run.status}: only a complete run can be judged; what was expected while"
-            " it went on is in manifest['expectations']"
+            f"the run is {run.status}: only a complete run can be judged; the verdicts on its own"
+            " expectations are in manifest['expectations']"
         )
     content, trust = run.manifest, Trust.of(())
     if run.directory is not None:
@@ -109,30 +113,29 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
     with restrict(trust) if run.directory is not None else nullcontext():
         simulation = _simulation(content, None)
         label = simulation.expect(expectation, JUDGED)
-        again = simulation.run()
-    differing = set(_tables(content["tables"], again.manifest["tables"])) - {TABLE}
-    if differing:
+        new = simulation.run()
+    tables = set(_tables(content["tables"], new.manifest["tables"])) - {TABLE}
+    if tables:
         raise ArtifactError(
-            f"the run comes out otherwise now ({', '.join(sorted(differing))}), so it can't be"
+            f"the run can't be reproduced ({', '.join(sorted(tables))} differ), so it can't be"
             " judged: `fleet2d reproduce` says what has changed"
         )
     verdict = simulation.verdicts()[label]
     return replace(verdict, name=name or verdict.expectation)
 
 
-def _run_again(content: Mapping[str, Any], out: Path) -> Run:
-    return _simulation(content, out).run()
-
-
 def _simulation(content: Mapping[str, Any], out: Path | None) -> Simulation:
-    # Running it at a pace of its own would only take longer; checkpoints would only cost time.
+    # Without its speedup and checkpoints, which would only cost time.
     scenario = content["scenario"]
     if not isinstance(scenario.get("simulation"), dict):
         raise RunDirectoryError(f"{FILE_NAME}: scenario.simulation is missing: it can't be run")
-    changed = {**scenario, "simulation": {**scenario["simulation"], "speedup": None}}
+    fast = {**scenario, "simulation": {**scenario["simulation"], "speedup": None}}
     try:
-        loaded = load_scenario(changed, "artifacts.checkpoint=off")
-        simulation = Simulation(loaded, out=out, interventions=content["interventions"])
+        simulation = Simulation(
+            load_scenario(fast, "artifacts.checkpoint=off"),
+            out=out,
+            interventions=content["interventions"],
+        )
         simulation._expect_again(content["expectations"])
         return simulation
     except RecursionError as error:
@@ -140,54 +143,54 @@ def _simulation(content: Mapping[str, Any], out: Path | None) -> Simulation:
 
 
 def _short(name: str) -> str:
-    """Name a table by its name, and a field of the manifest by its path."""
+    """Return the name of a table without suffix, and of a field of the manifest without file."""
     return name.removesuffix(".parquet").removeprefix(f"{FILE_NAME}: ")
 
 
-def _tables(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+def _tables(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Return the tables that differ in content, rows or columns."""
-    return [name for name in before.keys() | after.keys() if before.get(name) != after.get(name)]
+    return [name for name in old.keys() | new.keys() if old.get(name) != new.get(name)]
 
 
-def _fields(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+def _fields(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Return the fields of two manifests that differ and shouldn't."""
-    differing = []
-    for name in sorted((before.keys() | after.keys()) - _APART - set(NOT_COMPARED)):
-        old, new = before.get(name), after.get(name)
-        if old == new:
+    fields = []
+    for name in sorted((old.keys() | new.keys()) - _COMPARED_APART - set(NOT_COMPARED)):
+        before, after = old.get(name), new.get(name)
+        if before == after:
             continue
-        if isinstance(old, dict) and isinstance(new, dict):
-            keys = sorted(old.keys() | new.keys())
-            differing += [f"{name}.{key}" for key in keys if old.get(key) != new.get(key)]
+        if isinstance(before, dict) and isinstance(after, dict):
+            keys = sorted(before.keys() | after.keys())
+            fields += [f"{name}.{key}" for key in keys if before.get(key) != after.get(key)]
         else:
-            differing.append(name)
-    if _lasting(before["notes"]) != _lasting(after["notes"]):
-        differing.append("notes")
-    return differing
+            fields.append(name)
+    if _repeatable(old["notes"]) != _repeatable(new["notes"]):
+        fields.append("notes")
+    return fields
 
 
-def _lasting(notes: list[str]) -> list[str]:
-    """Return the notes that don't depend on how fast a machine is."""
+def _repeatable(notes: list[str]) -> list[str]:
+    """Return the notes that don't depend on the speed of a machine."""
     return [note for note in notes if not note.startswith(SLOW)]
 
 
-def _files(before: Path, after: Path) -> list[str]:
+def _files(old: Path, new: Path) -> list[str]:
     """Return the files beside the tables whose bytes differ: the plan, and what was learned."""
     names = {FLOORPLAN_NAME}
-    for root in (before, after):
+    for root in (old, new):
         names |= {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}
-    return [name for name in sorted(names) if not _alike(before / name, after / name)]
+    return [name for name in sorted(names) if not _are_equal(old / name, new / name)]
 
 
-def _alike(one: Path, other: Path) -> bool:
-    if not (one.is_file() and other.is_file()):
+def _are_equal(old: Path, new: Path) -> bool:
+    if not (old.is_file() and new.is_file()):
         return False
-    return one.stat().st_size == other.stat().st_size and one.read_bytes() == other.read_bytes()
+    return old.stat().st_size == new.stat().st_size and old.read_bytes() == new.read_bytes()
 
 
-def _other_versions(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+def _other_versions(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     return [
-        f"it was run with {name} {before.get(name, 'unknown')}, and this is {now[name]}"
-        for name in sorted(now)
-        if before.get(name) != now[name]
+        f"it was run with {name} {old.get(name, 'unknown')}, and this is {new[name]}"
+        for name in sorted(new)
+        if old.get(name) != new[name]
     ]

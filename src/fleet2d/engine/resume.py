@@ -1,4 +1,4 @@
-"""Going on with a run that was interrupted, killed or failed, from its last checkpoint."""
+"""Continue a run that was interrupted, killed or failed from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from fleet2d.trust import Trust, refuse_untrusted, restrict
 
 
 def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:
-    """Go on with an unfinished run to its end; its digest is that of an undisturbed run.
+    """Continue an unfinished run to its end; its digest is that of an uninterrupted run.
 
     Args:
-        directory: Of the run.
-        trust: Files and folders of code that may be run, if the scenario has components of its
-            own that aren't loaded yet.
+        directory: The run directory.
+        trust: Files and folders of code that may run, if the scenario has components of its own
+            that aren't loaded yet.
 
     Raises:
-        RunDirectoryError: There is no run, it is complete, another process writes it, an input is
-            not what it was, or code isn't trusted.
+        RunDirectoryError: There is no run, it is complete, another process writes it, an input
+            file has changed, or code isn't trusted.
         ArtifactError: Its journal is damaged, or it can't be written.
 
     Example:
@@ -46,7 +46,7 @@ def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:
 
 
 def reopen(directory: str | Path, trust: Trust) -> tuple[Simulation, str]:
-    """Return an unfinished run at its last checkpoint, or at its first step, and which it is.
+    """Return an unfinished run at its last checkpoint or its first step, and a remark about it.
 
     Raises:
         RunDirectoryError: See `resume`.
@@ -73,10 +73,9 @@ def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
         raise RunDirectoryError(f"{root} holds a complete run: there is nothing to go on with")
     if not manifest.scenario:
         raise RunDirectoryError(f"{root}/{FILE_NAME} has no scenario: run the scenario again")
-    changed = changed_inputs(manifest)
-    if changed:
+    if paths := changed_inputs(manifest):
         raise RunDirectoryError(
-            f"{changed[0]} has changed since the run began: put it back as it was, or run the"
+            f"{paths[0]} has changed since the run began: put it back as it was, or run the"
             " scenario again"
         )
     refuse_untrusted(root, manifest.scenario, trust)
@@ -86,19 +85,19 @@ def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
             checkpoint = _checkpoint(ledger, manifest)
             run = Simulation.reopened(scenario, RunStore(root), ledger, checkpoint)
         except UnusableCheckpointError as error:
-            remark = f"beginning anew, for {error}"
+            remark = f"starting again from the first step: {error}"
             run = Simulation.reopened(scenario, RunStore(root), ledger, None)
         else:
-            remark = f"going on from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
+            remark = f"continuing from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
     run.catch_up(manifest.interventions)
     return run, remark
 
 
 def _checkpoint(ledger: Ledger, manifest: Manifest) -> Checkpoint:
-    """Return the last checkpoint, whose rows are all there.
+    """Return the last checkpoint, after checking that the journal has all of its rows.
 
     Raises:
-        UnusableCheckpointError: There is none to go on from, and why.
+        UnusableCheckpointError: There is none, or it can't be used.
     """
     checkpoint = Checkpoint.open(ledger.checkpoint, manifest)
     last = last_commit(ledger.folder / JOURNAL_NAME)

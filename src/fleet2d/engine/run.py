@@ -1,4 +1,4 @@
-"""Whole runs."""
+"""Run a scenario to its end."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,8 +26,8 @@ def run(
         settings: Keys of `simulation` or of the scenario, such as seed=4.
 
     Raises:
-        InputError: Something that was given is wrong; nothing is written then.
-        ComponentError: A component failed; what was stored until then is readable.
+        InputError: An argument or the scenario is wrong; nothing is written then.
+        ComponentError: A component failed; the run up to that step can be read.
 
     Example:
         >>> import fleet2d

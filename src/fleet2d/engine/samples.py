@@ -1,4 +1,4 @@
-"""Samples: where everybody is, as often as a scenario asks for it."""
+"""Samples: the poses of all bodies at regular times, for the table of trajectories."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,16 @@ from fleet2d.units import whole_steps
 
 
 class Samples:
-    """Gathers the rows of the table of trajectories.
+    """Collects the rows of the table of trajectories.
 
     Attributes:
-        gathered: How many rows wait to be stored.
+        count: Number of rows that are not stored yet.
     """
 
     def __init__(
         self, store: RunStore, settings: ArtifactSettings, clock: Clock, home: Home
     ) -> None:
-        """Prepare to gather.
+        """Start without rows.
 
         Raises:
             ScenarioError: The interval between samples is not a multiple of the step.
@@ -32,10 +32,10 @@ class Samples:
         self._store, self._clock, self._home = store, clock, home
         self._every = _steps_between(settings, clock)
         self._blocks: list[NDArray[np.int64]] = []
-        self.gathered = 0
+        self.count = 0
 
     def take(self, bodies: Bodies, first: int, end: int) -> None:
-        """Gather the samples of the steps from `first` to `end` - 1."""
+        """Collect the samples of the steps from `first` to `end` - 1."""
         if not self._every or first >= end:
             return
         steps = np.arange(-(-first // self._every) * self._every, end, self._every)
@@ -51,14 +51,14 @@ class Samples:
                 rows[i, :, 2:] = np.stack(bodies.poses(step), axis=-1)
         if rows.size:
             self._blocks.append(rows.reshape(-1, 6))
-            self.gathered += len(steps) * len(bodies)
+            self.count += len(steps) * len(bodies)
 
     def store(self) -> None:
-        """Hand everything gathered to the store."""
+        """Append all collected rows to the store."""
         if not self._blocks:
             return
         rows = in_order(self._blocks)
-        self._blocks, self.gathered = [], 0
+        self._blocks, self.count = [], 0
         step, entity, x, y, heading, away = rows.T
         plan = self._home.plan
         gone = away.astype(bool)
@@ -79,7 +79,7 @@ class Samples:
 
 
 def _steps_between(settings: ArtifactSettings, clock: Clock) -> int:
-    """Return how many steps lie between two samples, 0 for no samples.
+    """Return the steps between two samples, 0 for no samples.
 
     Raises:
         ScenarioError: The interval is not a multiple of the step.

@@ -1,4 +1,4 @@
-"""Scripts in a run: what a scenario or somebody outside wants to be done later, taken up."""
+"""Scripts in a run: entries of a scenario's script, or from outside, are checked and scheduled."""
 
 from datetime import datetime
 
@@ -13,24 +13,23 @@ from fleet2d.interventions.when import ClockTime
 from fleet2d.units import format_duration, micros
 
 
-def take_up(state: State, entry: Entry, first: int, index: int | None = None) -> None:
-    """Let an entry of a script be done when it is time, or when its event happens.
+def schedule(state: State, entry: Entry, first: int, index: int | None = None) -> None:
+    """Schedule an entry of a script at its time or event.
 
     Args:
         state: The run.
         entry: The entry.
-        first: The present step: it is done from then on.
+        first: The present step.
         index: Its place in the scenario's script; None: it comes from outside.
 
     Raises:
-        ScenarioError: It names what there isn't, its event can never happen, or its time isn't in
-            the run.
-        PlacementError: There is no such place, or nobody gets there.
+        ScenarioError: It names something unknown, its event can never happen, or its time isn't
+            within the run.
+        PlacementError: There is no such place, or it can't be reached.
     """
     interventions, world = state.interventions, EngineWorld(state, first)
     entry.act.check(world)
-    outside = index is None
-    rank, by = (OUTSIDE, "") if outside else (SCRIPT, f"script.{index}")
+    rank, by = (OUTSIDE, "") if index is None else (SCRIPT, f"script.{index}")
     number = interventions.next_number() if index is None else index
     if entry.on is None:
         for step in steps_of(entry, world.clock, first):
@@ -41,26 +40,26 @@ def take_up(state: State, entry: Entry, first: int, index: int | None = None) ->
     interventions.waiting.append(Waiting(entry.on, entry.each, delay, entry.act, rank, number, by))
     if interventions not in state.events.sinks:
         state.events.sinks.append(interventions)
-    state.wait_for(state.wanted)
+    state.wait_for(state.requested)
 
 
 def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
-    """Return the steps at which an entry is done: from `first` on, within the run.
+    """Return the steps at which an entry is applied: from `first` on, within the run.
 
     Raises:
         ScenarioError: There are none.
     """
-    at = entry.at
-    if isinstance(at, ClockTime):
-        moments = [clock.elapsed(moment) for moment in at.moments(clock)]
+    time = entry.at
+    if isinstance(time, ClockTime):
+        moments = [clock.elapsed(moment) for moment in time.moments(clock)]
         steps = [clock.step_at_or_after(moment) for moment in moments]
         steps = [step for step in steps if first <= step < clock.steps]
-        steps, text = steps if entry.each else steps[:1], at.text
-    elif isinstance(at, datetime):
-        steps, text = [clock.step_at_or_after(clock.elapsed(at))], f"{at:%Y-%m-%d %H:%M:%S}"
+        steps, text = steps if entry.each else steps[:1], time.text
+    elif isinstance(time, datetime):
+        steps, text = [clock.step_at_or_after(clock.elapsed(time))], f"{time:%Y-%m-%d %H:%M:%S}"
     else:
-        assert at is not None
-        steps, text = [clock.step_at_or_after(micros(at))], format_duration(at)
+        assert time is not None
+        steps, text = [clock.step_at_or_after(micros(time))], format_duration(time)
     if not steps or not first <= steps[0] < clock.steps:
         begins, ends = clock.time(first), clock.time(clock.steps)
         raise ScenarioError(

@@ -1,4 +1,4 @@
-"""The seen area of a robot in a run: what its cameras have had in view, cell by cell."""
+"""The seen area of a robot: the cells that its cameras have had in view, and when."""
 
 from collections.abc import Collection, Iterable, Sequence
 
@@ -15,24 +15,25 @@ from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
 from fleet2d.sight.tables import TableContext, stack_lenses
 
-# Poses kept: half as many as slots. Rounds through a large home take a few thousand.
+# Slots of the cache of poses, which holds half as many. A round through a large home has a few
+# thousand poses.
 SLOTS = 1 << 14
-# Most steps that are looked from together.
+# Most steps in one call of the kernel.
 LONGEST = 1 << 16
 
 I64 = NDArray[np.int64]
 
 
 class SeenArea:
-    """What the cameras of one robot have had in view since the start.
+    """The cells that the cameras of one robot have had in view since the start.
 
     A cell is in view at a step if its centre is: not too near or far, within the angle, and no wall
-    touches the line to it, from the exact pose that the camera has at that step.
+    touches the line to it, from the exact pose of the camera at that step.
 
     Attributes:
-        robot: Whose cameras.
+        robot: The robot.
         row: Its row among the bodies.
-        taken: The step before which it has looked.
+        taken: The step before which all steps are included.
     """
 
     def __init__(
@@ -46,16 +47,16 @@ class SeenArea:
         keeps_last: bool = True,
         bin_steps: int = 0,
     ) -> None:
-        """Begin with nothing seen.
+        """Start with no cell seen.
 
         Args:
-            robot: Whose cameras.
+            robot: The robot.
             row: Its row among the bodies.
-            patches: The parts of rooms that bins tell apart.
-            bodies: Everybody in the run.
-            every: It looks at the steps that this divides; each look stands for so many steps.
-            keeps_last: Whether the last step at which each cell was in view can be asked for.
-            bin_steps: Keep exposure by bins of so many steps, for `take_bins`; 0: don't.
+            patches: The parts of rooms that bins distinguish.
+            bodies: All bodies of the run.
+            every: Steps between two looks; each look stands for so many steps.
+            keeps_last: Whether `last_seen` is available.
+            bin_steps: Steps in a bin of exposure, for `take_bins`; 0: no bins.
         """
         assert isinstance(robot.entity, Robot)
         self.robot, self.row, self.every, self._patches = robot, row, every, patches
@@ -82,10 +83,10 @@ class SeenArea:
         self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
         self._first_bin = 0
         self._glances = no_glances(SLOTS, len(patches.room))
-        self._face(robot.home.walls)
+        self._set_walls(robot.home.walls)
 
-    def _face(self, walls: Mesh) -> None:
-        """Take other walls: what is known of poses no longer holds."""
+    def _set_walls(self, walls: Mesh) -> None:
+        """Use other walls, and clear the cache of poses."""
         self._watched = Watched(
             walls,
             self._lenses,
@@ -98,16 +99,16 @@ class SeenArea:
         self._glances.used[0] = 0
 
     def darken(self, cameras: Collection[str]) -> None:
-        """Let these cameras see nothing from the present step on, and all others what they see."""
+        """Let these cameras see nothing from the present step on, and all others see normally."""
         self._settle()
-        dark = [name in cameras for name in self._names]
+        is_dark = [name in cameras for name in self._names]
         near, far = self._open_lenses.near_squared, self._open_lenses.far_squared
-        self._lenses = self._open_lenses._replace(near_squared=np.where(dark, far + 1, near))
-        self._face(self.robot.home.walls)
+        self._lenses = self._open_lenses._replace(near_squared=np.where(is_dark, far + 1, near))
+        self._set_walls(self.robot.home.walls)
 
     @property
     def waits(self) -> bool:
-        """Nothing that is seen ends a span."""
+        """False: nothing that is seen ends a span."""
         return False
 
     def limit(self, bodies: Bodies, end: int) -> int:
@@ -119,14 +120,14 @@ class SeenArea:
         walls = self.robot.home.walls
         if walls is not self._watched.walls:
             self._settle()
-            self._face(walls)
+            self._set_walls(walls)
         while self.taken < end:
             first, until = self.taken, min(end, self.taken + LONGEST)
             self.taken = until
             runs = bodies.runs(self.row, first, until)
             watch(self._watched, runs, 0, first, until, self._glances, self._record)
             if self._bin_steps:
-                self._gather_bins(first)
+                self._collect_bins(first)
         return ()
 
     def catch_up(self) -> None:
@@ -134,19 +135,19 @@ class SeenArea:
         self.take(self._bodies, self._bodies.step)
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: no plan waits for what is seen."""
+        """Return nothing: no plan waits for seen cells."""
         return ()
 
-    def _gather_bins(self, begin: int) -> None:
-        """Keep the bins of the steps from `begin` to the present one."""
+    def _collect_bins(self, begin: int) -> None:
+        """Collect the bins of the steps from `begin` to the present one."""
         first = begin // self._bin_steps - self._first_bin
         end = (self.taken - 1) // self._bin_steps + 1 - self._first_bin
-        under_way = self._bins[first:]  # the last bin, if steps of it were taken before
-        grown = np.stack([self._record.binned[: end - first], self._record.most[: end - first]], 1)
-        if len(under_way):
-            grown[0, 0] += under_way[0, 0]
-            grown[0, 1] = np.maximum(grown[0, 1], under_way[0, 1])
-        self._bins = np.concatenate([self._bins[:first], grown]) if first else grown
+        open_bins = self._bins[first:]  # the last bin, if it has earlier steps
+        bins = np.stack([self._record.binned[: end - first], self._record.most[: end - first]], 1)
+        if len(open_bins):
+            bins[0, 0] += open_bins[0, 0]
+            bins[0, 1] = np.maximum(bins[0, 1], open_bins[0, 1])
+        self._bins = np.concatenate([self._bins[:first], bins]) if first else bins
 
     def _settle(self) -> None:
         if len(self._record.last):
@@ -159,37 +160,37 @@ class SeenArea:
         return np.add.reduceat(self._record.exposure, self._patches.first)
 
     def take_bins(self, end: int) -> I64:
-        """Hand over exposure by bins, of those that end by step `end` and weren't taken before.
+        """Return and remove the exposure of the bins that end by step `end`.
 
         Returns:
-            int64 (bins, 2, patches), cells of each patch in view, summed over the steps of each
-            bin, and at most at one.
+            int64 (bins, 2, patches): cells of each patch in view, the sum over the steps of each
+            bin, and the maximum at one step.
         """
         self.catch_up()
         count = end // self._bin_steps - self._first_bin
-        taken, self._bins = self._bins[:count], self._bins[count:]
+        bins, self._bins = self._bins[:count], self._bins[count:]
         self._first_bin += count
-        return taken
+        return bins
 
     def explored(self) -> NDArray[np.bool_]:
-        """Return which cells were ever in view: bool (rows, columns)."""
+        """Return which cells were ever in view, bool (rows, columns)."""
         self.catch_up()
-        explored: NDArray[np.bool_] = self._record.first != NEVER
-        return explored
+        is_explored: NDArray[np.bool_] = self._record.first != NEVER
+        return is_explored
 
     def first_seen(self) -> I64:
-        """Return the first step at which each cell was in view: int64 (rows, columns), -1 never."""
+        """Return the first step with each cell in view, int64 (rows, columns); -1: never."""
         self.catch_up()
         return self._record.first.copy()
 
     def last_seen(self) -> I64:
-        """Return the last step at which each cell was in view: int64 (rows, columns), -1 never."""
+        """Return the last step with each cell in view, int64 (rows, columns); -1: never."""
         self.catch_up()
         self._settle()
         return self._record.last.copy()
 
     def time_since_seen(self) -> NDArray[np.float64]:
-        """Return how long ago each cell was in view [s]: float64 (rows, columns), NaN: never."""
+        """Return the time since each cell was in view [s], float64 (rows, columns), NaN: never."""
         last = self.last_seen()
         steps = np.where(last == NEVER, np.nan, self.taken - 1 - last)
         elapsed: NDArray[np.float64] = steps * (self.robot.clock.step_us / 1e6)

@@ -1,4 +1,4 @@
-"""The sensors of a run: what they report, and beside what activity."""
+"""The sensors of a run: their readings, and the activities at that time."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,7 +25,7 @@ from fleet2d.entities.objects.sensor import (
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.home.home import Home
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 
 class Sensors:
@@ -33,10 +33,11 @@ class Sensors:
 
     Attributes:
         names: Their names, in the order of the scenario.
-        taken: The step before which the sensors were read.
-        rooms: The room that each one's readings name.
-        words: What each one calls its two states, on and off.
-        on: Whether each is on at present.
+        taken: The step before which the sensors have been read.
+        rooms: The room in the readings of each sensor.
+        words: The words of each sensor for its two states, on and off.
+        stuck: The faults from outside, by name.
+        awaited: Whether an algorithm waits for readings.
     """
 
     def __init__(
@@ -49,14 +50,14 @@ class Sensors:
     ) -> None:
         self.home, self.users = home, len(users)
         self.taken = 0
-        self.stuck: dict[str, SensorFault] = {}  # what somebody outside lets them say
-        self.awaited = False  # whether an algorithm waits for readings
+        self.stuck: dict[str, SensorFault] = {}
+        self.awaited = False
         self._rows: list[SensorRow] = []
         self.sensors: list[Sensor] = []
         self.names: list[str] = []
-        for name, thing in objects.items():
-            if isinstance(thing, Sensor):
-                sensor = thing.model_copy(deep=True)
+        for name, item in objects.items():
+            if isinstance(item, Sensor):
+                sensor = item.model_copy(deep=True)
                 if isinstance(sensor, ContactSensor):
                     sensor.watch(_door(name, sensor.of, doors))
                 sensor.start(home, clock.step_us)
@@ -65,8 +66,8 @@ class Sensors:
         self.rooms = [sensor.room or sensor.place(home) for sensor in self.sensors]
         self.words = [sensor.words for sensor in self.sensors]
         self._states = [SensorState(sensor.hold_us() // clock.step_us) for sensor in self.sensors]
-        self._before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self._doing: dict[str, list[tuple[int, str]]] = {user: [] for user in users}
+        self._before: tuple[np.ndarray, ...] | None = None  # the poses of the last step
+        self._activities: dict[str, list[tuple[int, str]]] = {user: [] for user in users}
 
     @property
     def on(self) -> dict[str, bool]:
@@ -90,7 +91,7 @@ class Sensors:
         return end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Read the sensors; `collect` hands over what they report."""
+        """Read the sensors; `collect` returns the readings."""
         first, self.taken = self.taken, end
         if not self.sensors or first == end:
             return ()
@@ -98,7 +99,8 @@ class Sensors:
             view = self._view(bodies.block(first, end), first)
             readings = []
             for number, state in enumerate(self._states):
-                readings += [(number, each) for each in self._read(number, state, view, end)]
+                new = self._read(number, state, view, end)
+                readings += [(number, reading) for reading in new]
         self._rows += [
             SensorRow(reading.step, number, reading.on, self._activity(reading.user, reading.step))
             for number, reading in in_order(readings)
@@ -124,12 +126,12 @@ class Sensors:
         return ()
 
     def collect(self) -> list[SensorRow]:
-        """Hand over what sensors reported since this was called last, by step and sensor."""
+        """Return the readings since the last call, by step and sensor."""
         rows, self._rows = self._rows, []
         return rows
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
-        """Return readings as events: of which sensor, and its state in the words of the table."""
+        """Return readings as events, with the sensor and its state in the words of the table."""
         names, words = self.names, self.words
         return [
             Event(row.step, names[row.sensor], EventKind.SENSOR, words[row.sensor][not row.on])
@@ -137,34 +139,33 @@ class Sensors:
         ]
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Note what users do, for the readings to say."""
+        """Record the activities of users, for the readings."""
         for event in events:
-            if event.event == EventKind.ACTIVITY and event.entity in self._doing:
-                self._doing[event.entity].append((event.step, event.detail))
+            if event.event == EventKind.ACTIVITY and event.entity in self._activities:
+                self._activities[event.entity].append((event.step, event.detail))
 
     def _view(self, block: PoseBlock, first: int) -> SensorView:
-        here = (block.x, block.y, block.away == 0)
-        before = self._before or tuple(part[:, :1] for part in here)
-        self._before = (here[0][:, -1:].copy(), here[1][:, -1:].copy(), here[2][:, -1:].copy())
-        x, y, present = (np.concatenate(pair, axis=1) for pair in zip(before, here, strict=True))
+        arrays = (block.x, block.y, block.away == 0)
+        before = self._before or tuple(array[:, :1] for array in arrays)
+        self._before = tuple(array[:, -1:].copy() for array in arrays)
+        x, y, present = (np.concatenate(pair, axis=1) for pair in zip(before, arrays, strict=True))
         return SensorView(first, x, y, present, self.users)
 
     def _activity(self, user: int, step: int) -> str:
-        """Return what a user is doing at a step, if known; of all users if it is nobody's."""
+        """Return the activity of a user at a step, if known; that of all users for user -1."""
         if user >= self.users:
             return ""
         if user < 0:
-            doing = [self._activity(one, step) for one in range(self.users)]
-            return " and ".join(dict.fromkeys(text for text in doing if text))
-        begun = list(self._doing.values())[user]
-        at = bisect_right(begun, step, key=itemgetter(0))
-        return begun[at - 1][1] if at else ""
+            activities = [self._activity(number, step) for number in range(self.users)]
+            return " and ".join(dict.fromkeys(text for text in activities if text))
+        activities_of_user = list(self._activities.values())[user]
+        index = bisect_right(activities_of_user, step, key=itemgetter(0))
+        return activities_of_user[index - 1][1] if index else ""
 
 
-def _door(name: str, of: str, doors: Sequence[str]) -> int:
-    if of in doors:
-        return list(doors).index(of)
+def _door(name: str, door: str, doors: Sequence[str]) -> int:
+    if door in doors:
+        return list(doors).index(door)
     raise ScenarioError(
-        f"objects.{name}.of names {of!r}, which is no door of the scenario"
-        f"{did_you_mean(of, doors)} There are: {', '.join(doors) or 'none'}"
+        f"objects.{name}.of names {door!r}, which is no door of the scenario{suggest(door, doors)}"
     )

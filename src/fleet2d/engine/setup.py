@@ -1,4 +1,4 @@
-"""Setting up a run from a scenario: its home, its bodies, and all that watches them."""
+"""Setting up a run from a scenario: its home, bodies, cameras, sensors, algorithms and tables."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -18,7 +18,7 @@ from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of
-from fleet2d.engine.script import take_up
+from fleet2d.engine.script import schedule
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
 from fleet2d.engine.tables import camera_names, sensor_table, table_specs
@@ -29,7 +29,7 @@ from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.home import HomeIntervention
 from fleet2d.interventions.robots import causes_errors
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
 
 
@@ -37,7 +37,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     """Return the state before the first step, and add the tables of the run to its store.
 
     Raises:
-        InputError: The floor plan or a place in the scenario is wrong, or names what there isn't.
+        InputError: The floor plan or a place in the scenario is wrong, or a name is unknown.
     """
     home = _furnished_home(scenario)
     people: dict[str, DecidingActor | None] = dict.fromkeys(scenario.users)
@@ -50,16 +50,16 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         actor.join(bodies, row)
     gazes, cameras = open_cameras(actors, len(users), scenario.sight)
     _check_reads(scenario, actors)
-    for those in cameras:
-        if any(causes_errors(entry.act, those.owner.name) for entry in scenario.script):
-            those.prepare_to_err()
+    for group in cameras:
+        if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
+            group.prepare_to_err()
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
     blocking = Blocking(users, robots, scenario.simulation.people_block)
     changes = Changes(scenario.objects, home, clock)
     for index, change in enumerate(scenario.changes):
-        with _placing(scenario, f"changes.{index}"):
+        with _locate_errors(scenario, f"changes.{index}"):
             changes.declare(index, change)
-    with _placing(scenario, "objects"):
+    with _locate_errors(scenario, "objects"):
         sensors = Sensors(scenario.objects, changes.names, home, clock, list(scenario.users))
     _add_tables(store, scenario, home, cameras, sensors)
     recorder = Recorder(
@@ -76,8 +76,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     )
     layers = LayerBook(scenario, home, actors, bodies, store, clock)
     learners = _learners(scenario, home, clock, seed, store)
-    for those in [*gazes, *cameras]:
-        those.awaited = learners.awaited
+    for group in [*gazes, *cameras]:
+        group.awaited = learners.awaited
     sensors.awaited = EventKind.SENSOR in learners.awaited
     log = _log(home, actors, bodies, cameras, recorder) if learners.all else None
     state = State(
@@ -100,14 +100,14 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         interventions=Interventions(clock),
         max_span=scenario.simulation.max_span,
     )
-    for those in [*gazes, *cameras]:
-        those.owner.in_view = InView(state, those)
+    for group in [*gazes, *cameras]:
+        group.owner.in_view = InView(state, group)
     for index, entry in enumerate(scenario.script):
         path = f"script.{index}"
-        with _placing(scenario, path), _named(path):
-            take_up(state, entry, 0, index)
+        with _locate_errors(scenario, path), _prefix_errors(path):
+            schedule(state, entry, 0, index)
     for name, expectation in scenario.expect.items():
-        with _placing(scenario, f"expect.{name}"):
+        with _locate_errors(scenario, f"expect.{name}"):
             expect(state, scenario, clock, name, expectation, 0)
     return state
 
@@ -115,17 +115,17 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
 def _furnished_home(scenario: Scenario) -> Home:
     """Return the home, with a door in every doorway that the scenario names."""
     plan = scenario.floorplan.plan()
-    doors, taken = [], dict[int, str]()
+    doors, door_names = [], dict[int, str]()
     for name, door in scenario.objects.items():
         if isinstance(door, Door):
-            with _placing(scenario, f"objects.{name}"):
+            with _locate_errors(scenario, f"objects.{name}"):
                 doorway = door.find(plan)
-                if doorway.index in taken:
+                if doorway.index in door_names:
                     raise PlacementError(
-                        f"objects.{name}: {taken[doorway.index]} hangs in the doorway"
+                        f"objects.{name}: {door_names[doorway.index]} hangs in the doorway"
                         f" {doorway.name} already"
                     )
-            taken[doorway.index] = name
+            door_names[doorway.index] = name
             doors.append(doorway)
     home = Home(plan, doors)
     lay_layers(home, scenario.floorplan)
@@ -133,20 +133,20 @@ def _furnished_home(scenario: Scenario) -> Home:
 
 
 @contextmanager
-def _placing(scenario: Scenario, path: str) -> Iterator[None]:
-    """Say where in the scenario somebody was put that can't be there."""
+def _locate_errors(scenario: Scenario, path: str) -> Iterator[None]:
+    """Add to errors where in the scenario the key is written."""
     try:
         yield
     except (PlacementError, ScenarioError) as error:
-        where = scenario.where(path)
-        if not where or str(error).startswith(where):
+        place = scenario.where(path)
+        if not place or str(error).startswith(place):
             raise
-        raise type(error)(f"{where}: {error}") from error
+        raise type(error)(f"{place}: {error}") from error
 
 
 @contextmanager
-def _named(path: str) -> Iterator[None]:
-    """Say which entry of the scenario can't be."""
+def _prefix_errors(path: str) -> Iterator[None]:
+    """Add to errors which entry of the scenario is wrong."""
     try:
         yield
     except (PlacementError, ScenarioError) as error:
@@ -161,12 +161,12 @@ def _actors(
     seed: int,
     people: dict[str, DecidingActor | None],
 ) -> list[DecidingActor]:
-    """Return the users or the robots; `people` are told who they are."""
+    """Return the users or the robots, and enter the users in `people`."""
     entities: Mapping[str, Any] = getattr(scenario, bucket)
     actors = []
     for name, entity in entities.items():
         path = f"{bucket}.{name}"
-        with _placing(scenario, path):
+        with _locate_errors(scenario, path):
             actors.append(DecidingActor(name, path, entity, home, clock, seed, people=people))
         if name in people:
             people[name] = actors[-1]
@@ -174,19 +174,18 @@ def _actors(
 
 
 def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
-    """Refuse behaviors that go by an algorithm that there isn't."""
-    known = scenario.algorithms
+    """Refuse behaviors that read an unknown algorithm."""
     for actor in actors:
-        for read in (read for behavior in actor.behaviors for read in behavior.reads()):
-            if read not in known:
+        for name in (name for behavior in actor.behaviors for name in behavior.reads()):
+            if name not in scenario.algorithms:
                 raise ScenarioError(
-                    f"{actor.path} goes by {read!r}, which is no algorithm of the scenario"
-                    f"{did_you_mean(read, known)} There are: {', '.join(known) or 'none'}"
+                    f"{actor.path} reads {name!r}, which is no algorithm of the scenario"
+                    f"{suggest(name, scenario.algorithms)}"
                 )
 
 
 def _may_change(scenario: Scenario) -> bool:
-    """Tell whether the home may change during the run."""
+    """Whether the home may change during the run."""
     moves = any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)
     return bool(scenario.objects or scenario.changes or moves)
 

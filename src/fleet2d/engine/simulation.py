@@ -1,4 +1,4 @@
-"""The simulation: a run that scripts and the command line step, steer, look at and branch."""
+"""The simulation: a run in progress, which can be stepped, changed, read and copied."""
 
 import io
 import secrets
@@ -12,7 +12,7 @@ from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.checkpoint import Checkpoint, Keeper
+from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.garbage import rare_collections
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.judging import Judging
@@ -20,8 +20,8 @@ from fleet2d.engine.keeping import (
     deferred_interrupt,
     describe_end,
     describe_start,
-    keep_plan,
     open_store,
+    store_plan,
 )
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.phases import PHASES, Span
@@ -38,16 +38,16 @@ from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import LEARNED_NAME, Run, run_of
 from fleet2d.scenario.model import Scenario, load_scenario
 
-# So many steps are simulated without taking over Ctrl-C.
+# Fewer steps are simulated without a handler for Ctrl-C.
 SHORT = 100
 
 
 class Simulation(Judging):
-    """A scenario under way: step it, run it until a time, look at it, branch it.
+    """A run in progress: step it, run it until a time or event, read its state, copy it.
 
     Attributes:
-        scenario: What is simulated.
-        seed: The seed, given or drawn.
+        scenario: The scenario.
+        seed: The seed of the scenario, or the one that was drawn.
         clock: Its steps.
 
     Example:
@@ -68,14 +68,14 @@ class Simulation(Judging):
         interventions: Sequence[Mapping[str, Any]] = (),
         **settings: Any,
     ) -> None:
-        """Set everything up; with `out`, store in that directory, else in memory.
+        """Set up the run; with `out` it is stored in that directory, else in memory.
 
         Args:
             scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
                 scenario.
             overrides: Texts like 'simulation.duration.days=60'.
             out: Directory to store the run in; None keeps it in memory.
-            interventions: What is done to the run from outside, as a manifest has it.
+            interventions: Interventions from outside, as in a manifest.
             settings: Keys of `simulation` or of the scenario, such as seed=4.
 
         Raises:
@@ -84,10 +84,10 @@ class Simulation(Judging):
         """
         began = time.perf_counter()
         with rare_collections():
-            loaded = load_scenario(scenario, *overrides, **settings)
+            checked_scenario = load_scenario(scenario, *overrides, **settings)
             store = RunStore(out)
             store.check()
-            self._prepare(loaded, store, interventions)
+            self._prepare(checked_scenario, store, interventions)
         open_store(self._store, self.home)
         self._setup_s = time.perf_counter() - began
 
@@ -97,26 +97,26 @@ class Simulation(Judging):
         store: RunStore,
         interventions: Sequence[Mapping[str, Any]] = (),
     ) -> None:
-        """Set up everything but the directory."""
+        """Set up all but the directory."""
         self.scenario, simulation = scenario, scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
         self._store = store
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
-        # What the scenario's own script did, it does again.
+        # The scenario's own script repeats its interventions itself.
         outside = [dict(record) for record in interventions if is_from_outside(record)]
         self._state.interventions.repeat(outside)
         self._pace: Pace | None = None
         self._stopping = self._broken = False
-        self._run: Run | None = None  # once it is finished
+        self._run: Run | None = None  # set when it is finished
         describe_start(self._store.manifest, self.scenario, self.seed, self.clock, self.home.plan)
         store.manifest.interventions = outside
-        self._keeper: Keeper | None = None
+        self._keeper: CheckpointWriter | None = None
         if store.directory is not None:
             settings = scenario.artifacts
-            self._keeper = Keeper(store, settings, self.clock, self._checkpoint_header)
+            self._keeper = CheckpointWriter(store, settings, self.clock, self._checkpoint_header)
         self._setup_s = self._simulate_s = self._save_s = 0.0
-        self._began: float | None = None  # while it simulates
+        self._began: float | None = None  # set while it simulates
 
     @classmethod
     def reopened(
@@ -125,10 +125,10 @@ class Simulation(Judging):
         """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
 
         Args:
-            scenario: Of the run.
-            store: Of its directory, not opened.
-            ledger: What the run wrote there, locked.
-            checkpoint: Where to go on; None begins anew.
+            scenario: The scenario of the run.
+            store: The store of its directory, not opened.
+            ledger: The journal and checkpoint of the run, locked.
+            checkpoint: Where to continue; None: start from the first step.
 
         Raises:
             UnusableCheckpointError: The checkpoint can't be read; nothing is written then.
@@ -139,7 +139,7 @@ class Simulation(Judging):
         run._prepare(scenario, store)
         if checkpoint is None:
             store.reopen(ledger, None)
-            keep_plan(store, run.home)
+            store_plan(store, run.home)
             run._setup_s = time.perf_counter() - began
             return run
         state = checkpoint.read(run._constants)
@@ -153,21 +153,21 @@ class Simulation(Judging):
         return run
 
     def catch_up(self, interventions: Sequence[Mapping[str, Any]]) -> None:
-        """Let be done again what was done to the run after its checkpoint."""
-        known = self._state.interventions.records
+        """Repeat the interventions from outside after the checkpoint of the run."""
+        records = self._state.interventions.records
         outside = [record for record in interventions if is_from_outside(record)]
-        self._state.interventions.repeat([record for record in outside if record not in known])
+        self._state.interventions.repeat([record for record in outside if record not in records])
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        """Return a simulation that goes on by itself.
+        """Return an independent copy of the simulation.
 
         Raises:
             ArtifactError: The run is stored in a directory, which can't be in two states.
         """
         if self.directory is not None:
             raise ArtifactError(
-                f"a simulation that stores in {self.directory} can't be copied, for both would"
-                " write there: branch a simulation that stores in memory"
+                f"a simulation that stores in {self.directory} can't be copied, because both would"
+                " write there: copy a simulation that stores in memory"
             )
         twin = self.__class__.__new__(self.__class__)
         twin.__dict__.update(self.__dict__)
@@ -176,22 +176,22 @@ class Simulation(Judging):
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a file or another process needs to go on."""
+        """Return the content of a file that `load` reads."""
         file = io.BytesIO()
         self.save(file)
         return {"saved": file.getvalue()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Go on where another process left off."""
+        """Restore the simulation of another process."""
         self.__dict__.update(self.load(io.BytesIO(state["saved"])).__dict__)
 
     def save(self, path: str | Path | BinaryIO) -> None:
-        """Write the simulation to a file, to be gone on with by `load`.
+        """Write the simulation to a file that `load` reads.
 
         Raises:
-            ArtifactError: The run is stored in a directory, or a component keeps what can't be
-                written, such as an open file.
-            InputError: The run is finished, or broke off: there is nothing to go on with.
+            ArtifactError: The run is stored in a directory, or a component holds something that
+                can't be written, such as an open file.
+            InputError: The run is finished or has failed.
 
         Example:
             >>> import io
@@ -208,12 +208,12 @@ class Simulation(Judging):
                 f"the simulation stores in {self.directory}: set artifacts.checkpoint, and go on"
                 " by `fleet2d resume`"
             )
-        self._check_goes_on()
+        self._check_not_over()
         write_snapshot(path, self._state, self._constants, self._header())
 
     @classmethod
     def load(cls, path: str | Path | BinaryIO) -> Self:
-        """Return the simulation that `save` wrote, at the step where it was.
+        """Return the simulation that `save` wrote, at its step.
 
         Raises:
             ArtifactError: The file is damaged, or of another version of Fleet2D.
@@ -229,11 +229,11 @@ class Simulation(Judging):
         self._state, self._store = state, state.store
 
     def _header(self) -> dict[str, Any]:
-        under_way = 0.0 if self._began is None else time.perf_counter() - self._began
+        running_s = 0.0 if self._began is None else time.perf_counter() - self._began
         return {
             "scenario": self.scenario.resolved(),
             "seed": self.seed,
-            "wall_s": [self._setup_s, self._simulate_s + under_way, self._save_s],
+            "wall_s": [self._setup_s, self._simulate_s + running_s, self._save_s],
         }
 
     def _checkpoint_header(self) -> tuple[Constants, dict[str, Any]]:
@@ -241,7 +241,7 @@ class Simulation(Judging):
 
     @property
     def _constants(self) -> dict[str, object]:
-        """What never changes during the run, by name."""
+        """Objects that never change during the run, by name."""
         entities = {**self.scenario.users, **self.scenario.robots}
         constants: dict[str, object] = {f"entity {name}": e for name, e in entities.items()}
         constants |= {"clock": self.clock, "scenario": self.scenario, **self.home.constants}
@@ -252,17 +252,17 @@ class Simulation(Judging):
 
     @property
     def directory(self) -> Path | None:
-        """Where the run is stored; None in memory."""
+        """The run directory; None: the run is in memory."""
         return self._store.directory
 
     def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
         """Simulate to the end, store, and return the run.
 
         Args:
-            on_progress: Called now and then with the simulation.
+            on_progress: Called about every 0.1 s with the simulation.
 
         Raises:
-            KeyboardInterrupt: Ctrl-C; what was simulated until then is stored and readable.
+            KeyboardInterrupt: Ctrl-C; the run up to that step is stored and can be read.
         """
         try:
             self._run_to(self.clock.steps, on_progress)
@@ -283,7 +283,7 @@ class Simulation(Judging):
         began = time.perf_counter()
         if status == "interrupted" and self._keeper is not None:
             self._keeper.checkpoint(self._state)
-        # Where a component failed, asking the metrics could fail again, and lose what is stored.
+        # After a failure the metrics are not computed: they could fail, too, and lose the tables.
         results: dict[str, Any] = {}
         state = self._state
         with suppress(Exception) if status == "failed" else nullcontext():
@@ -292,7 +292,7 @@ class Simulation(Judging):
             state.count_looks()
             try:
                 results = state.learners.finish(self.step, state.log)
-                self._store.manifest.notes += self._state.learners.unheard()
+                self._store.manifest.notes += self._state.learners.idle_notes()
             except BaseException as error:
                 self._fail(error)
                 raise
@@ -302,7 +302,7 @@ class Simulation(Judging):
         state.recorder.end(self.step, len(state.actors))
         if status != "failed":
             self._state.layers.finish(self.step)
-            self._keep_learned()
+            self._store_learned()
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
         wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
@@ -313,8 +313,8 @@ class Simulation(Judging):
         self._run.plan = self.home.plan
         return self._run
 
-    def _keep_learned(self) -> None:
-        """Store what algorithms have learned; of one that can't be kept, the run says so."""
+    def _store_learned(self) -> None:
+        """Store what algorithms have learned; failures are noted in the manifest."""
         if self._store.directory is not None and self.scenario.artifacts.learned:
             notes = self._state.learners.remember(self._store.directory / LEARNED_NAME)
             self._store.manifest.notes += notes
@@ -325,12 +325,12 @@ class Simulation(Judging):
         on_progress: Callable[[Self], None] | None = None,
         spans: int | None = None,
     ) -> None:
-        self._check_goes_on()
-        began, stored = time.perf_counter(), self._state.recorder.wall_s
+        self._check_not_over()
+        began, save_s = time.perf_counter(), self._state.recorder.wall_s
         self._began = began
         self._set_pace()
         with ExitStack() as stack:
-            if end - self.step >= SHORT:  # fewer are over before anybody could press Ctrl-C
+            if end - self.step >= SHORT:  # fewer end before a user could press Ctrl-C
                 stack.enter_context(rare_collections())
                 stack.enter_context(deferred_interrupt(self._stop))
             try:
@@ -339,19 +339,19 @@ class Simulation(Judging):
                 self._broken = True
                 raise
             finally:
-                stored = self._state.recorder.wall_s - stored
-                self._simulate_s += time.perf_counter() - began - stored
-                self._save_s += stored
+                save_s = self._state.recorder.wall_s - save_s
+                self._simulate_s += time.perf_counter() - began - save_s
+                self._save_s += save_s
                 self._began = None
         if self._stopping:
             self._stopping = False
             raise KeyboardInterrupt
 
-    def _check_goes_on(self) -> None:
+    def _check_not_over(self) -> None:
         if self._run is not None:
-            raise InputError("the run is finished: set up a new Simulation to go on")
+            raise InputError("the run is finished: set up a new Simulation")
         if self._broken:
-            raise InputError("the run broke off in the middle of a span and can't go on")
+            raise InputError("the run failed in the middle of a span and can't be continued")
 
     def _spans(
         self, end: int, on_progress: Callable[[Self], None] | None, spans: int | None
@@ -378,13 +378,13 @@ class Simulation(Judging):
             self._pace.resume(self.step * self.clock.step_us / 1e6)
 
     def _stop(self) -> None:
-        """Let the run end after the present span, where everything stored fits together."""
+        """End the run after the present span, so that all tables end at the same step."""
         self._stopping = True
 
     def _fail(self, error: BaseException) -> None:
-        """Leave what was stored before the failure readable; the first error is reported."""
-        why = str(error) or type(error).__name__
-        self._store.manifest.notes.append(f"failed at step {self.step}: {why}")
+        """Close the run as failed, so that it can be read up to the failure."""
+        reason = str(error) or type(error).__name__
+        self._store.manifest.notes.append(f"failed at step {self.step}: {reason}")
         with suppress(Exception):
             self.finish("failed")
         if self.directory is not None and self._run is not None:

@@ -1,8 +1,8 @@
-"""Snapshots: copying the state of a run in memory, and writing it to a file, by one mechanism.
+"""Snapshots: copies of the state of a run in memory and in files, by one mechanism.
 
-A state refers to what never changes in a run: its scenario, floor plan, clock. A snapshot names
-these constants instead of holding them. A copy shares them; a file is read with the constants of a
-run that was set up from the same scenario.
+A state refers to constants of the run: its scenario, floor plan, clock. A snapshot contains only
+their names. A copy shares the constants; a file is read with those of a run that was set up from
+the same scenario.
 """
 
 import hashlib
@@ -32,13 +32,13 @@ from fleet2d.version import __version__
 
 _HASH = type(hashlib.sha256())
 
-# What never changes once it is made: copies in one process share it.
+# Types of objects that never change: copies in one process share them.
 _SHARED = frozenset(
     {CostedSpace, FloorPlan, FunctionType, Mesh, Persona, Space, Track, Walk, ColumnChunk}
 )
 
-# What a file may refer to besides classes of Fleet2D and of the scenario's own modules.
-_KNOWN = {
+# Names that a file may refer to besides classes of Fleet2D and of the scenario's own modules.
+_ALLOWED = {
     "builtins": {
         "bool",
         "bytearray",
@@ -64,10 +64,10 @@ _KNOWN = {
     "pathlib": {"Path", "PosixPath", "PurePosixPath", "PureWindowsPath", "WindowsPath"},
 }
 
-# Functions of our own that make values from plain ones.
-_MAKERS = frozenset({"object_array", "plain_array", "plain_scalar", "plain_type"})
+# Functions of Fleet2D that a file may call: they create plain values.
+_CONSTRUCTORS = frozenset({"object_array", "plain_array", "plain_scalar", "plain_type"})
 
-# Packages of which no class is part of a state: to make one would read, write or run something.
+# Packages without classes of states: their objects could read, write or run something.
 _NO_STATE = (
     "fleet2d.artifacts.arrow",
     "fleet2d.artifacts.journal",
@@ -103,7 +103,7 @@ Constants = Mapping[str, object]
 
 
 def copy_state(state: State, constants: Constants) -> State:
-    """Return a state that goes on by itself, and shares only what never changes."""
+    """Return an independent copy of a state, which shares only objects that never change."""
     shared: list[object] = []
     buffer = io.BytesIO()
     _Writer(buffer, constants, shared).dump(state)
@@ -115,13 +115,14 @@ def write_state(state: State, constants: Constants, file: BinaryIO) -> None:
     """Write a state to a file.
 
     Raises:
-        ArtifactError: A component of the user keeps what can't be written, such as an open file.
+        ArtifactError: A component of the user holds something that can't be written, such as an
+            open file.
     """
     try:
         _Writer(file, constants, None).dump(state)
     except ArtifactError:
         raise
-    except Exception as error:  # a component's own way to be pickled raises almost anything
+    except Exception as error:  # a component's own pickling may raise anything
         raise ArtifactError(f"the state of the run can't be written: {error}") from error
 
 
@@ -129,20 +130,20 @@ def read_state(file: BinaryIO, constants: Constants) -> State:
     """Read a state from a file, for a run that was set up from the same scenario.
 
     Raises:
-        ArtifactError: The file holds something else, or is damaged.
+        ArtifactError: The file contains something else, or is damaged.
     """
     try:
         return _Reader(file, constants, None).state()
     except ArtifactError:
         raise
-    except Exception as error:  # a damaged pickle raises almost anything
+    except Exception as error:  # a damaged pickle may raise anything
         raise ArtifactError(f"the file holds no state of a run: {error}") from error
 
 
 def write_snapshot(
     path: str | Path | BinaryIO, state: State, constants: Constants, header: Mapping[str, Any]
 ) -> None:
-    """Write a state behind a header that says which run it is of.
+    """Write a state after a header that describes the run.
 
     Raises:
         ArtifactError: The state, or the file, can't be written.
@@ -164,7 +165,7 @@ def write_snapshot(
 
 
 def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO]:
-    """Return the header of a snapshot, and the state behind it for `read_state`.
+    """Return the header of a snapshot, and the state after it for `read_state`.
 
     Raises:
         ArtifactError: It is no snapshot, is damaged, or is of another version of Fleet2D.
@@ -194,7 +195,7 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
 
 
 class _Writer(pickle.Pickler):
-    """Names constants, and collects what is shared."""
+    """Replaces constants by their names, and collects shared objects."""
 
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
@@ -209,7 +210,7 @@ class _Writer(pickle.Pickler):
         if name is not None:
             return name
         kind = type(obj)
-        if kind is _HASH:  # of a table: in a file it is made anew from the rows
+        if kind is _HASH:  # of a table: when a file is read it is computed again from the rows
             if self._shared is None:
                 return ("sha256",)
             obj = obj.copy()
@@ -223,7 +224,7 @@ class _Writer(pickle.Pickler):
         return len(self._shared) - 1
 
     def _check_reference(self, obj: Any) -> None:
-        """Refuse now what the reader would refuse."""
+        """Refuse a name that the reader would refuse."""
         module, name = obj.__module__ or "builtins", obj.__qualname__
         if not may_refer(module, name, self._packages) and obj is not type(None):
             raise ArtifactError(
@@ -232,7 +233,7 @@ class _Writer(pickle.Pickler):
 
 
 class _Reader(pickle.Unpickler):
-    """Finds constants by name; makes nothing but plain values, and objects of known classes."""
+    """Looks constants up by name; creates only plain values, and objects of allowed classes."""
 
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
         super().__init__(file)
@@ -258,33 +259,36 @@ class _Reader(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         if self._shared is not None:
             return super().find_class(module, name)
-        if not is_scenario_module(module):  # maybe one here, or one of a folder elsewhere
+        if not is_scenario_module(module):  # it may be one under another name in this process
             top, dot, rest = public_name(module).partition(".")
             module = self._packages.get(top, top) + dot + rest
         if not may_refer(module, name, self._packages):
             raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
-        found = super().find_class(module, name)
-        known = name in _KNOWN.get(module, ()) or module == arrays.__name__
-        # A module's own class, not one that it imports: that might be anything.
-        own = isinstance(found, type) and (found.__module__, found.__qualname__) == (module, name)
-        if not known and not own:
+        value = super().find_class(module, name)
+        is_allowed = name in _ALLOWED.get(module, ()) or module == arrays.__name__
+        # Only a class that the module defines: a class that it imports could be any.
+        is_own = isinstance(value, type) and (value.__module__, value.__qualname__) == (
+            module,
+            name,
+        )
+        if not is_allowed and not is_own:
             raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
-        return found
+        return value
 
 
 def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
-    """Whether a file of a state may refer to something by this name.
+    """Whether the file of a state may refer to a name.
 
     Args:
-        module: Where it is.
-        name: What it is called there.
-        packages: Those of the scenario's own components.
+        module: The module of the name.
+        name: The qualified name in that module.
+        packages: The packages of the scenario's own components.
 
     Example:
         >>> may_refer("fleet2d.engine.state", "State"), may_refer("os", "system")
         (True, False)
     """
-    if name in _KNOWN.get(module, ()) or (module == arrays.__name__ and name in _MAKERS):
+    if name in _ALLOWED.get(module, ()) or (module == arrays.__name__ and name in _CONSTRUCTORS):
         return True
     if f"{module}.".startswith(tuple(f"{package}." for package in _NO_STATE)):
         return False
@@ -296,8 +300,8 @@ def _packages_of(constants: Constants) -> dict[str, str]:
     """Return the packages outside Fleet2D that a scenario's components come from.
 
     Returns:
-        The name of each as users know it, and what it is called in this process: a module that
-        was imported here may be imported from the scenario's folder elsewhere.
+        The name of each in this process by its public name: in one process it may be installed, in
+        another it may come from the folder of the scenario.
     """
     scenario = constants.get("scenario")
     if not isinstance(scenario, Scenario):

@@ -1,4 +1,4 @@
-"""The state of a run: all that changes from step to step, and nothing else."""
+"""The state of a run: all that changes from step to step."""
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ from fleet2d.kernels.look import STEP as STEP_COLUMN
 if TYPE_CHECKING:
     from fleet2d.engine.expecting import Expecting
 
-# The most steps that watchers take in together: the fewer, the more bodies there are.
+# The most steps that watchers take in together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16
 LEAST_STEPS = 1 << 12
 MOST_POSES = 1 << 21
@@ -42,31 +42,31 @@ MOST_POSES = 1 << 21
 
 @dataclass
 class State:
-    """What a run is at a step.
+    """The state of a run at a step.
 
     Attributes:
-        bodies: Where all bodies are, how they go on, and when they decide; users, then robots.
-        actors: What their decisions carry: behaviors, plans, batteries; in the order of bodies.
-        home: The home as it is at present: doors, furniture, rooms, layers.
-        changes: What changes in the home, and when.
-        watchers: What follows the bodies, in the order in which it is asked.
-        clearance, blocking, encounters, sensors: Those of them by name.
+        bodies: The poses of bodies, their motion, and their next decisions; users, then robots.
+        actors: Behaviors, plans and batteries of the same bodies.
+        home: The present home: doors, furniture, rooms, layers.
+        changes: The changes of the home.
+        watchers: All followers of the bodies, in their order.
+        clearance, blocking, encounters, sensors: Some of the watchers.
         gazes, cameras: The cameras of users, and those of robots.
-        layers: What robots have seen of the home, and when it is stored.
-        learners: Algorithms and metrics, what they have learned and put out.
-        log: What learners may ask for; None where there are no learners.
+        layers: What robots have seen of the home, and when layers are stored.
+        learners: Algorithms and metrics, what they have learned, and their outputs.
+        log: The data that learners may read; None if there are no learners.
         recorder: Rows that aren't stored yet.
         store: The tables of the run.
-        events: What happened, for all who take it.
-        max_span: The most steps of a span; None for as many as there is room for.
-        settled: The step before which all watchers have taken everything in.
+        events: The stream of events to all sinks.
+        max_span: The most steps of a span; None: `capacity`.
+        settled: The step before which all watchers have taken in all steps.
         pending: Events that interrupted the plan of a body, by its row, until it decides.
-        interventions: What is done to the run from outside, and what was.
+        interventions: The interventions, done and scheduled.
         driven: Rows of the bodies that are driven from outside.
-        wanted: Kinds of events at which somebody outside wants the span to end.
+        requested: Kinds of events at which a caller wants the span to end.
         awaited: Those, and the kinds that interventions wait for.
-        expecting: What is expected of the run; None if nothing is.
-        notes_emitted: How many of the notes of each body's present plan have happened.
+        expecting: The expectations of the run; None if there are none.
+        notes_emitted: Number of notes of each body's present plan that have happened.
     """
 
     bodies: Bodies
@@ -91,7 +91,7 @@ class State:
     settled: int = 0
     pending: dict[int, list[SightEvent]] = field(default_factory=dict)
     driven: set[int] = field(default_factory=set)
-    wanted: frozenset[str] = frozenset()
+    requested: frozenset[str] = frozenset()
     awaited: frozenset[str] = frozenset()
     expecting: "Expecting | None" = None
     notes_emitted: list[int] = field(init=False)
@@ -117,8 +117,8 @@ class State:
     # Decisions of scripts
 
     def wait_for(self, kinds: frozenset[str]) -> None:
-        """Let spans end at events of these kinds, besides those that others wait for."""
-        self.wanted, self.awaited = kinds, kinds | self.interventions.kinds
+        """Let spans end at events of these kinds, besides those that components wait for."""
+        self.requested, self.awaited = kinds, kinds | self.interventions.kinds
         awaited = self.awaited | self.learners.awaited
         for cameras in [*self.gazes, *self.cameras]:
             cameras.awaited = awaited
@@ -131,13 +131,13 @@ class State:
         return tuple(self.pending.pop(row, ()))
 
     def end_plan(self, row: int, step: int) -> None:
-        """Record what happened on the plan of a body up to the step at which it is replaced."""
+        """Record the plan of a body up to the step at which it is replaced."""
         self.emit_notes(row, step)
         self.recorder.before_plan(row, step)
         self.encounters.before_plan(row, self.actors[row], step)
 
     def begin_plan(self, row: int, step: int) -> None:
-        """Record how the new plan of a body begins."""
+        """Record the begin of the new plan of a body."""
         self.notes_emitted[row] = 0
         self.emit_notes(row, step)
         self.recorder.after_plan(row, step)
@@ -145,7 +145,7 @@ class State:
             self.expecting.begin_plan(self.actors[row])
 
     def emit_notes(self, row: int, step: int) -> None:
-        """Emit what the plan of a body notes up to a step."""
+        """Emit the notes of a body's plan up to a step as events."""
         actor = self.actors[row]
         notes, begin = actor.plan.notes, self.notes_emitted[row]
         moment, end = step * actor.clock.step_us, begin
@@ -153,28 +153,28 @@ class State:
             end += 1
         if end > begin:
             self.notes_emitted[row] = end
-            at = actor.clock.step_at_or_after
+            step_of = actor.clock.step_at_or_after
             self.events.emit(
-                [Event(at(n.time_us), actor.name, n.event, n.detail) for n in notes[begin:end]]
+                [Event(step_of(n.time_us), actor.name, n.event, n.detail) for n in notes[begin:end]]
             )
 
     def next_note(self, step: int, kinds: Set[str]) -> int | None:
-        """Return the next step from `step` on at which a plan notes an event of these kinds."""
+        """Return the next step from `step` on at which a plan has an event of these kinds."""
         steps = [
             actor.clock.step_at_or_after(note.time_us)
             for actor, begin in zip(self.actors, self.notes_emitted, strict=True)
             for note in actor.plan.notes[begin:]
             if note.event in kinds
         ]
-        known = None if self.log is None else self.log.next_event(step, kinds)
-        if known is not None:
-            steps.append(known)
+        logged = None if self.log is None else self.log.next_event(step, kinds)
+        if logged is not None:
+            steps.append(logged)
         return min((s for s in steps if s >= step), default=None)
 
     # Watching
 
     def take(self, watcher: Watcher, end: int) -> Sequence[Event]:
-        """Let a watcher take in the steps up to `end` - 1; return what happened."""
+        """Let a watcher take in the steps up to `end` - 1; return its events."""
         if watcher.taken >= end:
             return ()
         events = watcher.take(self.bodies, end)
@@ -182,7 +182,7 @@ class State:
         return events
 
     def interrupt(self, watcher: Watcher, events: Sequence[Event]) -> None:
-        """Let bodies decide at the present step whose plans an event of a watcher ends."""
+        """Let bodies decide at the present step if an event of a watcher ends their plans."""
         for row, event in watcher.interruptions(events):
             self.pending.setdefault(row, []).append(event)
             self.bodies.ask_at[row] = self.bodies.step
@@ -210,43 +210,43 @@ class State:
             self.bodies.forget(end)
 
     def count_looks(self) -> None:
-        """Keep for metrics what the cameras have counted up to the present step."""
+        """Add the counts of the cameras up to the present step to the log, for metrics."""
         if self.log is not None:
             self.log.count_looks(self.settled, [cameras.counts for cameras in self.cameras])
             self.layers.expose(self.settled, self.log)
 
     def forget(self, before: int) -> None:
-        """Drop what learners may no longer ask for."""
+        """Drop the data before a step, which no learner can read any more."""
         if self.log is not None:
             self.log.forget(before)
         self.bodies.forget(min(before, self.settled))
 
     def _observations(self) -> NDArray[np.int64]:
-        """Join what all robots perceived, in order of step and robot."""
+        """Return the sightings of all robots, in order of step and robot."""
         blocks = [cameras.collect() for cameras in self.cameras]
         for gaze in self.gazes:
             gaze.collect()
         ends = np.cumsum([0, *map(len, blocks)])
         rows = np.empty((ends[-1], OBSERVATION), np.int64)
-        place: Any = slice(None)  # of each sighting among the rows
+        index: Any = slice(None)  # of each sighting among the rows
         if len(blocks) > 1:
             steps = np.concatenate([block[:, STEP_COLUMN] for block in blocks])
-            place = np.empty(len(rows), np.int64)
-            place[np.argsort(steps, kind="stable")] = np.arange(len(rows))
+            index = np.empty(len(rows), np.int64)
+            index[np.argsort(steps, kind="stable")] = np.arange(len(rows))
         for cameras, block, (begin, end) in zip(self.cameras, blocks, pairwise(ends), strict=True):
-            here = place[begin:end] if len(blocks) > 1 else place
-            rows[here, :SIGHTING], rows[here, ROBOT] = block, cameras.index
+            part = index[begin:end] if len(blocks) > 1 else index
+            rows[part, :SIGHTING], rows[part, ROBOT] = block, cameras.index
         return rows
 
 
 @dataclass(frozen=True)
 class InView:
-    """Whom the cameras of a body have in view at present, for its behaviors."""
+    """The bodies that the cameras of a body have in view at present, for its behaviors."""
 
     state: State
     cameras: Cameras
 
     def __call__(self) -> dict[str, tuple[float, float]]:
-        """Return where each was perceived last [m], by name; somebody unknown is ""."""
+        """Return the last perceived place of each [m], by name; "" for somebody unknown."""
         self.state.take(self.cameras, self.state.bodies.step)
         return self.cameras.in_view

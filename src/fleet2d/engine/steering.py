@@ -1,4 +1,4 @@
-"""Steering a simulation: looking at its state, stepping it, and doing things to it from outside."""
+"""Control of a simulation from outside: its state, its steps, and interventions."""
 
 import operator
 from abc import abstractmethod
@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.clock import Clock, next_time
-from fleet2d.engine.script import take_up
+from fleet2d.engine.script import schedule
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.decisions import DecidingActor
@@ -25,17 +25,17 @@ from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.script import WHEN, parse_entry
 from fleet2d.interventions.verbs import Verbs
 from fleet2d.kernels.headings import in_radians
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 from fleet2d.units import parse_duration
 
 
 class Steering(Verbs):
-    """What scripts, tests and outside minds may see of a simulation, and do to it.
+    """The part of a simulation that scripts, tests and external controllers read and control.
 
     Attributes:
-        scenario: What is simulated.
+        scenario: The scenario.
         clock: Its steps.
     """
 
@@ -48,13 +48,13 @@ class Steering(Verbs):
     def _run_to(
         self, end: int, on_progress: Callable[[Any], None] | None = None, spans: int | None = None
     ) -> None:
-        """Simulate up to a step, or so many spans."""
+        """Simulate up to a step, or a number of spans."""
 
     # State
 
     @property
     def step(self) -> int:
-        """The next step to simulate; 0 at first."""
+        """The next step to simulate; 0 at the start."""
         return self._state.bodies.step
 
     @property
@@ -74,9 +74,9 @@ class Steering(Verbs):
 
     @property
     def state(self) -> dict[str, dict[str, Any]]:
-        """Where everybody is at the next step: x, y [m], heading [rad], room, away.
+        """The state at the next step by name, of bodies: x, y [m], heading [rad], room, away.
 
-        And of doors whether they are open and locked, of sensors whether they are on.
+        Of doors it is whether they are open and locked, of sensors whether they are on.
         """
         bodies = {actor.name: self._state_of(actor) for actor in self._state.actors}
         doors = {
@@ -89,12 +89,12 @@ class Steering(Verbs):
 
     @property
     def actors(self) -> dict[str, DecidingActor]:
-        """Everybody in the run, by name: configuration, behaviors and plan."""
+        """All people and robots, by name: configuration, behaviors and plan."""
         return {actor.name: actor for actor in self._state.actors}
 
     @property
     def outputs(self) -> dict[str, Any]:
-        """The newest output of each algorithm, by name, as behaviors read it."""
+        """The latest output of each algorithm, by name, as behaviors read it."""
         return dict(self._state.learners.readable)
 
     @property
@@ -109,16 +109,15 @@ class Steering(Verbs):
     # Running
 
     def advance(self, steps: int | Mapping[str, Plan] = 1) -> None:
-        """Simulate so many steps, or up to the end of the run; or take decisions from outside.
+        """Simulate a number of steps, up to the end of the run; or apply decisions from outside.
 
         Args:
-            steps: How many; or a plan for each body that is `pending`, from `plan`: then the run
-                goes on up to the next step at which a body that is driven has to decide.
+            steps: The number; or a plan from `plan` for each body that is `pending`: then the run
+                continues up to the next step at which a driven body has to decide.
 
         Raises:
-            InputError: The number is negative, the run is finished, or a body that is driven has
-                no plan.
-            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
+            InputError: The number is negative, the run is finished, or a driven body has no plan.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can be continued.
 
         Example:
             >>> import fleet2d
@@ -146,21 +145,21 @@ class Steering(Verbs):
         entity: str | None = None,
         timeout: str | timedelta | None = None,
     ) -> Event | None:
-        """Simulate up to a step, a local time or an event; the step after is next then.
+        """Simulate up to a step, a local time or an event.
 
         Args:
-            when: A step, a local time, a time since the start, or a time of day ("19:00": the next
-                time that it is).
-            event: A kind of event, as the table of events has it, instead.
+            when: A step, a local time, a time since the start, or the next time of day ("19:00").
+            event: A kind of event instead, as in the table of events; the next step is the one
+                after it.
             entity: The body or object that it has to happen to; None: any.
-            timeout: How long to wait for the event at most; None: up to the end of the run.
+            timeout: The longest time to wait for the event; None: up to the end of the run.
 
         Returns:
-            The event, or None if there was none, or none was waited for.
+            The event; None if it didn't happen, or `when` is given.
 
         Raises:
             InputError: The time is past, the run is finished, or there is no such event or body.
-            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can go on.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can be continued.
 
         Example:
             >>> import fleet2d
@@ -197,8 +196,8 @@ class Steering(Verbs):
         self, event: str, entity: str | None, timeout: str | timedelta | None
     ) -> Event | None:
         state, end = self._state, self.clock.steps
-        known = {*EventKind, *(n for a in state.actors for b in a.behaviors for n in b.records)}
-        _check_name("event", event, known)
+        kinds = {*EventKind, *(n for a in state.actors for b in a.behaviors for n in b.records)}
+        _check_name("event", event, kinds)
         if entity is not None:
             _check_name("entity", entity, [*self.actors, *self.scenario.objects])
         if timeout is not None:
@@ -209,45 +208,45 @@ class Steering(Verbs):
         state.wait_for(frozenset({event}))
         try:
             while self.step < end:
-                before = self.step
+                start = self.step
                 self._run_to(end, spans=1)
-                for found in state.events.since(before):
-                    if found.event == event and entity in (None, found.entity):
-                        return found
+                for candidate in state.events.since(start):
+                    if candidate.event == event and entity in (None, candidate.entity):
+                        return candidate
         finally:
             state.wait_for(frozenset())
         return None
 
     def events(self, since: int = 0) -> list[Event]:
-        """Return what happened from a step on, up to the present one, in order.
+        """Return the events from a step on, up to the present one, in order.
 
         Raises:
-            InputError: Events of that step are no longer kept: read the table `events`.
+            InputError: Too many events have happened since: read the table `events`.
         """
         self._state.settle(self.step)
         return self._state.events.since(since)
 
     @property
     def interventions(self) -> list[dict[str, Any]]:
-        """What was done to the run so far, by its script or from outside, as in a manifest."""
+        """The interventions so far, of the script and from outside, as in a manifest."""
         return list(self._state.interventions.done)
 
     def listen(self, function: Callable[[Sequence[Event]], None]) -> None:
-        """Call a function with what happens, as it becomes known: not always in order of step."""
+        """Call a function with new events as they become known: not always in order of step."""
         self._state.events.sinks.append(Listener(function))
 
-    # Interventions: each is kept in the manifest, and done again by `reproduce`.
+    # Interventions: each is recorded in the manifest, and repeated by `reproduce`.
 
     def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
-        """Do something at the present step, or later: an intervention, or an entry of a script.
+        """Apply an intervention at the present step, or later.
 
         Args:
-            act: The intervention, or a mapping as a scenario's `script` has it; with `at` or `on`,
-                it is done then.
+            act: The intervention, or a mapping as in a scenario's `script`, which may say when by
+                `at` or `on`.
 
         Raises:
-            ScenarioError: It is none, there is nothing of that name, or it can never happen.
-            PlacementError: There is no such place, or nobody gets there.
+            ScenarioError: It is not valid, names something unknown, or can never happen.
+            PlacementError: There is no such place, or it can't be reached.
             InputError: The run is finished.
 
         Example:
@@ -265,34 +264,34 @@ class Steering(Verbs):
         if self._run is not None:
             raise InputError("the run is finished: nothing can be done to it any more")
         if isinstance(act, Mapping) and not act.keys().isdisjoint(WHEN):
-            take_up(self._state, parse_entry(act), self.step)
+            schedule(self._state, parse_entry(act), self.step)
             return
         if isinstance(act, Mapping):
             act = parse_intervention(act)
         act.check(EngineWorld(self._state, self.step))
         self._state.interventions.add(act, self.step)
 
-    def change(self, change: HomeChange | None = None, /, **what: Any) -> None:
+    def change(self, change: HomeChange | None = None, /, **keys: Any) -> None:
         """Change the home at the present step: ``simulation.change(shut="bath_door")``.
 
         Args:
             change: The change; or
-            what: its keys, as in the scenario's `changes`.
+            keys: its keys, as in the scenario's `changes`.
 
         Raises:
-            ScenarioError: The keys are no change, or there is nothing of that name.
+            ScenarioError: The keys are no change, or name something unknown.
         """
         try:
-            asked = HomeChange(**what) if change is None else change
+            change = HomeChange(**keys) if change is None else change
         except ValidationError as error:
             raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
-        self.intervene(Change(change=asked))
+        self.intervene(Change(change=change))
 
     def drive(self, name: str) -> None:
-        """Take the decisions of a body into one's own hands: see `pending` and `advance`.
+        """Take over the decisions of a body: see `pending` and `advance`.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such body.
         """
         row = list(self.actors).index(self._body(name).name)
         self.intervene(Drive(entity=name))
@@ -300,7 +299,7 @@ class Steering(Verbs):
         self._state.bodies.ask_at[row] = self.step
 
     def pending(self) -> list[str]:
-        """Return the bodies that are driven, and have to decide at the present step."""
+        """Return the driven bodies that have to decide at the present step."""
         state = self._state
         if self.done:
             return []
@@ -308,18 +307,18 @@ class Steering(Verbs):
         return [state.actors[row].name for row in sorted(due & state.driven)]
 
     def plan(self, name: str) -> Plan:
-        """Return a plan that begins here and now, to be filled and handed to `advance`.
+        """Return an empty plan from the body's present pose, to be filled and passed to `advance`.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such body.
         """
         return Plan(self._body(name), self.step)
 
     def decide(self, name: str, plan: Plan) -> None:
-        """Let a driven body follow a plan from the present step on; time does not go on.
+        """Let a driven body follow a plan from the present step on, without simulating a step.
 
         Raises:
-            ScenarioError: There is nobody of that name.
+            ScenarioError: There is no such body.
             InputError: The body isn't driven.
         """
         row = list(self.actors).index(self._body(name).name)
@@ -329,11 +328,9 @@ class Steering(Verbs):
 
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""
-        missing = [name for name in self.pending() if name not in plans]
-        if missing:
-            raise InputError(
-                f"advance(): {missing[0]} has to decide now, and there is no plan for it"
-            )
+        for name in self.pending():
+            if name not in plans:
+                raise InputError(f"advance(): {name} has to decide now, and has no plan")
         for name, plan in plans.items():
             self.decide(name, plan)
         while not self.done:
@@ -344,10 +341,7 @@ class Steering(Verbs):
     def _body(self, name: str) -> DecidingActor:
         actors = self.actors
         if name not in actors:
-            raise ScenarioError(
-                f"there is nobody named {name!r}{did_you_mean(name, actors)}"
-                f" There are: {', '.join(actors)}"
-            )
+            raise ScenarioError(f"there is nobody named {name!r}{suggest(name, actors)}")
         return actors[name]
 
     def _state_of(self, actor: DecidingActor) -> dict[str, Any]:
@@ -363,11 +357,8 @@ class Steering(Verbs):
         }
 
 
-def _check_name(what: str, name: str, known: Iterable[str]) -> None:
-    """Refuse a name that there isn't."""
+def _check_name(noun: str, name: str, known: Iterable[str]) -> None:
+    """Refuse an unknown name."""
     names = list(known)
     if name not in names:
-        raise InputError(
-            f"there is no {what} {name!r}{did_you_mean(name, names)} There are:"
-            f" {', '.join(map(str, names))}"
-        )
+        raise InputError(f"there is no {noun} {name!r}{suggest(name, names)}")

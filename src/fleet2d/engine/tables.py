@@ -1,4 +1,4 @@
-"""The tables of a run: what columns each has."""
+"""The tables of a run and their columns."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -43,26 +43,26 @@ def table_specs(
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=tuple(users))
-        seen = (user,) if users else ()
+        user_columns = (user,) if users else ()
         entities = entity
         if changes:
-            what = "what did it, or what it happened to; none: the home itself"
+            text = "what did it, or what it happened to; none: the home itself"
             names = (*users, *robots, *objects)
             entities = Column(
-                "entity", "category", categories=names, nullable=True, description=what
+                "entity", "category", categories=names, nullable=True, description=text
             )
-        specs.append(TableSpec("events", (STEP, TIME, entities, event, *seen, detail)))
+        specs.append(TableSpec("events", (STEP, TIME, entities, event, *user_columns, detail)))
     return specs
 
 
 def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
-    """Return the names of all cameras if a run has to tell them apart, or from the truth.
+    """Return the names of all cameras if the table of observations has to name them.
 
-    It does where a robot has several, or errs.
+    It does if a robot has several cameras, or cameras that err.
     """
-    if not any(those.errs or len(those.names) > 1 for those in cameras):
+    if not any(group.errs or len(group.names) > 1 for group in cameras):
         return ()
-    return tuple(dict.fromkeys(name for those in cameras for name in those.names))
+    return tuple(dict.fromkeys(name for group in cameras for name in group.names))
 
 
 def _observation_table(
@@ -72,7 +72,7 @@ def _observation_table(
     cameras: Sequence[str],
     activities: bool,
 ) -> TableSpec:
-    """Return the table of what was perceived; where that can be wrong, with the truth beside it."""
+    """Return the table of what was perceived, with the truth if that can differ."""
     robot = Column("robot", "category", categories=tuple(robots))
     user = Column("user", "category", nullable=bool(cameras), categories=tuple(users))
     columns = [STEP, TIME, robot, user, X, Y, room]
@@ -85,15 +85,15 @@ def _observation_table(
         camera = Column("camera", "category", categories=tuple(cameras))
         columns += [HEADING, posture, camera, *true.values()]
     if activities:
-        doing = "what the user does, as far as a behavior tells"
+        text = "what the user does, if a behavior says so"
         for name in ("activity", "true_activity"):
-            columns.append(Column(name, "category", nullable=True, description=doing))
+            columns.append(Column(name, "category", nullable=True, description=text))
     return TableSpec("observations", tuple(columns))
 
 
 def sensor_table(sensors: Sensors) -> TableSpec:
-    """Return the table of what sensors say, in the layout of the CASAS smart homes."""
+    """Return the table of the readings of sensors, in the layout of the CASAS smart homes."""
     sensor = Column("sensor", "category", categories=tuple(sensors.names))
     room, state = Column("room", "category"), Column("state", "category")
-    activity = Column("activity", "string", description="what the person does, as far as told")
+    activity = Column("activity", "string", description="what the person does, if known")
     return TableSpec("sensors", (STEP, TIME, room, sensor, state, activity))

@@ -1,4 +1,4 @@
-"""Who is in view by a method that is not compiled into the look: asked, and nothing twice."""
+"""Points in view by a method of sight that is written in Python, each computed only once."""
 
 import math
 
@@ -15,7 +15,7 @@ from fleet2d.kernels.points import BODY, BODY_X, BODY_Y, EYE_HEADING, questions
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.fov import FieldOfView
 
-# A method may round points to cells: it is asked about those so far beside the field of view, too.
+# Methods may round points to cells, so points this far outside the field of view are checked, too.
 SLACK = 2 * SUB
 
 
@@ -31,54 +31,54 @@ def points_seen(
     """Return which points of each body are in view of each camera at each step.
 
     Args:
-        method: What tells whether a point is in view.
+        method: The method of sight.
         home: The home.
         lenses: The cameras.
-        robot: The poses of whoever has them, n of them.
-        crowd: The others.
+        robot: The n poses of the owner of the cameras.
+        crowd: The other bodies.
         first: The step of the first pose.
-        step_us: Length of a step.
+        step_us: Length of a step [us].
 
     Returns:
         uint64 (cameras, bodies, n), bit i for point i.
 
     Raises:
-        ComponentError: The method answers with something else than a bool for each point.
+        ComponentError: The method doesn't return a bool for each point.
     """
     widest = np.array(
         [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
         np.int64,
     ).reshape(lenses.widest.shape)
-    asked, number = questions(
+    queries, number = questions(
         lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
     )
-    answers = np.zeros(len(asked) + 1, np.uint64)
-    moved = asked[1:, : EYE_HEADING + 1] != asked[:-1, : EYE_HEADING + 1]
-    moved[:, BODY] = False
-    begins = [0, *(np.flatnonzero(moved.any(axis=1)) + 1).tolist()] if len(asked) else []
-    for begin, end in zip(begins, [*begins[1:], len(asked)], strict=False):
-        answers[begin + 1 : end + 1] = _answers(method, home, lenses, asked[begin:end])
+    answers = np.zeros(len(queries) + 1, np.uint64)
+    has_moved = queries[1:, : EYE_HEADING + 1] != queries[:-1, : EYE_HEADING + 1]
+    has_moved[:, BODY] = False
+    begins = [0, *(np.flatnonzero(has_moved.any(axis=1)) + 1).tolist()] if len(queries) else []
+    for begin, end in zip(begins, [*begins[1:], len(queries)], strict=False):
+        answers[begin + 1 : end + 1] = _answers(method, home, lenses, queries[begin:end])
     return answers[number]
 
 
 def _answers(
-    method: FieldOfView, home: Home, lenses: Lenses, asked: NDArray[np.int64]
+    method: FieldOfView, home: Home, lenses: Lenses, queries: NDArray[np.int64]
 ) -> NDArray[np.uint64]:
     """Return which points of each body are in view, for one pose of one camera."""
-    camera, _, x, y, heading = asked[0, : EYE_HEADING + 1].tolist()
+    camera, _, x, y, heading = queries[0, : EYE_HEADING + 1].tolist()
     reach = Reach(
         int(lenses.near_squared[camera]),
         int(lenses.far_squared[camera]),
         int(lenses.half_angle[camera]),
     )
-    bodies = lenses.bodies[camera, asked[:, BODY], : int(lenses.points[camera]) + 1]
-    points = (bodies + asked[:, None, [BODY_X, BODY_Y]]).reshape(-1, 2)
-    found: object = method.sees(home, x, y, heading, reach, points)  # a user's own may err
-    if not isinstance(found, np.ndarray) or found.dtype != bool or found.shape != (len(points),):
+    bodies = lenses.bodies[camera, queries[:, BODY], : int(lenses.points[camera]) + 1]
+    points = (bodies + queries[:, None, [BODY_X, BODY_Y]]).reshape(-1, 2)
+    flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
+    if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
         raise ComponentError(
-            f"{type(method).__name__} answered {found!r} for {len(points)} points: an array with a"
+            f"{type(method).__name__} answered {flags!r} for {len(points)} points: an array with a"
             " bool for each is wanted"
         )
-    in_view = found.reshape(len(asked), -1)
+    in_view = flags.reshape(len(queries), -1)
     bits: NDArray[np.uint64] = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
     return in_view @ bits

@@ -1,4 +1,4 @@
-"""Watchers: what follows the bodies of a run, and finds out what happens."""
+"""Watchers: they follow the bodies of a run, and emit events."""
 
 from collections.abc import Iterable, Sequence
 from typing import Protocol
@@ -9,30 +9,30 @@ from fleet2d.events import Event
 
 
 class Watcher(Protocol):
-    """What follows the bodies from span to span.
+    """A follower of the bodies from span to span.
 
-    A span is a block of steps in which nobody decides. A watcher that may have to end one looks
-    ahead when it is asked for the limit; any other is handed many spans at once.
+    A span is a block of steps without decisions. A watcher that may have to end one looks ahead in
+    `limit`; all others take in many spans at once.
 
     Attributes:
-        taken: The step before which it has taken everything in.
+        taken: The step before which it has taken in all steps.
     """
 
     taken: int
 
     @property
     def waits(self) -> bool:
-        """Whether something that it may notice ends the present span."""
+        """Whether an event of it may end the present span."""
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step before which the present span ends at the latest, `end` or earlier."""
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps from `taken` to `end` - 1; return what happened."""
+        """Take in the steps from `taken` to `end` - 1; return their events."""
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return whose plans, by row, something in the last step taken in ends.
+        """Return the bodies, by row, whose plans an event of the last step ends, and the event.
 
         Args:
-            events: What `take` returned.
+            events: The result of `take`.
         """

@@ -1,4 +1,4 @@
-"""A run as interventions see it, at the step at which something is done to it."""
+"""The run that interventions read and change; see `fleet2d.interventions.world`."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -17,7 +17,7 @@ from fleet2d.sight.disturbance import Disturbance
 
 
 class EngineWorld:
-    """What interventions see and touch of a state; see `fleet2d.interventions.world`."""
+    """A run at the step of an intervention; see `fleet2d.interventions.world`."""
 
     def __init__(self, state: State, step: int) -> None:
         self._state, self.step = state, step
@@ -59,63 +59,66 @@ class EngineWorld:
 
     @property
     def lasting(self) -> Sequence[object]:
-        """What was begun and isn't over, in order."""
+        """The active interventions with a duration, in the order of their begin."""
         return self._state.interventions.lasting
 
-    def undo(self, is_meant: Callable[[object], bool]) -> None:
-        """End what is under way and meant."""
-        for act in self._state.interventions.undo(is_meant):
+    def undo(self, applies: Callable[[object], bool]) -> None:
+        """End the active interventions to which a condition applies."""
+        for act in self._state.interventions.undo(applies):
             act.end(self)
 
     def keeps_truth(self, robot: str) -> bool:
-        """Tell whether the run keeps what is true beside what a robot perceives."""
+        """Whether the run stores the truth beside what a robot perceives."""
         return any(c.owner.name == robot and c.errs for c in self._state.cameras)
 
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
-        """Disturb the cameras of a robot by these alone from the present step on."""
+        """Set all disturbances of the cameras of a robot from the present step on."""
         self._state.settle(self.step)
         row = self.robots[robot].row
         for cameras in self._state.cameras:
             if cameras.row == row:
                 cameras.disturb(disturbances)
-        eyes = self.robots[robot].entity.eyes
-        dark = {name for name in eyes for each in disturbances if each.dark and each.is_of(name)}
+        dark = {
+            name
+            for name in self.robots[robot].entity.eyes
+            if any(disturbance.dark and disturbance.is_of(name) for disturbance in disturbances)
+        }
         for area in self._state.layers.areas:
             if area.row == row:
                 area.darken(dark)
 
     def stick(self, sensor: str, says: SensorFault | None) -> None:
-        """Let a sensor say what it doesn't sense from the present step on; None: as it senses."""
+        """Set the fault of a sensor from the present step on; None: it works."""
         self._state.settle(self.step)
         self._state.sensors.stuck.pop(sensor, None)
         if says is not None:
             self._state.sensors.stuck[sensor] = says
 
     def reset(self, algorithm: str, learned: Path | None) -> None:
-        """Let an algorithm begin anew with nothing learned, or with what a file holds."""
+        """Restart an algorithm with nothing learned, or with what a file holds."""
         self._state.learners.reset(algorithm, learned)
 
     def replace(self, algorithm: str, output: object) -> None:
-        """Let all but metrics read something else of an algorithm; see `Learners.replace`."""
+        """Let all but metrics read another output of an algorithm; see `Learners.replace`."""
         self._state.learners.replace(algorithm, output)
 
     def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
-        """Put a body elsewhere, in a part of its space; it decides anew there."""
+        """Put a body at a pose in a part of its space, where it decides anew."""
         actor.state, actor.part = pose, part
         self._state.recorder.move_body(actor.row)
         actor.decide_anew(self.step)
 
     def drive(self, actor: DecidingActor) -> None:
-        """Take the decisions of a body out of the hands of its behaviors."""
+        """Let a body follow only plans from outside from now on, not its behaviors."""
         actor.behaviors, actor.arbiter, actor.order = [], Arbiter([]), None
         self._state.driven.add(actor.row)
         actor.decide_anew(self.step)
 
     def check_change(self, change: HomeChange) -> None:
-        """Refuse a change of the home that can't be.
+        """Refuse an impossible change of the home.
 
         Raises:
-            ScenarioError: There is nothing of that name to change.
+            ScenarioError: It names something unknown.
         """
         self._state.changes.check_names(change)
 
@@ -124,5 +127,5 @@ class EngineWorld:
         self._state.changes.ask(change, self.step, "a script")
 
     def emit(self, entity: str, event: EventKind, detail: str) -> None:
-        """Record that something happened at the present step."""
+        """Record an event at the present step."""
         self._state.events.emit([Event(self.step, entity, event, detail)])

@@ -174,7 +174,7 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
         ({"near": "far"}, "near"),
         ({"explore": 1.5}, "share is 0 to 1"),
         ({"blocking": -1}, "blocking"),
-        ({"source": "ltp"}, "goes by 'ltp'"),
+        ({"source": "ltp"}, "reads 'ltp'"),
         ({"user": "anna"}, "there is no user 'anna'"),
     ],
 )
