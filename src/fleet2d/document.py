@@ -11,7 +11,7 @@ from fleet2d.bounds import FILE_BYTES, one_line, read_bytes
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.paths import Text
 from fleet2d.problems import Location, did_you_mean
-from fleet2d.yaml_tree import NodeError, Walk, compose
+from fleet2d.yaml_tree import NodeError, TreeWalk, compose
 
 Keys = tuple[str, ...]
 """The path of a value in a scenario; indices of lists are text, too."""
@@ -174,7 +174,7 @@ class _Builder:
     title: str
     places: dict[Keys, str]
     open_nodes: list[yaml.Node] = field(default_factory=list)
-    walk: Walk = field(default_factory=Walk)
+    walk: TreeWalk = field(default_factory=TreeWalk)
 
     def build(self, node: yaml.Node, location: Keys) -> Any:
         """Return the value of a node, and add its place to `places`."""

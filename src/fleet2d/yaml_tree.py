@@ -1,7 +1,7 @@
 """YAML as trees of nodes, of a bounded size and depth: the one reader of all YAML.
 
 Scalars are those of YAML 1.2: booleans are true and false only, 12:30 is text. An alias is the same
-node as its anchor, so few nodes can stand for very many values: `Walk` counts these.
+node as its anchor, so few nodes can stand for very many values: `TreeWalk` counts these.
 """
 
 import re
@@ -142,10 +142,10 @@ def parse(text: str) -> Any:
         {'a': [1, 2], 'b': {'c': '12:30', 'd': [1, 2]}}
     """
     node = compose(text)
-    return None if node is None else _plain(node, [], Walk())
+    return None if node is None else _plain(node, [], TreeWalk())
 
 
-def _plain(node: yaml.Node, parents: list[yaml.Node], walk: "Walk") -> Any:
+def _plain(node: yaml.Node, parents: list[yaml.Node], walk: "TreeWalk") -> Any:
     walk.enter(node, parents)
     if isinstance(node, yaml.ScalarNode):
         return walk.scalar(node)
@@ -155,7 +155,7 @@ def _plain(node: yaml.Node, parents: list[yaml.Node], walk: "Walk") -> Any:
     return [_plain(item, path, walk) for item in node.value]
 
 
-class Walk:
+class TreeWalk:
     """A walk through a tree: reads its values, and counts them, once for each alias."""
 
     def __init__(self) -> None:

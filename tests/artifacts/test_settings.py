@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from fleet2d.artifacts import ArtifactSettings
+from fleet2d.artifacts.settings import ArtifactSettings
 
 
 @pytest.mark.parametrize(

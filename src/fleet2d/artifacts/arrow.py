@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from fleet2d.artifacts import files
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, empty_chunk
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, empty_chunk, encode_strings
 from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.bounds import TABLE_BYTES, unpacked_bytes
@@ -84,7 +84,7 @@ def _column_of(field: pa.Field) -> Column:
 def table_of(
     chunks: Sequence[tuple[Chunk, int]],
     spec: TableSpec,
-    words: Mapping[str, Words],
+    words: Mapping[str, Dictionary],
     schema: pa.Schema | None = None,
 ) -> pa.Table:
     """Return chunks, each with its number of rows, as one Arrow table."""
@@ -130,10 +130,7 @@ def _wrapped(
 
 
 def _strings(words: Sequence[str]) -> pa.Array:
-    encoded = [word.encode() for word in words]
-    ends = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
-    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(encoded))]
-    return pa.Array.from_buffers(pa.string(), len(words), buffers)
+    return _array_of(encode_strings(words, nullable=False), Column("words", "string"), None)
 
 
 def _bits(flags: NDArray[np.bool_]) -> pa.Buffer:
@@ -141,7 +138,7 @@ def _bits(flags: NDArray[np.bool_]) -> pa.Buffer:
 
 
 def chunks_of(
-    table: pa.Table, spec: TableSpec, words: Mapping[str, Words]
+    table: pa.Table, spec: TableSpec, words: Mapping[str, Dictionary]
 ) -> Iterator[tuple[Chunk, int]]:
     """Yield the rows of a table as chunks, and the number of rows of each.
 
@@ -161,7 +158,7 @@ def chunks_of(
         yield chunk, batch.num_rows
 
 
-def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> ColumnChunk:
+def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Dictionary]) -> ColumnChunk:
     """Convert an Arrow array to the form that is hashed: nulls are zero."""
     if not len(array):
         return empty_chunk(column)
@@ -182,7 +179,7 @@ def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> Co
     return ColumnChunk(values.astype(DTYPES[column.kind], casting="safe", copy=False), valid)
 
 
-def _codes_of(array: pa.Array, column: Column, words: Mapping[str, Words]) -> Any:
+def _codes_of(array: pa.Array, column: Column, words: Mapping[str, Dictionary]) -> Any:
     """Return the codes of an array in the dictionary of the column, whatever the array's own is."""
     if not pa.types.is_dictionary(array.type):
         array = array.dictionary_encode()
@@ -227,7 +224,7 @@ class ParquetTable:
             },
         )
 
-    def write(self, chunk: Chunk, rows: int, words: Mapping[str, Words]) -> None:
+    def write(self, chunk: Chunk, rows: int, words: Mapping[str, Dictionary]) -> None:
         """Write one row group."""
         table = table_of([(chunk, rows)], self.spec, words, self._schema)
         self._writer.write_table(table, row_group_size=max(rows, 1))

@@ -15,7 +15,7 @@ from fleet2d.artifacts.chunk import (
     empty_chunk,
     encode_strings,
     encode_words,
-    new_words,
+    new_dictionaries,
 )
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
@@ -51,7 +51,7 @@ class TableBuffer:
         self.spec = spec
         self.limit = limit
         self.rows = 0
-        self.words = new_words(spec)
+        self.words = new_dictionaries(spec)
         self._capacity = 0
         self._first_capacity = _FIRST_CAPACITY
         self._values: dict[str, Any] = {}

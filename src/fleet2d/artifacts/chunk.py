@@ -29,11 +29,11 @@ class ColumnChunk(NamedTuple):
 Chunk = dict[str, ColumnChunk]
 
 
-class Words(dict[str | None, int]):
+class Dictionary(dict[str | None, int]):
     """A growing dictionary: looking up a new word gives it the next code.
 
     Example:
-        >>> words = Words()
+        >>> words = Dictionary()
         >>> words["on"], words["off"], words["on"], words.in_order()
         (0, 1, 0, ['on', 'off'])
     """
@@ -55,9 +55,9 @@ class Words(dict[str | None, int]):
         return [word for word in self if word is not None]
 
 
-def new_words(spec: TableSpec) -> dict[str, Words]:
+def new_dictionaries(spec: TableSpec) -> dict[str, Dictionary]:
     """Return an empty dictionary for each column of a table whose dictionary grows."""
-    return {column.name: Words() for column in spec.columns if column.is_growing}
+    return {column.name: Dictionary() for column in spec.columns if column.is_growing}
 
 
 def empty_chunk(column: Column) -> ColumnChunk:
@@ -76,7 +76,7 @@ def encode_strings(strings: Sequence[str | None], nullable: bool) -> ColumnChunk
     return ColumnChunk(values, _valid(strings) if nullable else None, lengths)
 
 
-def encode_words(strings: Sequence[str | None], words: Words, nullable: bool) -> ColumnChunk:
+def encode_words(strings: Sequence[str | None], words: Dictionary, nullable: bool) -> ColumnChunk:
     """Turn strings into codes, entering new ones into `words`."""
     if nullable:
         words[None] = 0  # a missing value is stored as code 0 and marked by `valid`

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, new_words
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.errors import ArtifactError
 
@@ -38,7 +38,7 @@ class TableDigest:
             column.update(chunk[column.name])
         self.rows += rows
 
-    def hexdigest(self, words: Mapping[str, Words] | None = None) -> str:
+    def hexdigest(self, words: Mapping[str, Dictionary] | None = None) -> str:
         """Return the digest of all rows so far.
 
         Args:
@@ -104,12 +104,12 @@ def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> s
     from fleet2d.artifacts.arrow import chunks_of, spec_of
 
     digest: TableDigest | None = None
-    words: dict[str, Words] = {}
+    words: dict[str, Dictionary] = {}
     for part in parts:
         if digest is None:
             spec = spec or spec_of(part.schema)
             digest = TableDigest(spec)
-            words = new_words(spec)
+            words = new_dictionaries(spec)
         for chunk, rows in chunks_of(part, digest.spec, words):
             digest.update(chunk, rows)
     if digest is None:

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, Literal, NamedTuple
 import numpy as np
 
 from fleet2d.artifacts import files
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Words, new_words
+from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
 from fleet2d.artifacts.encoding import RAW, Encoded, decode, encode
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
@@ -98,7 +98,7 @@ class JournalWriter:
             os.close(self._handle)
             raise
 
-    def replay(self, entry: Entry) -> None:
+    def replay(self, entry: LoggedRows) -> None:
         """Count rows that are in the file already."""
         table = self._tables.setdefault(
             entry.spec.name, _LoggedTable(len(self._tables), entry.spec, 0, {})
@@ -106,7 +106,9 @@ class JournalWriter:
         table.rows += entry.rows
         table.words = {name: len(words) for name, words in entry.words.items()}
 
-    def add(self, spec: TableSpec, chunk: Chunk, rows: int, words: Mapping[str, Words]) -> None:
+    def add(
+        self, spec: TableSpec, chunk: Chunk, rows: int, words: Mapping[str, Dictionary]
+    ) -> None:
         """Append rows; readers see them after the next commit.
 
         Raises:
@@ -186,7 +188,7 @@ class JournalWriter:
         files.write_all(self._handle, content)
 
 
-class Entry(NamedTuple):
+class LoggedRows(NamedTuple):
     """Rows of a table in a journal.
 
     Attributes:
@@ -199,7 +201,7 @@ class Entry(NamedTuple):
     spec: TableSpec
     chunk: Chunk
     rows: int
-    words: dict[str, Words]
+    words: dict[str, Dictionary]
 
 
 def last_commit(path: Path) -> Commit | None:
@@ -215,7 +217,7 @@ def last_commit(path: Path) -> Commit | None:
     return commit
 
 
-def read_journal(path: Path, end: int) -> Iterator[Entry]:
+def read_journal(path: Path, end: int) -> Iterator[LoggedRows]:
     """Yield the rows of a journal up to a commit, in the order in which they were stored.
 
     Args:
@@ -226,20 +228,20 @@ def read_journal(path: Path, end: int) -> Iterator[Entry]:
         ArtifactError: The file can't be read, or is damaged.
     """
     specs: list[TableSpec] = []
-    words: list[dict[str, Words]] = []
+    words: list[dict[str, Dictionary]] = []
     try:
         for kind, description, content, stop in _frames(path):
             if stop > end:
                 break
             if kind == "table":
                 specs.append(_spec_of(description))
-                words.append(new_words(specs[-1]))
+                words.append(new_dictionaries(specs[-1]))
             if kind == "rows":
                 spec, dictionaries = specs[description["table"]], words[description["table"]]
                 for name, added_words in description["words"].items():
                     dictionaries[name].enter(added_words)
                 chunk = _chunk_of(spec, description, content)
-                yield Entry(spec, chunk, description["rows"], dictionaries)
+                yield LoggedRows(spec, chunk, description["rows"], dictionaries)
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise ArtifactError(f"{path} is damaged ({error}): run the scenario again") from error
 

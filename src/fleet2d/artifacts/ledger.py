@@ -14,8 +14,8 @@ from fleet2d.artifacts.journal import (
     FOLDER,
     JOURNAL_NAME,
     Commit,
-    Entry,
     JournalWriter,
+    LoggedRows,
     read_journal,
 )
 from fleet2d.artifacts.lock import RunLock
@@ -70,7 +70,7 @@ class Ledger:
             (self.folder / name).unlink(missing_ok=True)
         self._set_journal(JournalWriter(self.folder / JOURNAL_NAME))
 
-    def go_on(self, commit: Commit | None) -> Iterator[Entry]:
+    def go_on(self, commit: Commit | None) -> Iterator[LoggedRows]:
         """Truncate the journal after a commit, and yield the rows before it.
 
         Raises:
@@ -145,7 +145,7 @@ def remove_leftovers(directory: Path) -> None:
         folder.rmdir()
 
 
-def columns_of(entry: Entry) -> dict[str, object]:
+def columns_of(entry: LoggedRows) -> dict[str, object]:
     """Return the rows of a journal's entry as columns that `RunStore.append` takes."""
     from fleet2d.artifacts.arrow import table_of
 

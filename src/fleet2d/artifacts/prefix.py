@@ -9,7 +9,7 @@ from fleet2d.artifacts.journal import (
     FOLDER,
     JOURNAL_NAME,
     Commit,
-    Entry,
+    LoggedRows,
     last_commit,
     read_journal,
 )
@@ -54,5 +54,5 @@ class Prefix:
         rows = [e for e in read_journal(self._path, self.commit.end) if e.spec.name == name]
         if not rows:
             raise ArtifactError(f"{self._path} names the table {name!r}, but has no rows of it")
-        last: Entry = rows[-1]  # its dictionaries hold the words of all
+        last: LoggedRows = rows[-1]  # its dictionaries hold the words of all
         return table_of([(entry.chunk, entry.rows) for entry in rows], last.spec, last.words)

@@ -1,4 +1,4 @@
-"""Disturbed cameras: what somebody outside does to the tables by which the kernel looks."""
+"""Disturbed cameras: the effect of interventions on the tables of the kernel that looks."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -19,7 +19,7 @@ NOT_EVEN_AT_0 = -1
 
 
 def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
-    """Return how a camera errs at present, by the latest that says so; None: as before."""
+    """Return the present errors of a camera, by the latest intervention; None: the usual ones."""
     errs = [each.errs for each in of_camera(disturbances, camera) if each.errs is not None]
     return errs[-1] if errs else None
 
@@ -34,7 +34,7 @@ def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) ->
 
 
 def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
-    """Let dark cameras see nobody, and others notice people less often."""
+    """Change lenses in place: dark cameras see nobody, others notice people less often."""
     lenses.widest[dark_cameras(disturbances, cameras)] = NOT_EVEN_AT_0
     for c, camera in enumerate(cameras):
         for each in of_camera(disturbances, camera):
@@ -45,7 +45,7 @@ def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequenc
 def forced_of(
     disturbances: Sequence[Disturbance], cameras: Sequence[str], people: Sequence[str]
 ) -> I64:
-    """Return what is made of each person in view, (cameras, people); see About.FORCED."""
+    """Return what each person in view is perceived as, (cameras, people); see About.FORCED."""
     index = {name: u for u, name in enumerate(people)} | {"": -1}
     forced = np.zeros((len(cameras), len(people)), np.int64)
     for c, camera in enumerate(cameras):
@@ -61,7 +61,7 @@ def forced_of(
 def injected_by(
     disturbances: Sequence[Disturbance], cameras: Sequence[str], context: TableContext
 ) -> I64:
-    """Return the false sightings of cameras that aren't dark, (n, 5): see ErrorTables."""
+    """Return the false sightings of cameras that aren't dark, (n, 5); see ErrorTables."""
     dark = dark_cameras(disturbances, cameras)
     index = {name: u for u, name in enumerate(context.users)} | {"": -1}
     rows = [
@@ -73,20 +73,20 @@ def injected_by(
     return np.array(rows, np.int64).reshape(-1, 5)
 
 
-def carried_over(memory: Memory, before: Memory, forced: I64) -> Memory:
-    """Return what cameras carried before, in a memory that is made for other errors.
+def carry_over(memory: Memory, old: Memory, forced: I64) -> Memory:
+    """Return the memory of cameras for other errors, with the content of the old memory.
 
     Args:
-        memory: The memory, of a robot that has seen nobody.
-        before: What was carried, by the same cameras.
-        forced: What is made of each user in view from now on, (cameras, users).
+        memory: The new memory, of a robot that has seen nobody.
+        old: The memory of the same cameras so far.
+        forced: What each user in view is perceived as from now on, (cameras, users).
     """
-    about = before.about.copy()
+    about = old.about.copy()
     about[..., About.FORCED.value] = forced
-    rows = max(memory.backlog.shape[1], int(before.waiting[:, 1].max(initial=0)))
+    rows = max(memory.backlog.shape[1], int(old.waiting[:, 1].max(initial=0)))
     backlog = np.zeros((len(about), rows, SIGHTING), np.int64)
-    waiting = np.zeros_like(before.waiting)
-    for c, (begin, length) in enumerate(before.waiting.tolist()):
-        places = (begin + np.arange(length)) % max(1, before.backlog.shape[1])
-        backlog[c, :length], waiting[c, 1] = before.backlog[c, places], length
-    return Memory(before.noticed, before.seen, about, backlog, waiting)
+    waiting = np.zeros_like(old.waiting)
+    for c, (begin, length) in enumerate(old.waiting.tolist()):
+        places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
+        backlog[c, :length], waiting[c, 1] = old.backlog[c, places], length
+    return Memory(old.noticed, old.seen, about, backlog, waiting)

@@ -25,7 +25,7 @@ from fleet2d.units import micros
 ENDS, SCRIPT, OUTSIDE = range(3)
 
 
-class Due(NamedTuple):
+class DueIntervention(NamedTuple):
     """An intervention that begins or ends at a step.
 
     Attributes:
@@ -52,7 +52,7 @@ class Due(NamedTuple):
         """The entry of the manifest.
 
         Example:
-            >>> Due(60, OUTSIDE, 0, read_intervention({"replan": "astro"})[1]).record
+            >>> DueIntervention(60, OUTSIDE, 0, read_intervention({"replan": "astro"})[1]).record
             {'do': 'replan', 'step': 60, 'entity': 'astro'}
         """
         fields = dump_intervention(self.act)
@@ -61,7 +61,7 @@ class Due(NamedTuple):
 
 
 @dataclass
-class Waiting:
+class PendingIntervention:
     """An intervention that waits for an event.
 
     Attributes:
@@ -69,7 +69,7 @@ class Waiting:
         repeats: Whether it is applied at every such event, not only at the first.
         delay_us: Time from the event to the intervention [us].
         act: The intervention.
-        rank, number, by: See `Due`.
+        rank, number, by: See `DueIntervention`.
         last: The last step for which it was put into the queue; -1: none.
     """
 
@@ -99,10 +99,10 @@ class Interventions:
 
     def __init__(self, clock: Clock) -> None:
         self.done: list[dict[str, Any]] = []
-        self.waiting: list[Waiting] = []
+        self.waiting: list[PendingIntervention] = []
         self.lasting: list[Lasting] = []
         self._clock = clock
-        self._queue: list[Due] = []
+        self._queue: list[DueIntervention] = []
         self._count = 0
 
     def next_number(self) -> int:
@@ -126,13 +126,13 @@ class Interventions:
     ) -> None:
         """Schedule an intervention at a step, after those of its rank that were added before."""
         number = self.next_number() if number is None else number
-        insort(self._queue, Due(step, rank, number, act, by), key=lambda due: due[:3])
+        insort(self._queue, DueIntervention(step, rank, number, act, by), key=lambda due: due[:3])
 
     def next_due(self) -> int | None:
         """Return the step of the next intervention; None if none is scheduled."""
         return self._queue[0].step if self._queue else None
 
-    def take(self, step: int) -> Iterator[Due]:
+    def take(self, step: int) -> Iterator[DueIntervention]:
         """Yield what is due by a step, in order, and schedule the end of what begins."""
         while self._queue and self._queue[0].step <= step:
             due = self._queue.pop(0)

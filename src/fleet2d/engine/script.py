@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from fleet2d.clock import Clock
-from fleet2d.engine.interventions import OUTSIDE, SCRIPT, Waiting
+from fleet2d.engine.interventions import OUTSIDE, SCRIPT, PendingIntervention
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.errors import ScenarioError
@@ -36,8 +36,9 @@ def schedule(state: State, entry: Entry, first: int, index: int | None = None) -
             interventions.add(entry.act, step, rank, number, by)
         return
     check_trigger(world, entry.on)
-    delay = micros(entry.delay)
-    interventions.waiting.append(Waiting(entry.on, entry.each, delay, entry.act, rank, number, by))
+    interventions.waiting.append(
+        PendingIntervention(entry.on, entry.each, micros(entry.delay), entry.act, rank, number, by)
+    )
     if interventions not in state.events.sinks:
         state.events.sinks.append(interventions)
     state.wait_for(state.requested)

@@ -106,9 +106,9 @@ def copy_state(state: State, constants: Constants) -> State:
     """Return an independent copy of a state, which shares only objects that never change."""
     shared: list[object] = []
     buffer = io.BytesIO()
-    _Writer(buffer, constants, shared).dump(state)
+    _StateWriter(buffer, constants, shared).dump(state)
     buffer.seek(0)
-    return _Reader(buffer, constants, shared).state()
+    return _StateReader(buffer, constants, shared).state()
 
 
 def write_state(state: State, constants: Constants, file: BinaryIO) -> None:
@@ -119,7 +119,7 @@ def write_state(state: State, constants: Constants, file: BinaryIO) -> None:
             open file.
     """
     try:
-        _Writer(file, constants, None).dump(state)
+        _StateWriter(file, constants, None).dump(state)
     except ArtifactError:
         raise
     except Exception as error:  # a component's own pickling may raise anything
@@ -133,7 +133,7 @@ def read_state(file: BinaryIO, constants: Constants) -> State:
         ArtifactError: The file contains something else, or is damaged.
     """
     try:
-        return _Reader(file, constants, None).state()
+        return _StateReader(file, constants, None).state()
     except ArtifactError:
         raise
     except Exception as error:  # a damaged pickle may raise anything
@@ -194,7 +194,7 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     return header, io.BytesIO(body)
 
 
-class _Writer(pickle.Pickler):
+class _StateWriter(pickle.Pickler):
     """Replaces constants by their names, and collects shared objects."""
 
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
@@ -232,7 +232,7 @@ class _Writer(pickle.Pickler):
             )
 
 
-class _Reader(pickle.Unpickler):
+class _StateReader(pickle.Unpickler):
     """Looks constants up by name; creates only plain values, and objects of allowed classes."""
 
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:

@@ -96,7 +96,7 @@ class Send(BodyIntervention):
 
 
 @register("intervention", "hold")
-class Hold(BodyIntervention):
+class HoldStill(BodyIntervention):
     """Let a body stand still where it is, until it is released."""
 
     duration: PositiveDuration | None = Field(

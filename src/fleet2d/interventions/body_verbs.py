@@ -94,7 +94,7 @@ class BodyVerbs(ABC):
         Raises:
             ScenarioError: There is no such person or robot.
         """
-        self._do(bodies.Hold, entity=name, duration=duration)
+        self._do(bodies.HoldStill, entity=name, duration=duration)
 
     def release(self, name: str) -> None:
         """Return a body to the control of its own behaviors.
@@ -157,7 +157,7 @@ class BodyVerbs(ABC):
             ScenarioError: There is no such person, or no place for that activity.
             PlacementError: There is no such place, or it can't be reached.
         """
-        self._do(people.Activity, entity=name, what=what, to=to, duration=duration)
+        self._do(people.StartActivity, entity=name, what=what, to=to, duration=duration)
 
     def _do(self, verb: type[Intervention], **fields: Any) -> None:
         try:

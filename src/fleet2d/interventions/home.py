@@ -91,7 +91,7 @@ class Move(HomeIntervention):
 
 
 @register("intervention", "room")
-class Room(HomeIntervention):
+class SetRoomType(HomeIntervention):
     """Change the type of a room: behaviors that go to a bedroom go there from then on."""
 
     subject: ClassVar[str] = "name"

@@ -86,7 +86,7 @@ class LetIn(PersonIntervention):
 
 
 @register("intervention", "activity")
-class Activity(PersonIntervention):
+class StartActivity(PersonIntervention):
     """Let a person do an activity at its place, sitting or lying as is usual."""
 
     what: str = Field(min_length=1, description="its name in the persona or agenda")

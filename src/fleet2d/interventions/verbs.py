@@ -265,4 +265,4 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such room, or no such room type.
         """
-        self._do(home.Room, name=name, type=type)
+        self._do(home.SetRoomType, name=name, type=type)
