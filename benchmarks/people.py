@@ -165,7 +165,7 @@ def measured(group: str, people: int, weeks: int) -> dict[str, list[Counter[str]
         key = stream_key(4, f"users.person_{person}", "population")
         state = survey.first_state(table, Draws(key, 0), MONDAY)
         for ordinal in range(MONDAY, MONDAY + 7 * weeks):
-            blocks, state = survey.live(table, Draws(key, ordinal), ordinal, state)
+            blocks, state = survey.draw_episodes(table, Draws(key, ordinal), ordinal, state)
             kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
             k = 0
             for hour in range(4, 28):

@@ -65,8 +65,9 @@ def test_a_study_is_as_it_should_be(
     examples: Path, path: Path, request: pytest.FixtureRequest
 ) -> None:
     studies = examples / "studies"
-    if "logs/" in path.read_text():  # which its first lines say to put beside it
-        (studies / "logs").symlink_to(request.getfixturevalue("shared_data") / "activity")
+    for name, folder in (("logs", "activity"), ("houseexpo", "houseexpo")):
+        if f"{name}/" in path.read_text():  # which its first lines say to put beside it
+            (studies / name).symlink_to(request.getfixturevalue("shared_data") / folder)
     checked = check_study(studies / path.name)
     assert len(checked.plan.variants) > 10
     assert checked.specification.file.compare or checked.specification.file.tune
