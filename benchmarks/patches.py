@@ -22,7 +22,7 @@ ESTIMATORS = ("exposure_ratio", "likelihood")
 
 def all_shares(seeds: int, days: int, side: float) -> list[Shares]:
     """Return the shares for each seed, of patches so long; runs of a process share theirs."""
-    patches.SIDE = side
+    patches.SIDE_M = side
     return [shares(seed, days) for seed in range(seeds)]
 
 

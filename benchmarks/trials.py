@@ -10,7 +10,7 @@ from typing import Any
 
 from fleet2d.expectations import always, distance, eventually, seen
 from fleet2d.testing.claim import Claim, Variant
-from fleet2d.testing.running import run_life
+from fleet2d.testing.running import run_trial
 
 EVENING = {
     "simulation": {"start": "2026-01-05T17:00", "duration": "4 h", "seed": 0},
@@ -56,7 +56,7 @@ def main() -> None:
         spent = []
         for seed in range(seeds):
             began = time.process_time()
-            run_life(variant.with_seed(seed), body)
+            run_trial(variant.with_seed(seed), body)
             spent.append(1e3 * (time.process_time() - began))
         first, warm = spent[0], statistics.median(spent[1:])
         print(
