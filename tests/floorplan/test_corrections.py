@@ -23,47 +23,47 @@ def names(plan: FloorPlan) -> list[tuple[str, str]]:
 
 
 def test_place_names_and_retypes_its_room_and_its_doorway(plan: FloorPlan) -> None:
-    given = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="den", type="Home Office")])
+    result = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="den", type="Home Office")])
 
-    assert [("room_0", "room"), ("den", "office")] == names(given)
-    assert ("office",) == given.room("den").labels
-    assert {"den-room_0", "room_0-den"} & {doorway.name for doorway in given.doorways}
+    assert [("room_0", "room"), ("den", "office")] == names(result)
+    assert ("office",) == result.room("den").labels
+    assert {"den-room_0", "room_0-den"} & {doorway.name for doorway in result.doorways}
     assert [("room_0", "room"), ("room_1", "room")] == names(plan)
 
 
 def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> None:
-    given = correct_rooms(
+    result = correct_rooms(
         plan, [RoomCorrection(at=(2, 2), type="Küche"), RoomCorrection(at=(5, 2), type="kitchen")]
     )
 
-    assert [("kitchen_0", "kitchen"), ("kitchen_1", "kitchen")] == names(given)
+    assert [("kitchen_0", "kitchen"), ("kitchen_1", "kitchen")] == names(result)
 
 
 def test_room_that_is_only_named_keeps_its_type(plan: FloorPlan) -> None:
-    given = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="Anna's")])
+    result = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="Anna's")])
 
-    assert [("room_0", "room"), ("Anna's", "room")] == names(given)
+    assert [("room_0", "room"), ("Anna's", "room")] == names(result)
 
 
 def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
     corners = ((5.6, 0.0), (9.0, 0.0), (9.0, 9.0), (5.6, 9.0))
 
-    given = correct_rooms(plan, [RoomCorrection(polygon=corners, type="bedroom")])
+    result = correct_rooms(plan, [RoomCorrection(polygon=corners, type="bedroom")])
 
-    assert [("room_0", "room"), ("room_1", "room"), ("bedroom_0", "bedroom")] == names(given)
-    assert 6.0 == pytest.approx(given.room("bedroom_0").area_m2)
-    assert plan.area_m2 == pytest.approx(sum(room.area_m2 for room in given.rooms), abs=0.2)
+    assert [("room_0", "room"), ("room_1", "room"), ("bedroom_0", "bedroom")] == names(result)
+    assert 6.0 == pytest.approx(result.room("bedroom_0").area_m2)
+    assert plan.area_m2 == pytest.approx(sum(room.area_m2 for room in result.rooms), abs=0.2)
     assert ["bedroom_0"] == [
-        given.rooms[link.rooms[1]].name for link in given.room_graph if link.kind == "open"
+        result.rooms[link.rooms[1]].name for link in result.room_graph if link.kind == "open"
     ]
 
 
 def test_polygon_over_a_whole_room_replaces_it(plan: FloorPlan) -> None:
     corners = ((0.0, 0.0), (4.05, 0.0), (4.05, 9.0), (0.0, 9.0))
 
-    given = correct_rooms(plan, [RoomCorrection(polygon=corners, name="studio")])
+    result = correct_rooms(plan, [RoomCorrection(polygon=corners, name="studio")])
 
-    assert [("room_0", "room"), ("studio", "room")] == names(given)
+    assert [("room_0", "room"), ("studio", "room")] == names(result)
 
 
 def test_nothing_to_correct_is_the_same_plan(plan: FloorPlan) -> None:

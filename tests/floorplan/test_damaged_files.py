@@ -145,7 +145,7 @@ FORMATS: dict[str, tuple[str, dict[str, Any], Read]] = {
 }
 
 
-def written(folder: Path, name: str, content: object) -> Path:
+def write(folder: Path, name: str, content: object) -> Path:
     path = folder / name
     dump = yaml.safe_dump if path.suffix == ".yaml" else json.dumps
     path.write_text(dump(content), encoding="utf-8")
@@ -175,7 +175,7 @@ def refusal(read: Callable[..., object], path: Path, *arguments: Any) -> str:
 @every_format
 def test_the_file_itself_is_read(tmp_path: Path, kind: str) -> None:
     name, content, read = FORMATS[kind]
-    path = written(tmp_path, name, content)
+    path = write(tmp_path, name, content)
 
     plan = read(path)
 
@@ -192,7 +192,7 @@ def test_truncated_file_is_refused_or_lacks_what_it_says(
     tmp_path: Path, kind: str, share: float
 ) -> None:
     name, content, read = FORMATS[kind]
-    path = written(tmp_path, name, content)
+    path = write(tmp_path, name, content)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
 
@@ -226,7 +226,7 @@ RUBBISH = {
 @pytest.mark.parametrize("rubbish", RUBBISH)
 def test_rubbish_is_refused_in_a_few_words(tmp_path: Path, kind: str, rubbish: str) -> None:
     name, content, read = FORMATS[kind]
-    path = written(tmp_path, name, content)
+    path = write(tmp_path, name, content)
     path.write_bytes(RUBBISH[rubbish])
 
     for way in (read, load_floorplan):
@@ -281,7 +281,7 @@ vector_format = pytest.mark.parametrize(
 @pytest.mark.parametrize("outline", OUTLINES)
 def test_outline_that_is_none_is_refused(tmp_path: Path, kind: str, outline: str) -> None:
     name, _, read = FORMATS[kind]
-    path = written(tmp_path, name, with_outline(kind, OUTLINES[outline]))
+    path = write(tmp_path, name, with_outline(kind, OUTLINES[outline]))
 
     assert len(refusal(read, path)) < 1000
 
@@ -291,7 +291,7 @@ def test_outline_that_crosses_itself_is_refused_or_repaired_with_a_note(
     tmp_path: Path, kind: str
 ) -> None:
     name, _, read = FORMATS[kind]
-    path = written(tmp_path, name, with_outline(kind, [[0, 0], [4, 4], [4, 0], [0, 4]]))
+    path = write(tmp_path, name, with_outline(kind, [[0, 0], [4, 4], [4, 0], [0, 4]]))
 
     if kind.startswith("native"):
         assert "self-intersection at (2, 2) m" in refusal(read, path)
@@ -310,7 +310,7 @@ def test_outline_of_very_many_corners_is_read(tmp_path: Path, kind: str, corners
     angles = np.linspace(0, 2 * np.pi, corners, endpoint=False)
     circle = np.round(np.stack([8 * np.cos(angles), 8 * np.sin(angles)], axis=1), 7).tolist()
     name, _, read = FORMATS[kind]
-    path = written(tmp_path, name, with_outline(kind, circle))
+    path = write(tmp_path, name, with_outline(kind, circle))
 
     assert 64 * np.pi == pytest.approx(read(path).area_m2, rel=1e-3)
 
@@ -319,7 +319,7 @@ def test_outline_of_very_many_corners_is_read(tmp_path: Path, kind: str, corners
 def test_coordinate_next_to_nothing_is_nothing(tmp_path: Path, kind: str) -> None:
     """GEOS would divide by it."""
     name, _, read = FORMATS[kind]
-    path = written(tmp_path, name, with_outline(kind, [[0, 0], [1e-300, 0], [4, 3], [-1e-200, 3]]))
+    path = write(tmp_path, name, with_outline(kind, [[0, 0], [1e-300, 0], [4, 3], [-1e-200, 3]]))
 
     assert 6 == pytest.approx(read(path).area_m2, abs=0.01)
 
@@ -327,7 +327,7 @@ def test_coordinate_next_to_nothing_is_nothing(tmp_path: Path, kind: str) -> Non
 @vector_format
 def test_outline_of_9_000_m2_is_read(tmp_path: Path, kind: str) -> None:
     name, _, read = FORMATS[kind]
-    path = written(tmp_path, name, with_outline(kind, [[0, 0], [100, 0], [100, 90], [0, 90]]))
+    path = write(tmp_path, name, with_outline(kind, [[0, 0], [100, 0], [100, 90], [0, 90]]))
 
     assert 9000 == pytest.approx(read(path).area_m2)
 
@@ -357,7 +357,7 @@ IMAGES = {
 def test_damaged_image_is_refused(tmp_path: Path, image: str) -> None:
     if image.startswith("png"):
         pytest.importorskip("PIL.Image")
-    path = written(tmp_path, "map.yaml", ROS)
+    path = write(tmp_path, "map.yaml", ROS)
     (tmp_path / "map.pgm").write_bytes(IMAGES[image])
 
     assert "map.pgm" in refusal(read_ros, path)
@@ -365,7 +365,7 @@ def test_damaged_image_is_refused(tmp_path: Path, image: str) -> None:
 
 
 def test_missing_image_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, "map.yaml", ROS)
+    path = write(tmp_path, "map.yaml", ROS)
     (tmp_path / "map.pgm").unlink()
 
     assert "there is no image" in refusal(read_ros, path)
@@ -374,7 +374,7 @@ def test_missing_image_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("resolution", [0.0, -1.0, 2.0, math.nan, math.inf])
 def test_resolution_that_is_none_is_refused(tmp_path: Path, resolution: float) -> None:
-    written(tmp_path, "map.yaml", ROS)
+    write(tmp_path, "map.yaml", ROS)
 
     assert "resolution is" in refusal(read_image, tmp_path / "map.pgm", resolution)
 
@@ -388,7 +388,7 @@ def test_resolution_that_is_none_is_refused(tmp_path: Path, resolution: float) -
 def test_image_with_other_bytes_somewhere_is_read_or_refused(
     tmp_path: Path, other: bytes, place: int, insert: bool
 ) -> None:
-    written(tmp_path, "map.yaml", ROS)
+    write(tmp_path, "map.yaml", ROS)
     rest = PGM[place if insert else place + len(other) :]
     (tmp_path / "map.pgm").write_bytes(PGM[:place] + other + rest)
 
@@ -442,7 +442,7 @@ def places(value: Any, path: Place = ()) -> Iterator[Place]:
             yield from places(value[key], (*path, key))
 
 
-def changed(content: Any, place: Place, what: Any) -> None:
+def change(content: Any, place: Place, what: Any) -> None:
     inner = content
     try:
         for key in place[:-1]:
@@ -482,9 +482,9 @@ def test_wrong_things_anywhere_are_read_or_refused(
     damaged = copy.deepcopy(content)
     where = st.tuples(st.sampled_from(list(places(content))), st.sampled_from((*WRONG, places)))
     for place, what in data.draw(st.lists(where, min_size=1, max_size=3)):
-        changed(damaged, place, copy.deepcopy(what))
+        change(damaged, place, copy.deepcopy(what))
     try:
-        path = written(tmp_path, name, damaged)
+        path = write(tmp_path, name, damaged)
     except UnicodeEncodeError:
         return  # no file can hold that
 

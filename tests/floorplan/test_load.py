@@ -51,8 +51,8 @@ def test_named_rooms_have_the_areas_that_the_file_states(shared_data: Path, file
 
     plan = load_floorplan(shared_data / file)
 
-    found = {room.name: room.area_m2 for room in plan.rooms if room.name != "unknown_0"}
-    assert {name: pytest.approx(area / 100**2, abs=0.011) for name, area in stated.items()} == found
+    areas = {room.name: room.area_m2 for room in plan.rooms if room.name != "unknown_0"}
+    assert {name: pytest.approx(area / 100**2, abs=0.011) for name, area in stated.items()} == areas
 
 
 def test_synthetic_home_is_named_by_its_seed() -> None:

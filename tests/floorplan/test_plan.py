@@ -48,9 +48,9 @@ def test_anchor_is_the_deepest_cell_lowest_row_then_column(flat: FloorPlan) -> N
 
 
 def test_room_at_finds_rooms_and_nothing_in_walls_or_outside(flat: FloorPlan) -> None:
-    found = [flat.room_at(x, y) for x, y in [(1, 1), (2.05, 1.5), (4, 2)]]
+    rooms = [flat.room_at(x, y) for x, y in [(1, 1), (2.05, 1.5), (4, 2)]]
 
-    assert ["kitchen_0", "kitchen_0", "bedroom_0"] == [room.name if room else "" for room in found]
+    assert ["kitchen_0", "kitchen_0", "bedroom_0"] == [room.name if room else "" for room in rooms]
     assert [None] * 4 == [flat.room_at(*at) for at in [(2.1, 0.5), (-3, 1), (1, 1e6), (9, -9)]]
 
 

@@ -11,10 +11,8 @@ from shapely import Polygon
 
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.names import number_names
-from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.objects import PlacedObject, Point
 from fleet2d.kernels.headings import TURN, UNIT, cosine, in_radians, sine
-
-Point = tuple[float, float]
 
 
 def number_objects(objects: Sequence[PlacedObject]) -> tuple[PlacedObject, ...]:

@@ -27,14 +27,7 @@ def find_named(
     noun: str,
     error: type[InputError] = FloorPlanError,
 ) -> N:
-    """Return the thing of a name.
-
-    Args:
-        things: What to search.
-        name: The name.
-        owner: What has the things, for the message.
-        noun: What they are, for the message.
-        error: The type of the error.
+    """Return the thing of a name; `owner` and `noun` are for the message.
 
     Raises:
         InputError: None has that name; of the type `error`.
@@ -49,12 +42,7 @@ def find_named(
 
 
 def number_names(names: Sequence[str | None], types: Sequence[str], what: str) -> list[str]:
-    """Return a name for each thing: its own, or its type and a number.
-
-    Args:
-        names: Own names; None or empty to be numbered by type.
-        types: The types of the same things.
-        what: What they are, for the message.
+    """Return a name for each thing: its own if it isn't empty, or its type and a number.
 
     Raises:
         FloorPlanError: Two have the same name.
@@ -75,12 +63,7 @@ def number_names(names: Sequence[str | None], types: Sequence[str], what: str) -
 
 
 def distinct_names(names: Sequence[str | None], what: str, notes: list[str]) -> list[str | None]:
-    """Return names with a number added to those that occur before; None stays None.
-
-    Args:
-        names: The names in a file.
-        what: What they name, for the notes.
-        notes: A sentence is added for each new name.
+    """Return names with a number added to those that occur before, and add a note for each.
 
     Example:
         >>> distinct_names(["Bath", "Bath", None, "Bath 2"], "rooms", [])

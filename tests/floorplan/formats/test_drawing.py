@@ -22,7 +22,7 @@ HOME[14:66, 62:106] = PAPER  # as large
 HOME[34:46, 58:62] = PAPER  # a door between them
 
 
-def drawn(folder: Path, pixels: NDArray[np.uint8] = HOME) -> Path:
+def draw(folder: Path, pixels: NDArray[np.uint8] = HOME) -> Path:
     path = folder / "flat.pgm"
     rows, columns = pixels.shape
     path.write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + pixels.tobytes())
@@ -30,7 +30,7 @@ def drawn(folder: Path, pixels: NDArray[np.uint8] = HOME) -> Path:
 
 
 def read(folder: Path, pixels: NDArray[np.uint8] = HOME, **options: Any) -> FloorPlan:
-    return read_image(drawn(folder, pixels), 0.05, **options)
+    return read_image(draw(folder, pixels), 0.05, **options)
 
 
 def test_what_dark_walls_enclose_is_free_and_the_paper_around_is_not(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_rooms_without_a_way_to_the_rest_are_left_out_and_said(tmp_path: Path) -
 
 
 def test_resolution_scales_and_is_the_cell_unless_one_is_given(tmp_path: Path) -> None:
-    path = drawn(tmp_path)
+    path = draw(tmp_path)
 
     assert 0.02 == read_image(path, 0.02).lattice.cell
     assert 0.01 == read_image(path, 0.005, ray_width=0.02).lattice.cell
@@ -125,7 +125,7 @@ def test_drawing_that_encloses_nothing_is_refused(
 
 
 def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
-    path = drawn(tmp_path)
+    path = draw(tmp_path)
 
     source = Image.model_validate({"path": str(path), "resolution": "4 cm"})
 
@@ -139,7 +139,7 @@ def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> N
 
 
 def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path: Path) -> None:
-    path = drawn(tmp_path)
+    path = draw(tmp_path)
 
     assert read_image(path, 0.05) == load_floorplan(path, resolution=0.05)
     with pytest.raises(FloorPlanError, match="give the metres per pixel as resolution"):

@@ -30,8 +30,8 @@ def point(x: float, y: float) -> dict[str, Any]:
 
 
 def feature(geometry: Any, kind: str | None = None, **properties: Any) -> dict[str, Any]:
-    said = properties if kind is None else {"kind": kind, **properties}
-    return {"type": "Feature", "geometry": geometry, "properties": said}
+    all_properties = properties if kind is None else {"kind": kind, **properties}
+    return {"type": "Feature", "geometry": geometry, "properties": all_properties}
 
 
 def imdf(geometry: Any, feature_type: str, **properties: Any) -> dict[str, Any]:
@@ -43,7 +43,7 @@ BEDROOM = feature(box(4, 0, 9, 3), "room", name="Master Bedroom")
 DOOR = feature(line((4, 1), (4, 1.9)), "door")
 
 
-def written(folder: Path, *features: Any, **members: Any) -> Path:
+def write(folder: Path, *features: Any, **members: Any) -> Path:
     path = folder / "flat.geojson"
     content = {"type": "FeatureCollection", "features": list(features), **members}
     path.write_text(json.dumps(content), encoding="utf-8")
@@ -51,7 +51,7 @@ def written(folder: Path, *features: Any, **members: Any) -> Path:
 
 
 def read(folder: Path, *features: Any, **options: Any) -> FloorPlan:
-    return read_geojson(written(folder, *features), **options)
+    return read_geojson(write(folder, *features), **options)
 
 
 def space(plan: FloorPlan) -> shapely.Geometry:
@@ -333,7 +333,7 @@ FLOORS[0]["id"], FLOORS[1]["id"] = "b", "a"
 def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
     plan = read(tmp_path, *FLOORS, units="m", level=level)
 
-    assert [room] == [found.name for found in plan.rooms]
+    assert [room] == [plan_room.name for plan_room in plan.rooms]
     other = {"Down": "G was taken, and not Upstairs", "Up": "Upstairs was taken, and not G"}[room]
     assert (f"of its levels, {other}",) == plan.notes
 
@@ -352,8 +352,8 @@ def on_earth(geometry: dict[str, Any], latitude: float, longitude: float) -> dic
     east = 6378137 / square**0.5 * math.cos(math.radians(latitude)) * math.radians(1)
     north = 6378137 * (1 - 0.00669437999014) / square**1.5 * math.radians(1)
     shape = shapely.from_geojson(json.dumps(geometry))
-    moved = shapely.transform(shape, lambda xy: xy / (east, north) + (longitude, latitude))
-    return json.loads(shapely.to_geojson(moved))  # type: ignore[no-any-return]
+    degrees = shapely.transform(shape, lambda xy: xy / (east, north) + (longitude, latitude))
+    return json.loads(shapely.to_geojson(degrees))  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(
@@ -377,7 +377,7 @@ def test_longitude_and_latitude_become_metres(
 
 def test_units_can_be_said_by_the_file_and_by_the_setting(tmp_path: Path) -> None:
     small = feature(box(0, 0, 0.3, 0.3), "room")
-    path = written(tmp_path, small, units="m")
+    path = write(tmp_path, small, units="m")
 
     assert 0.09 == pytest.approx(read_geojson(path).area_m2)
     with pytest.raises(FloorPlanError, match="too large"):
@@ -391,7 +391,7 @@ def test_units_can_be_said_by_the_file_and_by_the_setting(tmp_path: Path) -> Non
 @pytest.mark.parametrize("units", ["feet", 3, None, [1]])
 def test_unknown_units_are_refused(tmp_path: Path, units: object) -> None:
     with pytest.raises(FloorPlanError, match="m, degrees or auto is expected"):
-        read_geojson(written(tmp_path, KITCHEN, units=units))
+        read_geojson(write(tmp_path, KITCHEN, units=units))
 
 
 def test_metres_far_from_the_origin_come_near_it(tmp_path: Path) -> None:
@@ -419,7 +419,7 @@ def test_plan_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
 
 def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
     plan = load_floorplan("family_home")
-    path = written(tmp_path)
+    path = write(tmp_path)
     path.write_text(json.dumps(geojson_document(plan)))
 
     assert plan == load_floorplan(path)
@@ -429,7 +429,7 @@ def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path: Path) -> Non
 
 
 def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
-    path = written(tmp_path, *FLOORS, KITCHEN, BEDROOM)
+    path = write(tmp_path, *FLOORS, KITCHEN, BEDROOM)
 
     source = GeoJson.model_validate({"path": str(path), "level": 1, "wall_m": "20 cm"})
 
@@ -441,7 +441,7 @@ def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> N
 
 
 def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
-    assert 0.1 == load_floorplan(written(tmp_path, KITCHEN), 0.1).lattice.cell
+    assert 0.1 == load_floorplan(write(tmp_path, KITCHEN), 0.1).lattice.cell
 
 
 @pytest.mark.parametrize(
@@ -468,7 +468,7 @@ def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
 def test_damaged_feature_is_refused_with_its_place(
     tmp_path: Path, wrong: Any, message: str
 ) -> None:
-    path = written(tmp_path, wrong, KITCHEN)
+    path = write(tmp_path, wrong, KITCHEN)
 
     with pytest.raises(FloorPlanError, match=message) as caught:
         read_geojson(path)
@@ -491,7 +491,7 @@ def test_file_without_space_is_refused(tmp_path: Path, features: Any, message: s
 
 
 def test_other_json_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path)
+    path = write(tmp_path)
     path.write_text('{"type": "Feature"}')
 
     with pytest.raises(FloorPlanError, match='no GeoJSON plan: "type": "FeatureCollection"'):

@@ -32,14 +32,14 @@ def read(plans: list[Path], start: str, cell: float = 0.05) -> FloorPlan:
     return read_houseexpo(path, cell)
 
 
-def written(folder: Path, content: object) -> Path:
+def write(folder: Path, content: object) -> Path:
     path = folder / "plan.json"
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
 
 
 def home(folder: Path, **content: Any) -> FloorPlan:
-    return read_houseexpo(written(folder, {"verts": SQUARE, **content}))
+    return read_houseexpo(write(folder, {"verts": SQUARE, **content}))
 
 
 # --- All fifty plans ----------------------------------------------------------------------------
@@ -338,7 +338,7 @@ NAN, INFINITY = float("nan"), float("inf")
 def test_json_that_is_no_plan_is_refused_with_the_place(
     tmp_path: Path, content: object, message: str
 ) -> None:
-    path = written(tmp_path, content)
+    path = write(tmp_path, content)
 
     with pytest.raises(FloorPlanError, match=message) as caught:
         read_houseexpo(path)
@@ -383,7 +383,7 @@ def test_text_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
 
 def test_houseexpo_is_found_by_name_and_alias(tmp_path: Path) -> None:
     source = HouseExpo.model_validate(
-        {"path": str(written(tmp_path, {"verts": SQUARE})), "cell": "10 cm"}
+        {"path": str(write(tmp_path, {"verts": SQUARE})), "cell": "10 cm"}
     )
 
     assert HouseExpo is lookup("floorplan", "houseexpo") is lookup("floorplan", "he")
@@ -391,7 +391,7 @@ def test_houseexpo_is_found_by_name_and_alias(tmp_path: Path) -> None:
 
 
 def test_houseexpo_refuses_a_missing_path_and_unknown_keys(tmp_path: Path) -> None:
-    path = str(written(tmp_path, {"verts": SQUARE}))
+    path = str(write(tmp_path, {"verts": SQUARE}))
 
     with pytest.raises(ValidationError, match="no such file"):
         HouseExpo.model_validate({"path": str(tmp_path / "nowhere.json")})

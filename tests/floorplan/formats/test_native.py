@@ -23,14 +23,14 @@ BED = {"type": "bed", "footprint": [[1, 1], [3, 1], [3, 2], [1, 2]]}
 USE = {"x": 2, "y": 1.5, "heading": 0.5}
 
 
-def written(folder: Path, content: object) -> Path:
+def write(folder: Path, content: object) -> Path:
     path = folder / "plan.json"
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
 
 
 def read(folder: Path, **content: Any) -> FloorPlan:
-    return read_native(written(folder, {**PLAN, **content}))
+    return read_native(write(folder, {**PLAN, **content}))
 
 
 def test_plan_written_by_hand_is_read(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: fl
             continue  # the largest takes seconds
         plan = read_houseexpo(path, cell)
 
-        again = read_native(written(tmp_path, native_document(plan)), cell)
+        again = read_native(write(tmp_path, native_document(plan)), cell)
 
         assert plan.digest == again.digest, path.name
         assert plan.rooms == again.rooms
@@ -71,7 +71,7 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
     den = LabelledRegion(("office", "bedroom"), shapely.box(0, 0, 4, 7), "Ben's den", "office")
     plan = FloorPlan.build("ring", ring, [den], entrance=(0.1 + 0.2, 1 / 3))
 
-    again = read_native(written(tmp_path, native_document(plan)))
+    again = read_native(write(tmp_path, native_document(plan)))
 
     assert plan == again
     assert ("Ben's den", "office", ("office", "bedroom")) == (
@@ -146,7 +146,7 @@ def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
 
     plan = read_native(path)
 
-    assert plan == read_native(written(tmp_path, content))
+    assert plan == read_native(write(tmp_path, content))
     assert plan == load_floorplan(path)
     assert [("bed_0", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
 
@@ -160,17 +160,17 @@ def test_doorways_that_a_file_leaves_out_are_looked_for(tmp_path: Path) -> None:
         {"type": "hall", "polygon": [[3.05, 0], [6, 0], [6, 3], [3.05, 3]]},
     ]
 
-    found = read(tmp_path, free=[{"outline": pinched}], rooms=rooms)
+    searched = read(tmp_path, free=[{"outline": pinched}], rooms=rooms)
     none = read(tmp_path, free=[{"outline": pinched}], rooms=rooms, doorways=[])
 
-    assert [0.9] == [pytest.approx(door.width_m) for door in found.doorways]
+    assert [0.9] == [pytest.approx(door.width_m) for door in searched.doorways]
     assert () == none.doorways
-    assert found == read_native(written(tmp_path, native_document(found)))
-    assert none == read_native(written(tmp_path, native_document(none)))
+    assert searched == read_native(write(tmp_path, native_document(searched)))
+    assert none == read_native(write(tmp_path, native_document(none)))
 
 
 def test_native_and_bundled_are_found_by_name(tmp_path: Path) -> None:
-    source = Native.model_validate({"path": str(written(tmp_path, PLAN)), "cell": 0.1})
+    source = Native.model_validate({"path": str(write(tmp_path, PLAN)), "cell": 0.1})
 
     assert 0.1 == source.load().lattice.cell
     assert Native is lookup("floorplan", "native")
@@ -213,13 +213,13 @@ def test_family_home_lets_a_body_of_25_cm_into_every_room(cell: float) -> None:
 
 def test_load_floorplan_tells_formats_by_content(tmp_path: Path) -> None:
     assert "family_home" == load_floorplan().name
-    assert "flat" == load_floorplan(written(tmp_path, PLAN)).name
-    assert 15.0 == pytest.approx(load_floorplan(written(tmp_path, {"verts": OUTLINE}), 0.1).area_m2)
+    assert "flat" == load_floorplan(write(tmp_path, PLAN)).name
+    assert 15.0 == pytest.approx(load_floorplan(write(tmp_path, {"verts": OUTLINE}), 0.1).area_m2)
 
 
 def test_load_floorplan_refuses_what_it_does_not_know(tmp_path: Path) -> None:
     with pytest.raises(FloorPlanError, match="no floor plan that Fleet2D knows"):
-        load_floorplan(written(tmp_path, {"walls": 3}))
+        load_floorplan(write(tmp_path, {"walls": 3}))
     with pytest.raises(FloorPlanError, match="did you mean 'family_home'"):
         load_floorplan("family-home")
     with pytest.raises(FloorPlanError, match="there is no file"):

@@ -12,7 +12,7 @@ from fleet2d.floorplan.formats.occupancy import OccupancyMap, free_space
 KEEP = {"speck_area_m2": 0.0, "ray_width": 0.0}
 
 
-def drawn(*lines: str, pixel: float = 0.1) -> OccupancyMap:
+def draw(*lines: str, pixel: float = 0.1) -> OccupancyMap:
     width = max(map(len, lines))
     pixels = np.array([list(line.ljust(width)) for line in lines])[::-1]
     return OccupancyMap(pixels == ".", pixels == "#", pixel)
@@ -38,7 +38,7 @@ def pixels_of(shape: Polygon, pixel: float = 0.1) -> int:
 
 
 def test_walls_are_the_sides_of_the_pixels_with_the_first_line_on_top() -> None:
-    free, notes = free_space(drawn("####", "#..#", "#.##", "####"), **KEEP)
+    free, notes = free_space(draw("####", "#..#", "#.##", "####"), **KEEP)
 
     assert free.normalize().equals_exact(
         Polygon(
@@ -50,7 +50,7 @@ def test_walls_are_the_sides_of_the_pixels_with_the_first_line_on_top() -> None:
 
 
 def test_unknown_inside_is_a_hole_with_a_note_of_its_length() -> None:
-    free, notes = free_space(drawn("#####", "#...#", "#. .#", "#...#", "#####"), **KEEP)
+    free, notes = free_space(draw("#####", "#...#", "#. .#", "#...#", "#####"), **KEEP)
 
     assert 1 == len(free.interiors)
     assert 8 == pixels_of(free)
@@ -58,7 +58,7 @@ def test_unknown_inside_is_a_hole_with_a_note_of_its_length() -> None:
 
 
 def test_pixels_that_share_only_a_corner_do_not_join() -> None:
-    free, notes = free_space(drawn("######", "#...##", "#####.", "######"), **KEEP)
+    free, notes = free_space(draw("######", "#...##", "#####.", "######"), **KEEP)
 
     assert 3 == pixels_of(free)
     assert "0.01 m2 of free space, in pieces: 1, that nothing joins to the rest" in notes[0]
@@ -66,7 +66,7 @@ def test_pixels_that_share_only_a_corner_do_not_join() -> None:
 
 
 def test_space_to_the_edge_of_the_image_ends_there_with_a_note() -> None:
-    free, notes = free_space(drawn("...", "..."), **KEEP)
+    free, notes = free_space(draw("...", "..."), **KEEP)
 
     assert 6 == pixels_of(free)
     assert [
@@ -76,7 +76,7 @@ def test_space_to_the_edge_of_the_image_ends_there_with_a_note() -> None:
 
 def test_a_map_with_nothing_free_is_refused() -> None:
     with pytest.raises(FloorPlanError, match="no pixel is free: check negate"):
-        free_space(drawn("###", "# #"), **KEEP)
+        free_space(draw("###", "# #"), **KEEP)
 
 
 # --- Specks -------------------------------------------------------------------------------------
@@ -148,10 +148,10 @@ def test_room_behind_a_gap_narrower_than_rays_is_left_out_and_behind_a_wider_one
     wide[10:13, 22:26] = "."
     narrow[10:12, 22:26] = "."
 
-    kept, _ = free_space(as_map(wide), speck_area_m2=0.0, ray_width=0.3)
+    wide_space, _ = free_space(as_map(wide), speck_area_m2=0.0, ray_width=0.3)
     cut, notes = free_space(as_map(narrow), speck_area_m2=0.0, ray_width=0.3)
 
-    assert 400 + 12 + 200 == pixels_of(kept)
+    assert 400 + 12 + 200 == pixels_of(wide_space)
     assert 400 + 2 == pixels_of(cut)
     assert "2.06 m2 of free space, in pieces: 1, that only passages" in notes[0]
 
@@ -186,11 +186,11 @@ def test_slanted_corners_keep_every_pixel() -> None:
 
 def test_space_narrower_than_rays_everywhere_is_refused() -> None:
     with pytest.raises(FloorPlanError, match=r"nowhere 0.3 m wide.*floorplan.ray_width"):
-        free_space(drawn("....", "    "), speck_area_m2=0.0, ray_width=0.3)
+        free_space(draw("....", "    "), speck_area_m2=0.0, ray_width=0.3)
 
 
 def test_width_of_zero_keeps_all_that_is_connected() -> None:
-    free, notes = free_space(drawn("#####.", "#....."), **KEEP)
+    free, notes = free_space(draw("#####.", "#....."), **KEEP)
 
     assert 6 == pixels_of(free)
     assert not any("left out" in note for note in notes)
@@ -208,10 +208,10 @@ def test_cleaning_is_the_same_on_every_side(ray_width: float) -> None:
     areas, holes, notes = set(), set(), set()
     for turns in range(4):
         for image in (np.rot90(pixels, turns), np.rot90(pixels, turns)[:, ::-1]):
-            free, said = free_space(as_map(image), speck_area_m2=0.03, ray_width=ray_width)
+            free, image_notes = free_space(as_map(image), speck_area_m2=0.03, ray_width=ray_width)
             areas.add(pixels_of(free))
             holes.add(len(free.interiors))
-            notes.add(tuple(note.partition("round (")[0] for note in said))
+            notes.add(tuple(note.partition("round (")[0] for note in image_notes))
 
     assert 1 == len(areas) == len(holes) == len(notes)
 

@@ -11,7 +11,7 @@ from fleet2d.floorplan.formats.raster import read_grey
 SHADES = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
 
 
-def written(folder: Path, content: bytes, name: str = "map.pgm") -> Path:
+def write(folder: Path, content: bytes, name: str = "map.pgm") -> Path:
     path = folder / name
     path.write_bytes(content)
     return path
@@ -39,7 +39,7 @@ def test_pgm_of_either_kind_and_depth_comes_back_as_written(
 ) -> None:
     values = SHADES.astype(np.int64) * factor
 
-    picture = read_grey(written(tmp_path, write(values, white)))  # type: ignore[operator]
+    picture = read_grey(write(tmp_path, write(values, white)))  # type: ignore[operator]
 
     assert white == picture.white
     assert np.array_equal(values, picture.values)
@@ -56,7 +56,7 @@ def test_pgm_of_either_kind_and_depth_comes_back_as_written(
     ],
 )
 def test_pgm_header_may_hold_comments_and_any_white_space(tmp_path: Path, header: bytes) -> None:
-    picture = read_grey(written(tmp_path, header + SHADES.tobytes()))
+    picture = read_grey(write(tmp_path, header + SHADES.tobytes()))
 
     assert np.array_equal(SHADES, picture.values)
 
@@ -64,30 +64,30 @@ def test_pgm_header_may_hold_comments_and_any_white_space(tmp_path: Path, header
 def test_packed_pixels_that_look_like_white_space_and_comments_are_pixels(tmp_path: Path) -> None:
     values = np.frombuffer(b"# \n\r\t  #\n\n \n", np.uint8).reshape(3, 4)
 
-    assert np.array_equal(values, read_grey(written(tmp_path, packed(values))).values)
+    assert np.array_equal(values, read_grey(write(tmp_path, packed(values))).values)
 
 
 def test_plain_pixels_may_be_followed_by_comments(tmp_path: Path) -> None:
     content = plain(SHADES).replace(b"20 40", b"20 # 1 2 3\n40")
 
-    assert np.array_equal(SHADES, read_grey(written(tmp_path, content)).values)
+    assert np.array_equal(SHADES, read_grey(write(tmp_path, content)).values)
 
 
 @pytest.mark.parametrize("write", [packed, plain])
 @pytest.mark.parametrize(
-    ("size", "said"), [(b"4 4", "it is cut off"), (b"4 2", "its header is wrong")]
+    ("size", "message"), [(b"4 4", "it is cut off"), (b"4 2", "its header is wrong")]
 )
 def test_pgm_of_another_size_than_its_header_is_refused(
-    tmp_path: Path, write: object, size: bytes, said: str
+    tmp_path: Path, write: object, size: bytes, message: str
 ) -> None:
     content = write(SHADES + 1).replace(b"4 3", size)  # type: ignore[operator]
 
-    with pytest.raises(FloorPlanError, match=rf"holds 12 pixels.*{said}"):
-        read_grey(written(tmp_path, content))
+    with pytest.raises(FloorPlanError, match=rf"holds 12 pixels.*{message}"):
+        read_grey(write(tmp_path, content))
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (b"P5\n4 3\n", "no PGM header"),
         (b"P5\n-4 3\n255\n", "no PGM header"),
@@ -107,11 +107,11 @@ def test_pgm_of_another_size_than_its_header_is_refused(
     ],
 )
 def test_damaged_or_foreign_image_is_refused_with_the_reason(
-    tmp_path: Path, content: bytes, said: str
+    tmp_path: Path, content: bytes, message: str
 ) -> None:
-    path = written(tmp_path, content)
+    path = write(tmp_path, content)
 
-    with pytest.raises(FloorPlanError, match=said) as caught:
+    with pytest.raises(FloorPlanError, match=message) as caught:
         read_grey(path)
 
     assert str(path) in str(caught.value)
@@ -162,14 +162,14 @@ def test_truncated_png_is_refused(tmp_path: Path) -> None:
         with pytest.raises(
             FloorPlanError, match=r"damaged PNG|holds 29 rows, but its header says 60"
         ):
-            read_grey(written(tmp_path, content[:length], "map.png"))
+            read_grey(write(tmp_path, content[:length], "map.png"))
 
 
 def test_png_without_pillow_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "PIL", None)
-    path = written(tmp_path, b"\x89PNG\r\n\x1a\n")
+    path = write(tmp_path, b"\x89PNG\r\n\x1a\n")
 
     with pytest.raises(FloorPlanError, match=r'pip install "fleet2d\[viz\]"'):
         read_grey(path)

@@ -29,7 +29,7 @@ def pgm(pixels: NDArray[np.uint8]) -> bytes:
     return f"P5\n# a comment\n{columns} {rows}\n255\n".encode() + pixels.tobytes()
 
 
-def written(folder: Path, pixels: NDArray[np.uint8] = ROOM, **changes: Any) -> Path:
+def write(folder: Path, pixels: NDArray[np.uint8] = ROOM, **changes: Any) -> Path:
     """Write a map; a change to None leaves the key out."""
     keys = {
         "image": "map.pgm",
@@ -101,7 +101,7 @@ def test_real_maps_have_the_same_area_turned_and_mirrored(
     pixels = np.frombuffer(body, np.uint8).reshape(side, side)
 
     areas = {
-        read_ros(written(tmp_path, np.ascontiguousarray(image))).area_m2
+        read_ros(write(tmp_path, np.ascontiguousarray(image))).area_m2
         for turns in range(4)
         for image in (np.rot90(pixels, turns), np.rot90(pixels, turns)[:, ::-1])
     }
@@ -124,7 +124,7 @@ def test_a_robot_reaches_nearly_all_of_the_real_maps(shared_data: Path, folder: 
 
 
 def test_first_row_of_the_image_is_the_top_and_origin_the_lower_left(tmp_path: Path) -> None:
-    plan = read_ros(written(tmp_path, origin=[-3.0, 7.0, 0.0]))
+    plan = read_ros(write(tmp_path, origin=[-3.0, 7.0, 0.0]))
 
     assert (-2.9, 7.1, -0.9, 8.6) == pytest.approx(plan.bounds)
     assert 2.5 == pytest.approx(plan.area_m2)
@@ -136,7 +136,7 @@ def test_first_row_of_the_image_is_the_top_and_origin_the_lower_left(tmp_path: P
 def test_yaw_turns_the_map_about_its_origin(tmp_path: Path, yaw: float) -> None:
     origin, at = np.array([2.0, -1.0]), np.array([2.0, 0.2])  # lower right; (2, 1.4) is upper right
 
-    plan = read_ros(written(tmp_path, origin=[*origin.tolist(), yaw]))
+    plan = read_ros(write(tmp_path, origin=[*origin.tolist(), yaw]))
 
     turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     assert 2.5 == pytest.approx(plan.area_m2, abs=0.01)
@@ -146,13 +146,13 @@ def test_yaw_turns_the_map_about_its_origin(tmp_path: Path, yaw: float) -> None:
 
 
 def test_quarter_turns_are_exact(tmp_path: Path) -> None:
-    plan = read_ros(written(tmp_path, origin=[0.0, 0.0, math.pi / 2]))
+    plan = read_ros(write(tmp_path, origin=[0.0, 0.0, math.pi / 2]))
 
     assert not (shapely.get_coordinates(plan.polygons) % 64).any()
 
 
 def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path: Path) -> None:
-    plan = read_ros(written(tmp_path, origin=[-3.2718, 1.0123, 0.0]))
+    plan = read_ros(write(tmp_path, origin=[-3.2718, 1.0123, 0.0]))
 
     assert 2.5 == pytest.approx(plan.area_m2, rel=1e-9)
     assert (-3.1718, 1.1123) == pytest.approx(plan.bounds[:2], abs=0.05 / 64)
@@ -162,7 +162,7 @@ def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path: Pat
 
 
 def test_cell_is_the_resolution_unless_given(tmp_path: Path) -> None:
-    path = written(tmp_path, resolution=0.04)
+    path = write(tmp_path, resolution=0.04)
 
     assert 0.04 == read_ros(path).lattice.cell
     assert 0.1 == read_ros(path, 0.1).lattice.cell
@@ -170,7 +170,7 @@ def test_cell_is_the_resolution_unless_given(tmp_path: Path) -> None:
 
 
 def test_resolution_below_the_smallest_cell_takes_that(tmp_path: Path) -> None:
-    plan = read_ros(written(tmp_path, resolution=0.005), ray_width=0.03)
+    plan = read_ros(write(tmp_path, resolution=0.005), ray_width=0.03)
 
     assert 0.01 == plan.lattice.cell
     assert 0.025 == pytest.approx(plan.area_m2)
@@ -180,10 +180,10 @@ def test_resolution_below_the_smallest_cell_takes_that(tmp_path: Path) -> None:
 
 
 def test_negate_takes_white_for_occupied(tmp_path: Path) -> None:
-    plain = read_ros(written(tmp_path))
+    plain = read_ros(write(tmp_path))
 
-    assert plain == read_ros(written(tmp_path, 255 - ROOM, negate=1))
-    assert plain == read_ros(written(tmp_path, 255 - ROOM, negate="true"))
+    assert plain == read_ros(write(tmp_path, 255 - ROOM, negate=1))
+    assert plain == read_ros(write(tmp_path, 255 - ROOM, negate="true"))
 
 
 @pytest.mark.parametrize(("free_thresh", "free"), [(0.1, False), (100 / 255, False), (0.393, True)])
@@ -193,7 +193,7 @@ def test_pixels_are_free_below_free_thresh_only(
     pixels = ROOM.copy()
     pixels[20:30, 20:30] = 155  # a chance of 100/255 = 0.392 of being occupied
 
-    plan = read_ros(written(tmp_path, pixels, free_thresh=free_thresh))
+    plan = read_ros(write(tmp_path, pixels, free_thresh=free_thresh))
 
     assert free == (plan.area_m2 > 2.4)
 
@@ -202,8 +202,8 @@ def test_occupied_thresh_tells_obstacles_from_unknown(tmp_path: Path) -> None:
     pixels = ROOM.copy()
     pixels[20:30, 20:30] = 155
 
-    loose = read_ros(written(tmp_path, pixels, occupied_thresh=0.392))
-    strict = read_ros(written(tmp_path, pixels, occupied_thresh=0.393))
+    loose = read_ros(write(tmp_path, pixels, occupied_thresh=0.392))
+    strict = read_ros(write(tmp_path, pixels, occupied_thresh=0.393))
 
     assert loose == strict  # both are walls
     assert () == loose.notes
@@ -211,13 +211,13 @@ def test_occupied_thresh_tells_obstacles_from_unknown(tmp_path: Path) -> None:
 
 
 def test_unknown_grey_that_the_threshold_makes_free_is_noted(tmp_path: Path) -> None:
-    plan = read_ros(written(tmp_path, free_thresh=0.25), ray_width=0.0)
+    plan = read_ros(write(tmp_path, free_thresh=0.25), ray_width=0.0)
 
     assert "free_thresh is 0.25: so 152 pixels of the grey" in plan.notes[0]
 
 
 def test_scale_mode_takes_what_is_between_for_unknown(tmp_path: Path) -> None:
-    assert read_ros(written(tmp_path)) == read_ros(written(tmp_path, mode="scale"))
+    assert read_ros(write(tmp_path)) == read_ros(write(tmp_path, mode="scale"))
 
 
 def test_raw_mode_takes_values_for_percent_and_those_above_100_for_unknown(tmp_path: Path) -> None:
@@ -225,10 +225,10 @@ def test_raw_mode_takes_values_for_percent_and_those_above_100_for_unknown(tmp_p
     percent[20:30, 20:30] = 19  # just below free_thresh
     percent[15, 25:29] = 20
 
-    plan = read_ros(written(tmp_path, percent, mode="raw"), speck_area_m2=0)
+    plan = read_ros(write(tmp_path, percent, mode="raw"), speck_area_m2=0)
 
     assert 2.5 - 4 * 0.05**2 == pytest.approx(plan.area_m2)
-    assert read_ros(written(tmp_path)) == read_ros(written(tmp_path, percent, mode="raw"))
+    assert read_ros(write(tmp_path)) == read_ros(write(tmp_path, percent, mode="raw"))
 
 
 def test_transparent_pixels_of_a_png_are_unknown(tmp_path: Path) -> None:
@@ -237,7 +237,7 @@ def test_transparent_pixels_of_a_png_are_unknown(tmp_path: Path) -> None:
     pixels[20:30, 20:30, 3] = 0
     images.fromarray(pixels).save(tmp_path / "map.png")
 
-    plan = read_ros(written(tmp_path, image="map.png"))
+    plan = read_ros(write(tmp_path, image="map.png"))
 
     assert 2.5 - 0.25 == pytest.approx(plan.area_m2)
 
@@ -249,21 +249,21 @@ def test_cleaning_is_tuned_by_the_component(tmp_path: Path) -> None:
     pixels = ROOM.copy()
     pixels[25, 25:29] = OCCUPIED  # 0.01 m2
     pixels[20:22, 42:44] = FREE  # a gap in the wall, to the edge of the image
-    path = written(tmp_path, pixels)
+    path = write(tmp_path, pixels)
 
     cleaned = Ros(path=path).load()
-    kept = Ros(path=path, speck_area_m2=0, ray_width="1 cm").load()
+    plan = Ros(path=path, speck_area_m2=0, ray_width="1 cm").load()
 
     assert 2.5 + 0.01 == pytest.approx(cleaned.area_m2)
-    assert 2.5 - 0.01 + 0.01 == pytest.approx(kept.area_m2)
+    assert 2.5 - 0.01 + 0.01 == pytest.approx(plan.area_m2)
     assert 0 == len(cleaned.polygons[0].interiors)
-    assert 1 == len(kept.polygons[0].interiors)
+    assert 1 == len(plan.polygons[0].interiors)
 
 
 def test_simplify_straightens_jagged_walls_within_the_tolerance(tmp_path: Path) -> None:
     y, x = np.indices((60, 60))
     pixels = np.where((x > 1) & (y > 1) & (x + 2 * y < 100), FREE, OCCUPIED).astype(np.uint8)
-    path = written(tmp_path, pixels)
+    path = write(tmp_path, pixels)
 
     exact = read_ros(path)
     straight = read_ros(path, simplify=0.05)
@@ -288,8 +288,8 @@ def test_simplify_straightens_jagged_walls_within_the_tolerance(tmp_path: Path) 
 def test_image_may_be_absolute(tmp_path: Path) -> None:
     home = tmp_path / "home"
     home.mkdir()
-    written(tmp_path)
-    path = written(home, image=tmp_path / "map.pgm")
+    write(tmp_path)
+    path = write(home, image=tmp_path / "map.pgm")
     (home / "map.pgm").unlink()
 
     assert 2.5 == pytest.approx(read_ros(path).area_m2)
@@ -299,19 +299,19 @@ def test_image_may_be_absolute(tmp_path: Path) -> None:
 def test_image_that_stayed_on_another_computer_is_taken_from_beside_with_a_note(
     tmp_path: Path, image: str
 ) -> None:
-    plan = read_ros(written(tmp_path, image=image))
+    plan = read_ros(write(tmp_path, image=image))
 
     assert f"there is no image {image}: map.pgm beside map.yaml was taken" == plan.notes[0]
 
 
 def test_missing_image_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, image="other.pgm")
+    path = write(tmp_path, image="other.pgm")
 
     assert f"there is no image {tmp_path / 'other.pgm'}" in refusal(path)
 
 
 def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path)
+    path = write(tmp_path)
     (tmp_path / "map.pgm").write_bytes(pgm(ROOM)[:-100])
 
     assert "holds 1396 pixels, but its header says 44 x 34 = 1496" in refusal(path)
@@ -321,7 +321,7 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"image": None}, "the key 'image' is missing, as in `image: map.pgm`"),
         ({"resolution": None}, "the key 'resolution' is missing"),
@@ -354,13 +354,13 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
     ],
 )
 def test_wrong_settings_are_refused_with_the_reason(
-    tmp_path: Path, changes: dict[str, Any], said: str
+    tmp_path: Path, changes: dict[str, Any], message: str
 ) -> None:
-    assert said in refusal(written(tmp_path, **changes))
+    assert message in refusal(write(tmp_path, **changes))
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (b"", "holds nothing: a floor plan is a YAML mapping"),
         (b"[1, 2]", "holds a list: a floor plan is a YAML mapping"),
@@ -369,11 +369,11 @@ def test_wrong_settings_are_refused_with_the_reason(
         (b"mode: inorder\nposes: []\n", "no ROS map: the key 'image' is missing"),
     ],
 )
-def test_other_files_are_refused(tmp_path: Path, content: bytes, said: str) -> None:
+def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
     path = tmp_path / "map.yaml"
     path.write_bytes(content)
 
-    assert said in refusal(path)
+    assert message in refusal(path)
 
 
 def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
@@ -382,21 +382,21 @@ def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
 
 
 def test_map_too_large_for_the_cells_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, np.full((20, 17_000), FREE, np.uint8))
+    path = write(tmp_path, np.full((20, 17_000), FREE, np.uint8))
 
     assert "too large for cells of 0.05 m" in refusal(path)
 
 
 def test_resolution_with_an_exponent_is_a_number(tmp_path: Path) -> None:
     """YAML 1.1 takes 5e-2 for text."""
-    assert 0.05 == read_ros(written(tmp_path, resolution="5e-2")).lattice.cell
+    assert 0.05 == read_ros(write(tmp_path, resolution="5e-2")).lattice.cell
 
 
 # --- As a component, and by its file ------------------------------------------------------------
 
 
 def test_component_is_found_and_holds_the_cell_for_the_manifest(tmp_path: Path) -> None:
-    path = written(tmp_path, resolution=0.04)
+    path = write(tmp_path, resolution=0.04)
 
     source = Ros(path=path)
 
@@ -409,7 +409,7 @@ def test_component_is_found_and_holds_the_cell_for_the_manifest(tmp_path: Path) 
 
 
 def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path: Path) -> None:
-    source = Ros(path=written(tmp_path, resolution=0))
+    source = Ros(path=write(tmp_path, resolution=0))
 
     with pytest.raises(FloorPlanError, match="resolution is 0"):
         source.load()
@@ -418,18 +418,18 @@ def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path: Path) -> None
 @pytest.mark.parametrize("key", ["speck_area_m2", "ray_width", "simplify"])
 def test_negative_cleaning_is_refused(tmp_path: Path, key: str) -> None:
     with pytest.raises(ValidationError, match=key):
-        Ros(path=written(tmp_path), **{key: -1})
+        Ros(path=write(tmp_path), **{key: -1})
 
 
 def test_load_floorplan_knows_a_map_by_its_file(tmp_path: Path) -> None:
-    path = written(tmp_path, resolution=0.04)
+    path = write(tmp_path, resolution=0.04)
 
     assert read_ros(path) == load_floorplan(path)
     assert 0.1 == load_floorplan(path, 0.1).lattice.cell
 
 
 def test_load_floorplan_of_the_image_names_the_yaml_file(tmp_path: Path) -> None:
-    written(tmp_path)
+    write(tmp_path)
 
     with pytest.raises(FloorPlanError, match=r"name the YAML file.*map\.yaml"):
         load_floorplan(tmp_path / "map.pgm")

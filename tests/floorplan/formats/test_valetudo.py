@@ -67,18 +67,18 @@ def vacuum_map(*layers: dict[str, Any], **changes: Any) -> dict[str, Any]:
     }
 
 
-def written(folder: Path, content: object) -> Path:
+def write(folder: Path, content: object) -> Path:
     path = folder / "home.json"
     path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
     return path
 
 
 def home(folder: Path, *layers: dict[str, Any], **changes: Any) -> FloorPlan:
-    return read_valetudo(written(folder, vacuum_map(*layers, **changes)))
+    return read_valetudo(write(folder, vacuum_map(*layers, **changes)))
 
 
 def refusal(folder: Path, content: object) -> str:
-    path = written(folder, content)
+    path = write(folder, content)
     with pytest.raises(FloorPlanError) as caught:
         read_valetudo(path)
     assert str(path) in str(caught.value)
@@ -101,15 +101,15 @@ def assert_box(expected: tuple[float, float, float, float], plan: FloorPlan) -> 
 
 def pixels_of(content: dict[str, Any], *kinds: str) -> set[tuple[int, int]]:
     """The pixels (x, y) of all layers of some kinds, decoded one by one."""
-    found: set[tuple[int, int]] = set()
+    pixels: set[tuple[int, int]] = set()
     for item in content["layers"]:
         if item["type"] not in kinds:
             continue
         packed, single = item.get("compressedPixels") or [], item.get("pixels") or []
         for x, y, count in zip(packed[::3], packed[1::3], packed[2::3], strict=True):
-            found.update((x + k, y) for k in range(count))
-        found.update(zip(single[::2], single[1::2], strict=True))
-    return found
+            pixels.update((x + k, y) for k in range(count))
+        pixels.update(zip(single[::2], single[1::2], strict=True))
+    return pixels
 
 
 @pytest.mark.parametrize("name", MAPS)
@@ -219,7 +219,7 @@ def test_real_map_comes_back_from_our_own_format(
 ) -> None:
     plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
 
-    assert plan == read_native(written(tmp_path, native_document(plan)))
+    assert plan == read_native(write(tmp_path, native_document(plan)))
 
 
 # --- Free space ---------------------------------------------------------------------------------
@@ -285,12 +285,12 @@ def test_room_inside_a_ring_of_wall_is_apart(tmp_path: Path) -> None:
 def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path: Path) -> None:
     plan = home(tmp_path)
 
-    found = [(room.name, room.type, room.labels, room.cells) for room in plan.rooms]
+    rooms = [(room.name, room.type, room.labels, room.cells) for room in plan.rooms]
     assert [
         ("Kitchen", "kitchen", ("kitchen",), 1200),
         ("segment_17", "unknown", ("segment_17",), 600),
         ("unknown_0", "unknown", (), 200),
-    ] == found
+    ] == rooms
 
 
 def test_segments_of_one_name_get_names_of_their_own(tmp_path: Path) -> None:
@@ -330,10 +330,8 @@ def test_umlaut_written_as_two_characters_is_the_same_name(tmp_path: Path) -> No
 # --- No-go areas and virtual walls ----------------------------------------------------------------
 
 
-def walled(folder: Path, *entities: dict[str, Any]) -> FloorPlan:
-    return read_valetudo(
-        written(folder, vacuum_map(KITCHEN, entities=list(entities))), no_go="wall"
-    )
+def home_with_walls(folder: Path, *entities: dict[str, Any]) -> FloorPlan:
+    return read_valetudo(write(folder, vacuum_map(KITCHEN, entities=list(entities))), no_go="wall")
 
 
 def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path: Path) -> None:
@@ -347,14 +345,14 @@ def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path: Path) -> 
     assert_box((0.5, -2.0, 2.5, -0.5), plan)
     assert [(1.01, -1.5, 1.14, -1.0), (0.5, -1.025, 2.5, -0.975)] == [a.bounds for a in plan.no_go]
     assert "no-go areas in the map: 1, robots keep out of them" in plan.notes
-    assert plan == read_native(written(tmp_path, native_document(plan)))
+    assert plan == read_native(write(tmp_path, native_document(plan)))
 
 
 def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) -> None:
     """From 101 to 114 cm are the pixels 20 to 22, down to 150 cm the row 29."""
     area = entity("no_go_area", 101, 100, 114, 100, 114, 150, 101, 150)
 
-    plan = walled(tmp_path, area)
+    plan = home_with_walls(tmp_path, area)
 
     (hole,) = (shapely.Polygon(hole) for hole in whole(plan).geoms[0].interiors)
     assert pytest.approx((1.0, -1.5, 1.15, -1.0)) == hole.bounds
@@ -365,7 +363,7 @@ def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) 
 def test_virtual_wall_parts_a_room(tmp_path: Path, y: int) -> None:
     wall = entity("virtual_wall", 50, y, 250, y + 31)
 
-    plan = walled(tmp_path, wall)
+    plan = home_with_walls(tmp_path, wall)
 
     assert 2 == len(plan.polygons)
     assert plan.area_m2 > 1140 * PIXEL_AREA - 0.2
@@ -376,7 +374,7 @@ def test_no_go_areas_can_be_ignored(tmp_path: Path) -> None:
         entity("no_go_area", 60, 60, 200, 60, 200, 150, 60, 150),
         entity("virtual_wall", 50, 100, 250, 100),
     ]
-    path = written(tmp_path, vacuum_map(KITCHEN, entities=entities))
+    path = write(tmp_path, vacuum_map(KITCHEN, entities=entities))
 
     plan = read_valetudo(path, no_go="ignore")
 
@@ -416,7 +414,7 @@ def test_no_go_area_beyond_the_floor_and_no_mop_area_change_nothing(tmp_path: Pa
 def test_no_go_area_over_everything_leaves_no_floor(tmp_path: Path) -> None:
     area = entity("no_go_area", 0, 0, 900, 0, 900, 900, 0, 900)
 
-    path = written(tmp_path, vacuum_map(entities=[area]))
+    path = write(tmp_path, vacuum_map(entities=[area]))
 
     with pytest.raises(FloorPlanError, match="no floor is left"):
         read_valetudo(path, no_go="wall")
@@ -434,7 +432,7 @@ def test_path_and_charger_are_in_the_frame_of_the_plan(tmp_path: Path) -> None:
         entity("charger_location", 60, 75),
         entity("path", 200, 150),
     ]
-    path = written(tmp_path, vacuum_map(entities=entities))
+    path = write(tmp_path, vacuum_map(entities=entities))
 
     assert [[1.0, -1.0], [1.5, -1.005], [2.0, -1.5]] == read_valetudo_path(path).tolist()
     assert [2, 1] == [len(piece) for piece in read_valetudo_paths(path)]
@@ -472,11 +470,11 @@ def test_charger_far_from_all_floor_has_no_place_to_stand(tmp_path: Path) -> Non
     plan = home(tmp_path, entities=[entity("charger_location", 5000, 5000)])
 
     assert [()] == [thing.uses for thing in plan.objects]
-    assert plan == read_native(written(tmp_path, native_document(plan)))
+    assert plan == read_native(write(tmp_path, native_document(plan)))
 
 
 def test_map_without_path_and_charger_says_so(tmp_path: Path) -> None:
-    path = written(tmp_path, vacuum_map())
+    path = write(tmp_path, vacuum_map())
 
     assert (0, 2) == read_valetudo_path(path).shape
     assert [] == read_valetudo_paths(path)
@@ -488,7 +486,7 @@ def test_map_without_path_and_charger_says_so(tmp_path: Path) -> None:
 @pytest.mark.parametrize("read", [read_valetudo_path, read_valetudo, read_valetudo_paths])
 def test_damaged_path_is_refused(tmp_path: Path, read: Any, points: object) -> None:
     bad = {"type": "path", "points": points}
-    path = written(tmp_path, vacuum_map(entities=[bad]))
+    path = write(tmp_path, vacuum_map(entities=[bad]))
 
     with pytest.raises(FloorPlanError, match=r"home\.json: entities\[0\]\.points"):
         read(path)
@@ -498,7 +496,7 @@ def test_damaged_path_is_refused(tmp_path: Path, read: Any, points: object) -> N
 
 
 def test_component_takes_the_cell_from_the_map(tmp_path: Path) -> None:
-    path = written(tmp_path, vacuum_map(pixelSize=4))
+    path = write(tmp_path, vacuum_map(pixelSize=4))
 
     source = Valetudo(path=path)
 
@@ -509,7 +507,7 @@ def test_component_takes_the_cell_from_the_map(tmp_path: Path) -> None:
 
 
 def test_given_cell_is_used(tmp_path: Path) -> None:
-    path = written(tmp_path, vacuum_map())
+    path = write(tmp_path, vacuum_map())
 
     for plan in (Valetudo(path=path, cell=0.1).load(), load_floorplan(path, 0.1)):
         assert 0.1 == plan.lattice.cell
@@ -518,11 +516,11 @@ def test_given_cell_is_used(tmp_path: Path) -> None:
 
 def test_component_refuses_an_unknown_choice(tmp_path: Path) -> None:
     with pytest.raises(ValidationError, match="keep_out"):
-        Valetudo(path=written(tmp_path, vacuum_map()), no_go="maybe")
+        Valetudo(path=write(tmp_path, vacuum_map()), no_go="maybe")
 
 
 def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path: Path) -> None:
-    source = Valetudo(path=written(tmp_path, "{"))
+    source = Valetudo(path=write(tmp_path, "{"))
 
     with pytest.raises(FloorPlanError, match="is not JSON"):
         source.load()

@@ -218,8 +218,8 @@ def test_nothing_stands_before_a_doorway() -> None:
     for seed in range(10):
         furnished = furnish(plan, seed)
         assert len(furnished.objects) >= 5
-        taken = shapely.union_all(footprints(furnished))
-        assert shapely.intersection(before, taken).area < 1e-9
+        covered = shapely.union_all(footprints(furnished))
+        assert shapely.intersection(before, covered).area < 1e-9
 
 
 def test_charger_stands_once_in_the_hallway() -> None:

@@ -59,7 +59,7 @@ def truth(home: Home, shut: list[Segment], eye: I64, points: I64) -> NDArray[np.
     return inside[1:] & inside[0] & ~touches_any_wall(walls, eye, points)
 
 
-def compared(home: Home, rng: np.random.Generator, doors: int, eyes: int, points: int) -> int:
+def compare(home: Home, rng: np.random.Generator, doors: int, eyes: int, points: int) -> int:
     """Compare all verdicts with some doors shut; return how many there were."""
     home, segments = with_doors(home, rng, doors)
     corners = [end for segment in segments for end in segment]
@@ -73,8 +73,8 @@ def compared(home: Home, rng: np.random.Generator, doors: int, eyes: int, points
         targets = awkward_points(home, rng, points)
         on_doors = [np.array(ends, np.int64) for line in segments for ends in (line,)]
         targets = np.concatenate([targets, *[(e[:1] + e[1:]) // 2 for e in on_doors]])
-        found = verdicts(mesh, eye, targets)
-        np.testing.assert_array_equal(truth(home, lines, eye, targets), found)
+        answers = verdicts(mesh, eye, targets)
+        np.testing.assert_array_equal(truth(home, lines, eye, targets), answers)
         pairs += len(targets)
     return pairs
 
@@ -85,12 +85,12 @@ def test_who_sees_what_past_shut_and_open_doors_is_as_every_wall_says(
     polygons: list[shapely.Polygon], seed: int
 ) -> None:
     assume(len(home_of(polygons).cells))
-    compared(home_of(polygons), np.random.default_rng(seed), doors=4, eyes=3, points=40)
+    compare(home_of(polygons), np.random.default_rng(seed), doors=4, eyes=3, points=40)
 
 
 def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data: Path) -> None:
     rng = np.random.default_rng(5)
-    pairs = [compared(home, rng, doors=6, eyes=4, points=250) for home in all_homes(shared_data)]
+    pairs = [compare(home, rng, doors=6, eyes=4, points=250) for home in all_homes(shared_data)]
     assert sum(pairs) > 800 * len(pairs)
 
 

@@ -9,16 +9,16 @@ from fleet2d.floorplan.home.change import HomeChange, HomeChanges
 
 
 @pytest.mark.parametrize(
-    ("written", "meant"),
+    ("text", "moment"),
     [
         ("2 d 14 h", timedelta(days=2, hours=14)),
         ("2026-01-07T14:00", datetime(2026, 1, 7, 14)),
         ("2026-01-07", datetime(2026, 1, 7)),
     ],
 )
-def test_moment_is_a_local_time_or_the_time_since_the_start(written: str, meant: object) -> None:
-    change = HomeChange(at=written, shut="door")
-    assert meant == change.at
+def test_moment_is_a_local_time_or_the_time_since_the_start(text: str, moment: object) -> None:
+    change = HomeChange(at=text, shut="door")
+    assert moment == change.at
     assert change == HomeChange.model_validate(change.model_dump(mode="json"))
 
 
@@ -39,7 +39,7 @@ def test_change_that_is_not_exactly_one_is_refused(settings: dict, words: str) -
 
 
 def test_changes_become_columns_in_their_order() -> None:
-    asked = HomeChanges([HomeChange(open="b"), HomeChange(move="sofa_0", to=(1, 2))])
-    columns = asked.to_columns()
+    output = HomeChanges([HomeChange(open="b"), HomeChange(move="sofa_0", to=(1, 2))])
+    columns = output.to_columns()
     assert ["open", "move"] == columns["change"].tolist()
     assert ["b", "sofa_0"] == columns["target"].tolist()

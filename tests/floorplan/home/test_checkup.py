@@ -24,8 +24,8 @@ REGIONS = (
 )
 
 
-def home(free: shapely.Geometry = FREE, regions=REGIONS, **given) -> FloorPlan:  # type: ignore[no-untyped-def]
-    return FloorPlan.build("home", free, regions, **given)
+def home(free: shapely.Geometry = FREE, regions=REGIONS, **parts) -> FloorPlan:  # type: ignore[no-untyped-def]
+    return FloorPlan.build("home", free, regions, **parts)
 
 
 def only(findings: list[Finding]) -> Finding:
@@ -107,11 +107,11 @@ def test_bed_that_nobody_can_get_to_is_found() -> None:
         PlacedObject("", "fence", shapely.box(8.6, 1.7, 10, 1.8)),
         PlacedObject("", "fence", shapely.box(8.6, 1.8, 8.8, 4)),
     ]
-    found = only(checkup(home(objects=[bed, *fence])))
+    finding = only(checkup(home(objects=[bed, *fence])))
 
-    assert ("object", "wrong") == (found.kind, found.severity)
-    assert "nobody can get to cot" in found.text
-    assert bed.footprint == found.shape
+    assert ("object", "wrong") == (finding.kind, finding.severity)
+    assert "nobody can get to cot" in finding.text
+    assert bed.footprint == finding.shape
 
 
 def test_object_in_a_wall_and_objects_in_each_other_are_found() -> None:
@@ -134,10 +134,10 @@ def test_charger_in_its_niche_is_no_fault() -> None:
 
 def test_door_in_no_wall_is_found() -> None:
     lost = DoorLine((2.0, 20.0), (3.0, 20.0), "trapdoor")
-    found = only(checkup(home(doorways=[lost])))
+    finding = only(checkup(home(doorways=[lost])))
 
-    assert ("door", "wrong", (2.5, 20.0)) == (found.kind, found.severity, found.at)
-    assert "trapdoor" in found.text
+    assert ("door", "wrong", (2.5, 20.0)) == (finding.kind, finding.severity, finding.at)
+    assert "trapdoor" in finding.text
 
 
 def test_door_as_wide_as_a_room_is_found() -> None:
@@ -147,18 +147,18 @@ def test_door_as_wide_as_a_room_is_found() -> None:
 
 def test_label_outside_the_home_is_found() -> None:
     far = LabelledRegion(("Garage",), shapely.box(4, -10, 6, -6))
-    found = only(checkup(home(regions=[*REGIONS, far])))
+    finding = only(checkup(home(regions=[*REGIONS, far])))
 
-    assert ("outside", "odd") == (found.kind, found.severity)
-    assert "100 % of what is labelled garage lies outside the home" in found.text
+    assert ("outside", "odd") == (finding.kind, finding.severity)
+    assert "100 % of what is labelled garage lies outside the home" in finding.text
 
 
 def test_labels_that_overlap_are_found_once() -> None:
     office = LabelledRegion(("Office",), shapely.box(6, 0, 10, 4))
-    found = only(checkup(home(regions=[*REGIONS, office])))
+    finding = only(checkup(home(regions=[*REGIONS, office])))
 
-    assert "the labels bedroom and office overlap by 16.0 m2" in found.text
-    assert (6, 0, 10, 4) == found.shape.bounds
+    assert "the labels bedroom and office overlap by 16.0 m2" in finding.text
+    assert (6, 0, 10, 4) == finding.shape.bounds
 
 
 def test_two_labels_of_one_box_do_not_overlap() -> None:
@@ -171,11 +171,11 @@ def test_two_labels_of_one_box_do_not_overlap() -> None:
     ("factor", "unit"), [(100, "centimetres"), (20, "pixels of 5 cm"), (0.1, "very small")]
 )
 def test_wrong_scale_is_found_with_a_guess(factor: float, unit: str) -> None:
-    def scaled(shape: shapely.Geometry) -> shapely.Geometry:
+    def scale_shape(shape: shapely.Geometry) -> shapely.Geometry:
         return shapely.transform(shape, lambda xy: xy * factor)
 
-    regions = [LabelledRegion(region.labels, scaled(region.shape)) for region in REGIONS]
-    plan = home(scaled(FREE), regions, cell=max(0.02, 0.02 * factor) if factor < 50 else 1.0)
+    regions = [LabelledRegion(region.labels, scale_shape(region.shape)) for region in REGIONS]
+    plan = home(scale_shape(FREE), regions, cell=max(0.02, 0.02 * factor) if factor < 50 else 1.0)
     scale = only([f for f in checkup(plan) if f.kind == "scale"])
 
     assert "wrong" == scale.severity

@@ -100,11 +100,11 @@ def test_way_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
     worst = 1.0
     for a, b in rng.choice(cells, (40, 2)).tolist():
         start, goal = plan.lattice.cell_centre(*a), plan.lattice.cell_centre(*b)
-        shortest, found = space.route(start, goal), route_by_cost(space, free, start, goal)
+        shortest, cheapest = space.route(start, goal), route_by_cost(space, free, start, goal)
         assert shortest is not None
-        assert found is not None
-        assert length(found) >= length(shortest) - 1e-6
-        worst = max(worst, length(found) / max(length(shortest), 1.0))
+        assert cheapest is not None
+        assert length(cheapest) >= length(shortest) - 1e-6
+        worst = max(worst, length(cheapest) / max(length(shortest), 1.0))
     assert worst < 1.06
 
 
@@ -159,22 +159,22 @@ def test_wrong_settings_are_an_error_that_names_the_key(
 
 def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
     """Return the parts of a set of cells, by walking from side to side, the largest first."""
-    parts, left = [], set(open_cells)
-    while left:
-        waiting = [left.pop()]
-        part = set(waiting)
-        while waiting:
-            row, column = waiting.pop()
+    parts, unvisited = [], set(open_cells)
+    while unvisited:
+        queue = [unvisited.pop()]
+        part = set(queue)
+        while queue:
+            row, column = queue.pop()
             for other in (
                 (row + 1, column),
                 (row - 1, column),
                 (row, column + 1),
                 (row, column - 1),
             ):
-                if other in left:
-                    left.remove(other)
+                if other in unvisited:
+                    unvisited.remove(other)
                     part.add(other)
-                    waiting.append(other)
+                    queue.append(other)
         parts.append(part)
     return sorted(parts, key=lambda part: (-len(part), min(part)))
 

@@ -88,8 +88,8 @@ def test_unknown_layer_says_which_there_are_and_how_to_get_it(home: Home) -> Non
 
 def test_copies_of_a_home_have_layers_of_their_own(home: Home) -> None:
     layer = home.layers.add("dust")
-    kept = {"home": home, "layer": layer, "values": layer.values}
-    twin = copy.deepcopy(kept)
+    state = {"home": home, "layer": layer, "values": layer.values}
+    twin = copy.deepcopy(state)
     twin["layer"].values += 1
 
     assert twin["home"].layers["dust"] is twin["layer"]

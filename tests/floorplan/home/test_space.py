@@ -58,7 +58,7 @@ def space_of(path: Path, radius: float) -> Space:
     return Space(plan_of(path), radius)
 
 
-def built(free: shapely.Geometry) -> FloorPlan:
+def build_plan(free: shapely.Geometry) -> FloorPlan:
     """Return the plan of free space in metres."""
     return FloorPlan.build("test home", free)
 
@@ -132,7 +132,7 @@ def space_in(polygons: list[Polygon], radius: float) -> Space | None:
     """Return the space of a body in free space [lattice], or None where there is none."""
     free = shapely.transform(shapely.MultiPolygon(polygons), lambda xy: xy / UNITS_PER_M)
     try:
-        return Space(built(free), radius)
+        return Space(build_plan(free), radius)
     except FloorPlanError:
         return None
 
@@ -166,7 +166,7 @@ def test_space_is_what_is_a_radius_off_the_walls_and_no_farther_off_than_stated(
 def test_clearance_from_a_wall_at_any_angle_is_as_stated(degrees: float) -> None:
     """At most 8.3 % more than the radius, next to rounding; nothing more at 0 and 45 degrees."""
     room = shapely.affinity.rotate(shapely.box(1, 1, 5, 4), degrees)
-    space = Space(built(room), 0.3)
+    space = Space(build_plan(room), 0.3)
     reach = 0.3 * UNITS_PER_M
     walls = walls_around(space.plan)
     corners = shapely.points(space.mesh.vertices)
@@ -196,7 +196,7 @@ def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(
         free = two_rooms(2 * radius + spare, offset)
         if upright:
             free = shapely.transform(free, lambda xy: xy[:, ::-1])
-        space = Space(built(free), radius)
+        space = Space(build_plan(free), radius)
         here, there = ((1.0, 0.6), (3.0, 2.4)) if not upright else ((0.6, 1.0), (2.4, 3.0))
         start, goal = (space.plan.lattice.to_lattice(at).tolist() for at in (here, there))
 
@@ -209,8 +209,8 @@ def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(
 def test_a_doorway_needs_less_than_a_centimetre_to_spare() -> None:
     """The lattice takes at most 2 * 5 units, which is 8 mm."""
     for radius in np.arange(0.1, 0.4, 0.0137).tolist():
-        assert Space(built(two_rooms(2 * radius + 0.0095, 1.0)), radius).parts == 1
-        assert Space(built(two_rooms(2 * radius - 0.001, 1.0)), radius).parts == 2
+        assert Space(build_plan(two_rooms(2 * radius + 0.0095, 1.0)), radius).parts == 1
+        assert Space(build_plan(two_rooms(2 * radius - 0.001, 1.0)), radius).parts == 2
 
 
 def moves(plan: FloorPlan) -> list[npt.NDArray[np.float64]]:
@@ -234,7 +234,7 @@ def check_symmetry(plan: FloorPlan, radius: float, slip: float) -> None:
             return shapely.transform(shape, lambda xy: xy @ move[:, :2].T + move[:, 2])
 
         walls = shapely.union_all([moved(polygon) for polygon in plan.polygons])
-        other = built(shapely.transform(walls, lambda xy: xy / UNITS_PER_M))
+        other = build_plan(shapely.transform(walls, lambda xy: xy / UNITS_PER_M))
         shift = other.lattice.to_lattice((0.0, 0.0))
         there = shapely.transform(moved(here), lambda xy, shift=shift: xy + shift)
 
@@ -251,7 +251,7 @@ def test_space_of_a_turned_and_mirrored_home_is_the_same(radius: float) -> None:
     ]
     home = shapely.box(0, 0, 5, 4).difference(shapely.union_all(pillars))
 
-    check_symmetry(built(home), radius, 0.0)
+    check_symmetry(build_plan(home), radius, 0.0)
 
 
 @pytest.mark.parametrize("name", HOMES)
@@ -263,7 +263,7 @@ def test_space_of_a_turned_and_mirrored_real_home_is_the_same_to_the_grid_of_wal
 
 
 def test_route_from_the_border_of_the_space_steps_back_in() -> None:
-    space = Space(built(two_rooms(0.9, 1.0)), 0.2)
+    space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     walls = walls_of(space.plan.polygons)
     goal = tuple(space.plan.lattice.to_lattice((3.0, 2.4)).tolist())
     corner, side = space.mesh.vertices[0], (space.mesh.vertices[0] + space.mesh.vertices[1]) // 2
@@ -283,7 +283,7 @@ def test_route_from_the_border_of_the_space_steps_back_in() -> None:
 def test_route_from_beside_a_wall_does_not_step_through_it() -> None:
     """The nearest free cell lies behind the wall; the way back in leads to the near side."""
     rooms = shapely.box(0, 0, 4, 3).difference(shapely.box(2, 0, 2.02, 2.2))
-    space = Space(built(rooms), 0.2)
+    space = Space(build_plan(rooms), 0.2)
     lattice = space.plan.lattice
     start, goal = (tuple(lattice.to_lattice(at).tolist()) for at in ((2.03, 1.0), (1.0, 1.0)))
 
@@ -295,7 +295,7 @@ def test_route_from_beside_a_wall_does_not_step_through_it() -> None:
 
 
 def test_route_from_a_wall_or_outside_is_none() -> None:
-    space = Space(built(two_rooms(0.9, 1.0)), 0.2)
+    space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     lattice = space.plan.lattice
     goal = tuple(lattice.to_lattice((3.0, 2.4)).tolist())
 
@@ -304,7 +304,7 @@ def test_route_from_a_wall_or_outside_is_none() -> None:
 
 
 def test_route_to_a_place_without_room_is_none() -> None:
-    space = Space(built(two_rooms(0.9, 1.0)), 0.2)
+    space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     lattice = space.plan.lattice
     start = tuple(lattice.to_lattice((3.0, 2.4)).tolist())
 
@@ -315,7 +315,7 @@ def test_route_to_a_place_without_room_is_none() -> None:
 def test_route_to_the_border_of_the_space_is_none() -> None:
     """It used to lead round by a corner of the space, as a sight line never ends on a wall."""
     free = shapely.box(0, 0, 5, 4).difference(shapely.box(2, 1, 3, 3))
-    space = Space(built(free), 0.2)
+    space = Space(build_plan(free), 0.2)
     low = space.mesh.vertices[0]
     start = space.plan.lattice.to_lattice((1.0, 2.0)).tolist()
 
@@ -341,11 +341,13 @@ def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> No
 @pytest.mark.parametrize("radius", [1.01, 5.0])
 def test_space_of_a_body_too_wide_for_the_home_says_so(radius: float) -> None:
     with pytest.raises(FloorPlanError, match=r"fits nowhere in test home: give it a smaller"):
-        Space(built(shapely.box(0, 0, 2, 2)), radius)
+        Space(build_plan(shapely.box(0, 0, 2, 2)), radius)
 
 
 def test_parts_are_numbered_from_the_largest() -> None:
-    space = Space(built(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2)
+    space = Space(
+        build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
+    )
     lattice = space.plan.lattice
 
     assert space.parts == 2
@@ -356,7 +358,9 @@ def test_parts_are_numbered_from_the_largest() -> None:
 
 
 def test_nearest_is_the_nearest_cell_of_the_part() -> None:
-    space = Space(built(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2)
+    space = Space(
+        build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
+    )
     x, y = space.plan.lattice.to_lattice((2.9, 1.01)).tolist()
 
     for part in (None, 0, 1):
@@ -371,7 +375,7 @@ def test_nearest_is_the_nearest_cell_of_the_part() -> None:
 
 
 def test_copy_of_a_space_is_itself() -> None:
-    space = Space(built(shapely.box(0, 0, 2, 2)), 0.2)
+    space = Space(build_plan(shapely.box(0, 0, 2, 2)), 0.2)
 
     assert copy.deepcopy(space) is space
 

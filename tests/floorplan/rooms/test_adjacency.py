@@ -16,8 +16,8 @@ def rooms(*rows: str) -> np.ndarray:
 
 
 def test_open_border_is_as_long_as_its_longer_side() -> None:
-    found = open_borders(LATTICE, rooms("0011", "0011", "0000"), ())
-    assert [((0, 1), "open", 1.0)] == [(link.rooms, link.kind, link.width_m) for link in found]
+    links = open_borders(LATTICE, rooms("0011", "0011", "0000"), ())
+    assert [((0, 1), "open", 1.0)] == [(link.rooms, link.kind, link.width_m) for link in links]
 
 
 def test_cells_that_happen_to_touch_once_make_no_way() -> None:

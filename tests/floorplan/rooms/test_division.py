@@ -23,7 +23,7 @@ def space(*boxes: Box) -> Polygon:
     return free
 
 
-def labelled(free: Polygon, **boxes: Box) -> FloorPlan:
+def build(free: Polygon, **boxes: Box) -> FloorPlan:
     regions = [
         LabelledRegion((name.rstrip("_"),), shapely.box(*box)) for name, box in boxes.items()
     ]
@@ -38,7 +38,7 @@ def areas(plan: FloorPlan) -> dict[str, float]:
 
 
 def test_box_that_reaches_through_a_wall_ends_at_it() -> None:
-    plan = labelled(space(LEFT, RIGHT, DOOR), bedroom=(0.5, 0.5, 5.0, 4.5), office=(4, 1, 7.3, 4.3))
+    plan = build(space(LEFT, RIGHT, DOOR), bedroom=(0.5, 0.5, 5.0, 4.5), office=(4, 1, 7.3, 4.3))
 
     assert {"bedroom_0": 9.0, "office_0": 9.1} == pytest.approx(areas(plan), abs=0.11)
     assert ["bedroom_0-office_0"] == [doorway.name for doorway in plan.doorways]
@@ -46,7 +46,7 @@ def test_box_that_reaches_through_a_wall_ends_at_it() -> None:
 
 
 def test_box_that_is_too_small_for_its_chamber_has_all_of_it() -> None:
-    plan = labelled(space(LEFT, RIGHT, DOOR), bedroom=(1.3, 1.0, 3.9, 3.8), office=RIGHT)
+    plan = build(space(LEFT, RIGHT, DOOR), bedroom=(1.3, 1.0, 3.9, 3.8), office=RIGHT)
 
     assert {"bedroom_0", "office_0"} == set(areas(plan))
     assert 9.0 == pytest.approx(plan.room("bedroom_0").area_m2, abs=0.1)
@@ -56,14 +56,14 @@ def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone()
     walls = shapely.union_all([shapely.box(3, 3, 3.1, 5), shapely.box(3.1, 3, 4.2, 3.1)])
     free = shapely.difference(shapely.box(1, 1, 5, 5), walls)
 
-    plan = labelled(free, bedroom=(0.9, 0.9, 5.1, 5.1), bathroom=(3.0, 3.0, 5.1, 5.1))
+    plan = build(free, bedroom=(0.9, 0.9, 5.1, 5.1), bathroom=(3.0, 3.0, 5.1, 5.1))
 
     assert {"bedroom_0": 12.0, "bathroom_0": 3.6} == pytest.approx(areas(plan), abs=0.3)
     assert 1 == len(plan.doorways)
 
 
 def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
-    plan = labelled(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4, 1, 9, 5))
+    plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4, 1, 9, 5))
 
     assert {"kitchen_0": 12.0, "living_room_0": 20.0} == areas(plan)
     (link,) = plan.room_graph
@@ -71,19 +71,19 @@ def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
 
 
 def test_gap_between_boxes_goes_to_the_nearest() -> None:
-    plan = labelled(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4.4, 1, 9, 5))
+    plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4.4, 1, 9, 5))
 
     assert {"kitchen_0": 12.8, "living_room_0": 19.2} == areas(plan)
 
 
 def test_large_space_that_no_box_covers_is_a_room_of_its_own() -> None:
-    plan = labelled(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(6.5, 1, 9, 5))
+    plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(6.5, 1, 9, 5))
 
     assert {"kitchen_0": 12.0, "living_room_0": 10.0, "unknown_0": 10.0} == areas(plan)
 
 
 def test_box_under_another_is_one_room_with_both_labels() -> None:
-    plan = labelled(shapely.box(1, 1, 5, 5), dining_room=(0.9, 1, 5, 5), kitchen=(1, 1.1, 5, 5.0))
+    plan = build(shapely.box(1, 1, 5, 5), dining_room=(0.9, 1, 5, 5), kitchen=(1, 1.1, 5, 5.0))
 
     assert [("kitchen_0", ("kitchen", "dining_room"))] == [(r.name, r.labels) for r in plan.rooms]
     assert (
@@ -93,7 +93,7 @@ def test_box_under_another_is_one_room_with_both_labels() -> None:
 
 
 def test_boxes_that_make_no_room_are_notes_with_the_reason() -> None:
-    plan = labelled(
+    plan = build(
         space(LEFT, RIGHT, DOOR),
         office=LEFT,
         gym=(7.0, 1, 12, 4),
@@ -121,7 +121,7 @@ def home_with_hall(height: float) -> FloorPlan:
     doors = [(x + 1, 4.0, x + 1.9, 4.1) for x, *_ in rooms]
     hall = (*HALL[:3], HALL[1] + height)
     boxes = dict(zip(("bedroom", "kitchen", "office"), rooms, strict=True))
-    return labelled(space(*rooms, *doors, hall), **boxes)
+    return build(space(*rooms, *doors, hall), **boxes)
 
 
 def test_unlabelled_space_that_joins_three_rooms_is_a_hallway_with_a_note() -> None:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from shapely import Polygon
 from tests.thorough import examples
 
+from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorway_search import MAX_DOOR_M, MIN_DOOR_M, find_passages
-from fleet2d.floorplan.rooms.doorways import Segment
 
 UNITS = 1280.0
 
@@ -149,9 +149,9 @@ def grids(draw: st.DrawFn) -> tuple[Polygon, list[shapely.Polygon], int]:
 @settings(max_examples=examples(60))
 @given(grids())
 def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(
-    drawn: tuple[Polygon, list[shapely.Polygon], int],
+    grid: tuple[Polygon, list[shapely.Polygon], int],
 ) -> None:
-    free, doors, count = drawn
+    free, doors, count = grid
 
     plan = FloorPlan.build("grid", free, doorways=None, regions_are="none")
 

@@ -16,7 +16,7 @@ def region(label: str, x0: float, y0: float, x1: float, y1: float) -> LabelledRe
     return LabelledRegion((label,), shapely.box(x0, y0, x1, y1))
 
 
-def assigned(*regions: LabelledRegion) -> tuple[np.ndarray, dict[str, Room], list[str]]:
+def assign(*regions: LabelledRegion) -> tuple[np.ndarray, dict[str, Room], list[str]]:
     room_of_cell, rooms, notes = assign_rooms(LATTICE, FREE, regions)
     assert list(range(len(rooms))) == [room.index for room in rooms]
     assert np.array_equal(FREE, room_of_cell >= 0)
@@ -29,7 +29,7 @@ def assigned(*regions: LabelledRegion) -> tuple[np.ndarray, dict[str, Room], lis
 
 def test_no_labels_make_one_unknown_room_of_everything() -> None:
     """Known failure 6: a plan without labels crashed."""
-    _, rooms, notes = assigned()
+    _, rooms, notes = assign()
 
     assert ["unknown_0"] == list(rooms)
     assert ("unknown", (), 26 * 36) == (
@@ -41,13 +41,13 @@ def test_no_labels_make_one_unknown_room_of_everything() -> None:
 
 
 def test_uncovered_cells_are_unknown() -> None:
-    _, rooms, _ = assigned(region("Bedroom", 0, 0, 2, 3))
+    _, rooms, _ = assign(region("Bedroom", 0, 0, 2, 3))
 
     assert {"bedroom_0": 18 * 26, "unknown_0": 18 * 26} == {k: r.cells for k, r in rooms.items()}
 
 
 def test_rooms_are_numbered_by_type_in_file_order() -> None:
-    _, rooms, _ = assigned(
+    _, rooms, _ = assign(
         region("Bedroom", 2, 0, 4, 3), region("Toilet", 0, 0, 1, 3), region("Bedroom", 1, 0, 2, 3)
     )
 
@@ -60,14 +60,14 @@ def test_rooms_are_numbered_by_type_in_file_order() -> None:
 def test_the_smaller_box_wins_in_either_order(order: int) -> None:
     regions = [region("Hall", 0, 0, 4, 3), region("Toilet", 1, 1, 2, 2)][::order]
 
-    _, rooms, _ = assigned(*regions)
+    _, rooms, _ = assign(*regions)
 
     assert 100 == rooms["toilet_0"].cells
     assert 26 * 36 - 100 == rooms["hall_0"].cells
 
 
 def test_the_first_of_two_boxes_of_equal_size_wins() -> None:
-    _, rooms, _ = assigned(region("Hall", 0, 0, 2, 3), region("Office", 1, 0, 3, 3))
+    _, rooms, _ = assign(region("Hall", 0, 0, 2, 3), region("Office", 1, 0, 3, 3))
 
     assert 18 * 26 == rooms["hall_0"].cells
     assert 10 * 26 == rooms["office_0"].cells
@@ -75,7 +75,7 @@ def test_the_first_of_two_boxes_of_equal_size_wins() -> None:
 
 def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
     """Known failure 6: a kitchen with the same box as the dining room got no cells."""
-    _, rooms, notes = assigned(
+    _, rooms, notes = assign(
         region("Dining_Room", 0, 0, 2, 3),
         region("Toilet", 2, 0, 4, 3),
         region("Kitchen", 0, 0, 2, 3),
@@ -88,7 +88,7 @@ def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
 
 
 def test_boxes_are_the_same_when_they_round_to_the_same() -> None:
-    _, rooms, _ = assigned(region("Toilet", 0, 0, 2, 3), region("Bathroom", 0, 0, 2.0004, 3))
+    _, rooms, _ = assign(region("Toilet", 0, 0, 2, 3), region("Bathroom", 0, 0, 2.0004, 3))
 
     assert {"bathroom_0": ("toilet", "bathroom"), "unknown_0": ()} == {
         k: r.labels for k, r in rooms.items()
@@ -97,7 +97,7 @@ def test_boxes_are_the_same_when_they_round_to_the_same() -> None:
 
 def test_a_box_that_misses_the_free_space_is_a_note_and_no_room() -> None:
     """Known failure 6: a room whose box missed the floor got the whole background."""
-    _, rooms, notes = assigned(
+    _, rooms, notes = assign(
         region("Garage", 7, 7, 9, 9), region("Garage", -5, -5, -1, -1), region("Garage", 0, 0, 4, 2)
     )
 
@@ -107,7 +107,7 @@ def test_a_box_that_misses_the_free_space_is_a_note_and_no_room() -> None:
 
 
 def test_a_box_under_smaller_ones_is_a_note_and_no_room() -> None:
-    _, rooms, notes = assigned(
+    _, rooms, notes = assign(
         region("Office", 0, 0, 4, 3), region("Hall", 0, 0, 2, 3), region("Gym", 2, 0, 4, 3)
     )
 
@@ -116,7 +116,7 @@ def test_a_box_under_smaller_ones_is_a_note_and_no_room() -> None:
 
 
 def test_a_box_thinner_than_a_cell_is_a_note() -> None:
-    _, rooms, notes = assigned(region("Aeration", 1.0, 0, 1.01, 3), region("Hall", 1, 1, 1, 1))
+    _, rooms, notes = assign(region("Aeration", 1.0, 0, 1.01, 3), region("Hall", 1, 1, 1, 1))
 
     assert ["unknown_0"] == list(rooms)
     assert 2 == len(notes)
@@ -124,7 +124,7 @@ def test_a_box_thinner_than_a_cell_is_a_note() -> None:
 
 def test_polygons_take_the_cells_inside_them() -> None:
     triangle = shapely.Polygon([(0, 0), (3, 0), (0, 3)])
-    room_of_cell, rooms, _ = assigned(LabelledRegion(("Loggia",), triangle))
+    room_of_cell, rooms, _ = assign(LabelledRegion(("Loggia",), triangle))
 
     x, y = LATTICE.centre_axes()
     expected = FREE & ((x[None, :] + y[:, None]) < 3 * LATTICE.units_per_m)
@@ -132,7 +132,7 @@ def test_polygons_take_the_cells_inside_them() -> None:
 
 
 def test_given_names_stay_and_numbers_step_round_them() -> None:
-    _, rooms, _ = assigned(
+    _, rooms, _ = assign(
         region("Bedroom", 0, 0, 1, 3),
         LabelledRegion(("Bedroom",), shapely.box(1, 0, 2, 3), name="bedroom_0"),
         LabelledRegion(("Bedroom",), shapely.box(2, 0, 3, 3), name="Anna's", type="child_room"),

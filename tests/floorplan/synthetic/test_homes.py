@@ -116,7 +116,7 @@ def test_seed_gives_the_home_that_it_gives_on_every_machine(seed: int) -> None:
     ("area", "bedrooms", "bathrooms"),
     [(36, 1, 1), (62, 2, 1), (90, 2, 2), (120, 3, 2), (186, 3, 2), (240, 5, 3), (300, 4, 3)],
 )
-def test_area_and_rooms_are_as_asked_for(area: float, bedrooms: int, bathrooms: int) -> None:
+def test_area_and_rooms_are_as_requested(area: float, bedrooms: int, bathrooms: int) -> None:
     for seed in range(4):
         plan = home(seed, area_m2=area, bedrooms=bedrooms, bathrooms=bathrooms)
         types = [room.type for room in plan.rooms]
@@ -126,19 +126,19 @@ def test_area_and_rooms_are_as_asked_for(area: float, bedrooms: int, bathrooms: 
 
 
 @pytest.mark.parametrize("outline", ["rectangle", "L", "T", "U"])
-def test_outline_is_the_one_asked_for(outline: str) -> None:
+def test_outline_is_the_requested_one(outline: str) -> None:
     for seed in range(6):
         house = generate(seed, Wishes(area_m2=140, bedrooms=3), Style(outline=outline))
         assert outline == outline_kind(outline_corners(house.boxes))
 
 
-def test_widths_and_open_plan_are_as_asked_for() -> None:
+def test_widths_and_open_plan_are_as_requested() -> None:
     for seed in range(6):
-        asked = {"area_m2": 130, "bedrooms": 3, "door_width": 0.9, "corridor_width": 1.4}
+        settings = {"area_m2": 130, "bedrooms": 3, "door_width": 0.9, "corridor_width": 1.4}
         house = generate(seed, Wishes(130, 3), Style(None, True, 28, 18))
         halls = [b for b in house.boxes if house.briefs[b.room].kind == "hallway"]
         assert {28} == {min(box.clear) for box in halls}
-        plan = home(seed, open_plan=True, **asked)
+        plan = home(seed, open_plan=True, **settings)
         for door in plan.doorways:
             types = {plan.rooms[index].type for index in door.rooms}
             if types == {"hallway", "bedroom"}:

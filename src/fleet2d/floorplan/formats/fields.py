@@ -65,7 +65,7 @@ _EXPECTED = {
 }
 
 
-def validated(kind: TypeAdapter[T], content: object, where: str = "") -> T:
+def validate(kind: TypeAdapter[T], content: object, where: str = "") -> T:
     """Return content of a file as a type.
 
     Args:
@@ -77,7 +77,7 @@ def validated(kind: TypeAdapter[T], content: object, where: str = "") -> T:
         FloorPlanError: The content is not of that type; names the first wrong place.
 
     Example:
-        >>> validated(TypeAdapter(Listed[Point]), [[0, 1], [2, "x"]], "path")
+        >>> validate(TypeAdapter(Listed[Point]), [[0, 1], [2, "x"]], "path")
         Traceback (most recent call last):
         fleet2d.errors.FloorPlanError: path[1] is [2, "x"]: "x" is not a number
     """

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import validated
+from fleet2d.floorplan.formats.fields import validate
 from fleet2d.floorplan.formats.geojson_file import Feature, Move, Units, in_metres, read_features
 from fleet2d.floorplan.formats.native_file import ObjectUse
 from fleet2d.floorplan.names import distinct_names
@@ -304,7 +304,7 @@ def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
     kind = feature.text("type", "category", "object") or "object"
     properties = {key: feature.properties.get(key) for key in ObjectUse.model_fields}
     present = {key: value for key, value in properties.items() if value is not None}
-    use_of = validated(_OBJECT_USE, present, f"{feature.where}.properties")
+    use_of = validate(_OBJECT_USE, present, f"{feature.where}.properties")
     uses = []
     for use in use_of.use_places():
         x, y = _to_plan(move, use.x, use.y)

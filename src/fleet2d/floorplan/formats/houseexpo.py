@@ -10,7 +10,7 @@ from shapely.geometry import MultiPolygon
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import Box, Listed, Point, Ring, list_of, validated
+from fleet2d.floorplan.formats.fields import Box, Listed, Point, Ring, list_of, validate
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
 from fleet2d.paths import InputPath
@@ -65,7 +65,7 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
         raise FloorPlanError(f"{path} is no HouseExpo plan: it has no key `verts`{hint}")
     name = content.get("id")
     with in_file(path):
-        house = validated(_HOUSE_FILE, content)
+        house = validate(_HOUSE_FILE, content)
         free, notes = _free_space(house.verts)
         regions, box_notes = _regions(house.room_category or {})
         return FloorPlan.build(

@@ -21,7 +21,7 @@ from shapely import Polygon
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import shown_value, validated
+from fleet2d.floorplan.formats.fields import shown_value, validate
 from fleet2d.floorplan.formats.native_file import FORMAT, PLAN_FILE, VERSION, space_of
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
@@ -73,7 +73,7 @@ def native_plan(content: dict[str, Any], path: Path, cell: float = 0.05) -> Floo
             raise FloorPlanError(
                 f"version {version} of the format is not known: this Fleet2D reads {VERSION}"
             )
-        file = validated(PLAN_FILE, {**content, "version": VERSION})
+        file = validate(PLAN_FILE, {**content, "version": VERSION})
         return FloorPlan.build(
             file.name or path.stem,
             space_of(file.free),

@@ -18,7 +18,7 @@ from fleet2d.floorplan.formats.fields import (
     MAX_COORDINATE_M,
     Listed,
     shown_value,
-    validated,
+    validate,
 )
 
 MAP_CLASS = "ValetudoMap"
@@ -152,7 +152,7 @@ def note_size(content: dict[str, Any], box: PixelBox, notes: list[str]) -> None:
 
 def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], str]]:
     """Return the objects in one of the map's lists, each with its place in the file."""
-    items = validated(_OBJECTS, content.get(key, []), key)
+    items = validate(_OBJECTS, content.get(key, []), key)
     return [(item, f"{key}[{number}]") for number, item in enumerate(items)]
 
 
@@ -208,7 +208,7 @@ def _whole_numbers(
     layer: dict[str, Any], key: str, group: int, what: str, where: str
 ) -> NDArray[np.int64]:
     """Return a flat list of whole numbers in groups, int64 (n, group)."""
-    values = validated(_PIXELS, layer.get(key) or [], f"{where}.{key}")
+    values = validate(_PIXELS, layer.get(key) or [], f"{where}.{key}")
     if len(values) % group:
         raise FloorPlanError(
             f"{where}.{key} has {len(values)} numbers, which is no multiple of {group} ({what}): it"
@@ -227,7 +227,7 @@ def entities_of(content: dict[str, Any], kind: str) -> Iterator[tuple[dict[str, 
 
 def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
     """Return an entity's points, float64 (n, 2) [m]."""
-    values = validated(_POINTS, entity.get("points"), f"{where}.points")
+    values = validate(_POINTS, entity.get("points"), f"{where}.points")
     if len(values) % 2:
         raise FloorPlanError(
             f"{where}.points is {shown_value(values)}: a list x, y, x, y, … is expected"

@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.floorplan.objects import Point
 from fleet2d.problems import problem
 from fleet2d.units import format_duration, parse_duration
 
 VERBS = ("open", "shut", "lock", "unlock", "move", "room")
-Point = tuple[float, float]
 
 
 def parse_moment(value: Any) -> datetime | timedelta:

@@ -1,7 +1,6 @@
 """Routes of least cost: distance from walls, no-go areas, and a user's own costs."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field
 
 from fleet2d.component import Settings
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.home.space import CACHED_ROUTES, Space
+from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.fields import MOST_COST, cost_distance, descend, squared_distance
 from fleet2d.kernels.masks import label_parts
@@ -116,11 +115,7 @@ class CostedSpace(Space):
         near = squared_distance(np.ascontiguousarray(cost >= 0)) <= cells * cells
         self._original_cost = cost
         self.base, self.cost = base, np.where(near, CLOSED, cost).astype(np.int32)
-        self.route = lru_cache(CACHED_ROUTES)(self._find_route)
-        self.cells = lru_cache(None)(self._find_cells)
-        self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
-        self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
-        self.rooms_of = lru_cache(None)(self._find_rooms)
+        self._cache_searches()
         # Cells of the space that share a side always belong to one part.
         part = label_parts((base.part_of_cell >= 0) & (self.cost >= 0), diagonal=False)
         sizes = np.bincount(part[part >= 0])

@@ -20,6 +20,7 @@ from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.names import find_named
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.rooms.adjacency import doorway_segments
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels.mesh import Mesh
@@ -66,7 +67,7 @@ class Home:
         self.locked: frozenset[int] = NOTHING
         self.version = 0
         self.layers = Layers(plan)
-        self._shapes = _shapes_of(plan, [self.door_line(door) for door in range(len(self.doors))])
+        self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))
         self._walls: tuple[int, Mesh] = (-1, plan.mesh)
         self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
         # The layer `costmap` at its last use, the number of its changes, and the spaces of bodies
@@ -145,9 +146,7 @@ class Home:
 
     def door_line(self, door: int) -> Segment:
         """Return the segment at which a shut door stands [lattice]."""
-        doorway = self.doors[door]
-        (x0, y0), (x1, y1) = self.plan.lattice.to_lattice((doorway.start, doorway.end)).tolist()
-        return (x0, y0), (x1, y1)
+        return doorway_segments(self.plan.lattice, [self.doors[door]])[0]
 
     def set_door(self, door: int, *, is_open: bool) -> None:
         """Open or shut a door."""

@@ -74,12 +74,7 @@ class Space:
         """
         self.plan = plan
         self.walls = plan.mesh if walls is None else walls
-        # Behaviors repeat their searches: the same rooms, and on rounds the same routes.
-        self.route = lru_cache(CACHED_ROUTES)(self._find_route)
-        self.cells = lru_cache(None)(self._find_cells)
-        self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
-        self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
-        self.rooms_of = lru_cache(None)(self._find_rooms)
+        self._cache_searches()
         self.radius = radius
         self.key: tuple[Any, ...] = ()  # the home's key of this space
         lattice = plan.lattice
@@ -107,6 +102,14 @@ class Space:
         )
         self._part_of_triangle = read_only(rank[part].astype(np.int32))
         self.parts = int(np.count_nonzero(sizes))
+
+    def _cache_searches(self) -> None:
+        """Cache the searches, since behaviors repeat them for the same rooms and routes."""
+        self.route = lru_cache(CACHED_ROUTES)(self._find_route)
+        self.cells = lru_cache(None)(self._find_cells)
+        self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
+        self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
+        self.rooms_of = lru_cache(None)(self._find_rooms)
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Space":
         """Return itself, as nothing in it changes."""

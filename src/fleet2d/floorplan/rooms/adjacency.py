@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.rooms.doorways import Doorway, Segment
+from fleet2d.floorplan.rooms.doorways import Doorway
 
 _CENTRE = UNITS_PER_CELL // 2 + 1
 

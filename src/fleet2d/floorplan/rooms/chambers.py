@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from fleet2d.floorplan.geometry.gates import Gates
+from fleet2d.floorplan.geometry.gates import Gates, Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
-from fleet2d.floorplan.rooms.doorways import Segment
 from fleet2d.kernels.chambers import spread_labels
 from fleet2d.kernels.mesh import WALL, Mesh, label_triangles, rasterize_cells
 

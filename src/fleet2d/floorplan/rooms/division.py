@@ -9,12 +9,13 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.rooms.adjacency import open_borders
 from fleet2d.floorplan.rooms.chambers import Chambers, cut_chambers
 from fleet2d.floorplan.rooms.doorway_search import MAX_DOOR_M, find_passages
-from fleet2d.floorplan.rooms.doorways import DoorLine, Segment, fit_lines, rooms_beside
+from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines, rooms_beside
 from fleet2d.floorplan.rooms.labelling import label_chambers
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
 from fleet2d.floorplan.rooms.room import NO_ROOM, Room, assign_rooms, dropped_note, make_rooms

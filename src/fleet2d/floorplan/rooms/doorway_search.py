@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from fleet2d.floorplan.rooms.doorways import Segment
+from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.kernels.chambers import see_each
 from fleet2d.kernels.mesh import Mesh
 

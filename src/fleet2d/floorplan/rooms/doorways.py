@@ -9,10 +9,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
+from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
-
-Point = tuple[float, float]
-Segment = tuple[tuple[int, int], tuple[int, int]]
+from fleet2d.floorplan.objects import Point
 
 # How far beyond the end of a door line its wall may be [m].
 REACH_M = 0.3

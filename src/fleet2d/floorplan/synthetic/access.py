@@ -28,65 +28,31 @@ class Gap(NamedTuple):
 
 
 # Cost of a passage between two types of rooms; other pairs never open to each other.
-_COSTS: dict[tuple[str, str], float] = {
-    ("entryway", "hallway"): 0,
-    ("entryway", "living_room"): 0,
-    ("entryway", "dining_room"): 1.5,
-    ("entryway", "kitchen"): 3,
-    ("hallway", "living_room"): 0.2,
-    ("hallway", "dining_room"): 1.2,
-    ("hallway", "kitchen"): 2.5,
-    ("hallway", "hallway"): 0,
-    ("living_room", "dining_room"): 0,
-    ("living_room", "kitchen"): 0.6,
-    ("dining_room", "kitchen"): 0,
-    ("bedroom", "hallway"): 0,
-    ("bedroom", "entryway"): 0.8,
-    ("bedroom", "living_room"): 0.8,
-    ("bedroom", "dining_room"): 3,
-    ("bathroom", "hallway"): 0,
-    ("bathroom", "entryway"): 0.6,
-    ("bathroom", "living_room"): 1.2,
-    ("bathroom", "laundry"): 3,
-    ("bathroom", "dining_room"): 4,
-    ("toilet", "hallway"): 0,
-    ("toilet", "entryway"): 0,
-    ("toilet", "laundry"): 1,
-    ("toilet", "living_room"): 2.5,
-    ("office", "hallway"): 0,
-    ("office", "entryway"): 0,
-    ("office", "living_room"): 0.8,
-    ("office", "dining_room"): 1.5,
-    ("gym", "hallway"): 0,
-    ("gym", "living_room"): 1.5,
-    ("gym", "garage"): 1.5,
-    ("gym", "laundry"): 2.5,
-    ("gym", "dining_room"): 2,
-    ("laundry", "kitchen"): 0,
-    ("laundry", "hallway"): 0.2,
-    ("laundry", "garage"): 0.5,
-    ("laundry", "entryway"): 1,
-    ("laundry", "dining_room"): 2,
-    ("laundry", "living_room"): 3,
-    ("storage", "hallway"): 0,
-    ("storage", "kitchen"): 0.2,
-    ("storage", "entryway"): 0.2,
-    ("storage", "laundry"): 0.3,
-    ("storage", "garage"): 0.5,
-    ("storage", "dining_room"): 2,
-    ("storage", "living_room"): 2.5,
-    ("garage", "laundry"): 0,
-    ("garage", "entryway"): 0.3,
-    ("garage", "hallway"): 0.3,
-    ("garage", "storage"): 1,
-    ("garage", "kitchen"): 0.8,
-    ("garage", "dining_room"): 2.5,
-    ("garage", "living_room"): 3,
-}
-COSTS: Mapping[tuple[str, str], float] = {
-    **_COSTS,
-    **{(b, a): cost for (a, b), cost in _COSTS.items()},
-}
+_COSTS: dict[str, dict[str, float]] = {
+    "entryway": {"hallway": 0, "living_room": 0, "dining_room": 1.5, "kitchen": 3},
+    "hallway": {"living_room": 0.2, "dining_room": 1.2, "kitchen": 2.5, "hallway": 0},
+    "living_room": {"dining_room": 0, "kitchen": 0.6},
+    "dining_room": {"kitchen": 0},
+    "bedroom": {"hallway": 0, "entryway": 0.8, "living_room": 0.8, "dining_room": 3},
+    "bathroom": {"hallway": 0, "entryway": 0.6, "living_room": 1.2, "laundry": 3, "dining_room": 4},
+    "toilet": {"hallway": 0, "entryway": 0, "laundry": 1, "living_room": 2.5},
+    "office": {"hallway": 0, "entryway": 0, "living_room": 0.8, "dining_room": 1.5},
+    "gym": {"hallway": 0, "living_room": 1.5, "garage": 1.5, "laundry": 2.5, "dining_room": 2},
+    "laundry": {
+        "kitchen": 0, "hallway": 0.2, "garage": 0.5, "entryway": 1, "dining_room": 2,
+        "living_room": 3,
+    },
+    "storage": {
+        "hallway": 0, "kitchen": 0.2, "entryway": 0.2, "laundry": 0.3, "garage": 0.5,
+        "dining_room": 2, "living_room": 2.5,
+    },
+    "garage": {
+        "laundry": 0, "entryway": 0.3, "hallway": 0.3, "storage": 1, "kitchen": 0.8,
+        "dining_room": 2.5, "living_room": 3,
+    },
+}  # fmt: skip
+_PAIRS = {(a, b): cost for a, row in _COSTS.items() for b, cost in row.items()}
+COSTS: Mapping[tuple[str, str], float] = _PAIRS | {(b, a): cost for (a, b), cost in _PAIRS.items()}
 # Rooms through which the way to other rooms may lead.
 _PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
 # Between these a passage needs no jambs: a corridor of 1 m may end in a door of 0.9 m.
