@@ -53,7 +53,9 @@ class RoomCorrection(Settings):
         if self.at is not None and self.name is None and self.type is None:
             raise problem("a room at a place needs a name or a type to give it")
         if self.polygon is not None and not _shape(self.polygon).is_valid:
-            raise problem("polygon is no sound outline: at least 3 corners, and no crossing sides")
+            raise problem(
+                "polygon is not a valid outline: at least 3 corners, and no crossing sides"
+            )
         return self
 
 

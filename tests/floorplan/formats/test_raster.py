@@ -32,14 +32,14 @@ def plain(values: NDArray[np.integer], white: int = 255) -> bytes:
 # --- PGM ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("write", [packed, plain])
+@pytest.mark.parametrize("encode", [packed, plain])
 @pytest.mark.parametrize(("factor", "white"), [(1, 255), (1, 220), (200, 65535), (1, 256)])
 def test_pgm_of_either_kind_and_depth_comes_back_as_written(
-    tmp_path: Path, write: object, factor: int, white: int
+    tmp_path: Path, encode: object, factor: int, white: int
 ) -> None:
     values = SHADES.astype(np.int64) * factor
 
-    picture = read_grey(write(tmp_path, write(values, white)))  # type: ignore[operator]
+    picture = read_grey(write(tmp_path, encode(values, white)))  # type: ignore[operator]
 
     assert white == picture.white
     assert np.array_equal(values, picture.values)
@@ -73,14 +73,14 @@ def test_plain_pixels_may_be_followed_by_comments(tmp_path: Path) -> None:
     assert np.array_equal(SHADES, read_grey(write(tmp_path, content)).values)
 
 
-@pytest.mark.parametrize("write", [packed, plain])
+@pytest.mark.parametrize("encode", [packed, plain])
 @pytest.mark.parametrize(
     ("size", "message"), [(b"4 4", "it is cut off"), (b"4 2", "its header is wrong")]
 )
 def test_pgm_of_another_size_than_its_header_is_refused(
-    tmp_path: Path, write: object, size: bytes, message: str
+    tmp_path: Path, encode: object, size: bytes, message: str
 ) -> None:
-    content = write(SHADES + 1).replace(b"4 3", size)  # type: ignore[operator]
+    content = encode(SHADES + 1).replace(b"4 3", size)  # type: ignore[operator]
 
     with pytest.raises(FloorPlanError, match=rf"holds 12 pixels.*{message}"):
         read_grey(write(tmp_path, content))

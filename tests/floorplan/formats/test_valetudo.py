@@ -257,7 +257,7 @@ def test_wall_takes_floor_away_and_is_said(tmp_path: Path) -> None:
 
     assert pytest.approx((40 * 30 - 4) * PIXEL_AREA) == plan.area_m2
     assert 1 == len(plan.polygons[0].interiors)
-    assert "4 pixels are floor and wall: they are taken for wall" in plan.notes
+    assert "4 pixels are floor and wall: they count as wall" in plan.notes
 
 
 def test_pixels_that_share_a_corner_are_not_joined(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """The content of a file in Fleet2D's own floor plan format, and its JSON Schema."""
 
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self
 
 import shapely
 from pydantic import (
@@ -32,8 +32,6 @@ from fleet2d.problems import problem
 
 FORMAT = "fleet2d-floorplan"
 VERSION = 1
-
-Shape = TypeVar("Shape", Polygon, MultiPolygon)
 
 
 class Part(FileModel):
@@ -70,11 +68,11 @@ Area = Annotated[
 
 
 def _check_valid(shape: Polygon | MultiPolygon) -> None:
-    """Refuse a shape that crosses itself; unlike a traced outline, one in our format must not."""
+    """Refuse a shape that crosses itself: our own format has no traced outlines, which may."""
     if not shape.is_valid:
         reason, _, at = shapely.is_valid_reason(shape).partition("[")
         place = f" at ({at.rstrip(']').replace(' ', ', ')}) m" if at else ""
-        raise problem(f"is no sound outline: {reason.lower()}{place}")
+        raise problem(f"is not a valid outline: {reason.lower()}{place}")
 
 
 def space_of(parts: list[Part]) -> Polygon | MultiPolygon:
@@ -83,7 +81,8 @@ def space_of(parts: list[Part]) -> Polygon | MultiPolygon:
 
 
 def _check_space(parts: list[Part]) -> list[Part]:
-    _check_valid(space_of(parts))
+    if len(parts) > 1:
+        _check_valid(space_of(parts))
     return parts
 
 

@@ -33,7 +33,7 @@ class GreyPicture:
     Attributes:
         values: Shades, uint8 or uint16 (rows, columns), the first row on top.
         white: The value of white; black is 0.
-        clear: Where the picture is not fully opaque, bool (rows, columns), or None for nowhere.
+        clear: Pixels that are not fully opaque, bool (rows, columns), or None if all are.
     """
 
     values: NDArray[np.integer[Any]]
@@ -42,7 +42,7 @@ class GreyPicture:
 
 
 def read_grey(path: Path) -> GreyPicture:
-    """Read a PGM (P2 or P5, 8 or 16 bits) or PNG file; its content tells which.
+    """Read a PGM (P2 or P5, 8 or 16 bits) or PNG file, by its content.
 
     Raises:
         FloorPlanError: It can't be read, is damaged, too large or of another kind, or is a PNG and
@@ -110,7 +110,7 @@ def _plain_values(body: bytes, columns: int, rows: int) -> NDArray[np.integer[An
 
 
 def _in_pieces(text: bytes) -> Iterator[list[bytes]]:
-    """Yield the words of a text, some at a time: all of them would fill the memory."""
+    """Yield the words of a text in pieces, since all of them could fill the memory."""
     begin = 0
     while begin < len(text):
         space = _SPACE.search(text, begin + _PIECE)
@@ -141,7 +141,7 @@ def _read_png(content: bytes) -> GreyPicture:
         from PIL import Image
     except ImportError:
         raise FloorPlanError(
-            'is PNG, and to read that takes Pillow: pip install "fleet2d[viz]", or convert the'
+            'is PNG, which only Pillow can read: pip install "fleet2d[viz]", or convert the'
             " image to PGM"
         ) from None
     if len(content) >= 24:  # else it is cut off, as Pillow says
@@ -166,11 +166,11 @@ def _read_png(content: bytes) -> GreyPicture:
 
 
 def _check_rows(content: bytes) -> None:
-    """Refuse a PNG with fewer rows than it says; Pillow takes what lacks for black.
+    """Refuse a PNG with fewer rows than its header says, which Pillow would fill with black.
 
     Raises:
-        FloorPlanError: There are too few.
-        zlib.error: What is packed can't be unpacked.
+        FloorPlanError: There are too few rows.
+        zlib.error: The data can't be unpacked.
     """
     width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
     bits, colours, interlaced = content[24], content[25], content[28]

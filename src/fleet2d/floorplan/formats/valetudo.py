@@ -1,8 +1,6 @@
-"""Maps of robot vacuums with Valetudo: JSON, format version 2.
+"""Maps of robot vacuums with Valetudo, format version 2.
 
-Their pixels are numbered from the top and their lengths are in centimetres. Here the place
-(x, y) [cm] of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored; the
-plan and the recorded path share this frame.
+The plan and the recorded path share the frame of `valetudo_file`.
 """
 
 import math
@@ -46,12 +44,12 @@ from fleet2d.paths import InputPath
 
 NoGo = Literal["keep_out", "wall", "ignore"]
 
-# A charger's side, the room that one takes in front of it, and how far off that may be [m].
+# Side of a charger, radius of a person in front of it, and how far off that person may be [m].
 CHARGER_M, STAND_RADIUS_M, STAND_REACH_M = 0.2, 0.2, 1.0
 
 MAX_PARTS = 10_000
 
-# What touches a pixel by no more than this [pixels] only shares its side.
+# An overlap of at most this is only a common side [pixels].
 TINY = 1e-6
 
 
@@ -61,8 +59,8 @@ class Valetudo(PixelSource):
 
     Attributes:
         path: The map's JSON file.
-        no_go: What no-go areas and virtual walls are: areas that robots keep out of, walls for
-            everybody and for sight, or nothing.
+        no_go: What becomes of no-go areas and virtual walls: areas that robots keep out of
+            (`keep_out`), walls (`wall`), or nothing (`ignore`).
     """
 
     path: InputPath = Field(description="the map's JSON file")
@@ -85,14 +83,14 @@ class Valetudo(PixelSource):
 def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_out") -> FloorPlan:
     """Read the map of a robot vacuum.
 
-    Free is what is floor or segment and not wall, along the sides of the pixels. Every segment is a
-    room under the name that it has in the vacuum's app.
+    Free space is the pixels of floors and segments without those of walls. Every segment is a room
+    under the name that it has in the vacuum's app.
 
     Args:
         path: The JSON file.
         cell: Side of a grid cell [m]; None for the side of the map's pixels.
-        no_go: What becomes of no-go areas and virtual walls: `FloorPlan.no_go`, or the pixels that
-            they touch are walls, or they are ignored.
+        no_go: What becomes of no-go areas and virtual walls: `FloorPlan.no_go` (`keep_out`), walls
+            at the pixels that they touch (`wall`), or nothing (`ignore`).
 
     Raises:
         FloorPlanError: The file can't be read, isn't such a map, or has no floor.
@@ -126,11 +124,11 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
 
 
 def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
-    """Read where the vacuum drove.
+    """Read the path that the vacuum drove, in pieces.
 
     Returns:
-        The pieces of its path in the file's order, each float64 (n, 2) [m] in the plan's frame, as
-        recorded: at unknown times, and points may repeat. An empty list if the map has no path.
+        The pieces in the file's order, each float64 (n, 2) [m] in the plan's frame, as recorded:
+        times are unknown, and points may repeat. An empty list if the map has no path.
 
     Raises:
         FloorPlanError: The file can't be read, or isn't such a map.
@@ -144,7 +142,7 @@ def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
 
 
 def read_valetudo_path(path: Path) -> NDArray[np.float64]:
-    """Read where the vacuum drove, float64 (n, 2) [m]: all pieces of the path, one after another.
+    """Read the path that the vacuum drove, float64 (n, 2) [m], with all pieces joined.
 
     Raises:
         FloorPlanError: The file can't be read, or isn't such a map.
@@ -153,7 +151,7 @@ def read_valetudo_path(path: Path) -> NDArray[np.float64]:
 
 
 def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
-    """Read where the vacuum's charger is (x, y) [m] in the plan's frame, if the map says so.
+    """Read the place of the vacuum's charger (x, y) [m] in the plan's frame, if the map has it.
 
     Raises:
         FloorPlanError: The file can't be read, or isn't such a map.
@@ -167,7 +165,7 @@ def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
 
 
 def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> Mask:
-    """Return which pixels are floor and not wall, bool (rows, columns)."""
+    """Return the pixels that are floor and not wall, bool (rows, columns)."""
     segments_at = np.zeros((box.rows, box.columns), np.uint16)
     floor, wall = (np.zeros(segments_at.shape, np.bool_) for _ in range(2))
     for layer in layers:
@@ -180,7 +178,7 @@ def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> M
         if layer.kind == "segment":
             segments_at[window] += part.paint(layer.runs)
     for both, what in (
-        (floor & wall, "floor and wall: they are taken for wall"),
+        (floor & wall, "floor and wall: they count as wall"),
         (segments_at > 1, "in several segments: they belong to the smallest of those"),
     ):
         if both.any():
@@ -218,45 +216,45 @@ def _regions(layers: list[PixelLayer], pixel_m: float, notes: list[str]) -> list
     for layer, name in zip(segments, names, strict=True):
         box = PixelBox.around(layer.runs)
         shape = _in_metres(box.paint(layer.runs), box, pixel_m)
-        kind = usual_type(layer.name) if layer.named else UNKNOWN
+        kind = usual_type(layer.name) if layer.is_named else UNKNOWN
         regions.append(LabelledRegion((layer.name,), shape, name, kind))
     return regions
 
 
-# --- What lies on the floor ---------------------------------------------------------------------
+# --- No-go areas and the charger ----------------------------------------------------------------
 
 
 def _no_go_areas(
     content: dict[str, Any], free: Mask, box: PixelBox, no_go: NoGo, notes: list[str]
 ) -> list[Polygon]:
-    """Return the areas that robots keep out of [m]; those that are walls leave the free pixels."""
+    """Return the areas that robots keep out of [m]; no-go areas as walls change `free` instead."""
     pixel_m = pixel_side(content)
     areas: list[Polygon] = []
     for kind, what in (("no_go_area", "no-go areas"), ("virtual_wall", "virtual walls")):
         shapes = []
         for entity, where in entities_of(content, kind):
-            shape = _forbidden(read_points(entity, where) / pixel_m, kind)
+            shape = _no_go_shape(read_points(entity, where) / pixel_m, kind)
             if shape.is_empty:
                 notes.append(f"{where}, {kind}, has no extent: ignored")
             else:
                 shapes.append(shape)
         if not shapes:
             continue
-        done = {"keep_out": "robots keep out of them", "ignore": "ignored"}.get(no_go)
+        effect = {"keep_out": "robots keep out of them", "ignore": "ignored"}.get(no_go)
         if no_go == "keep_out":
             areas += [part for shape in shapes for part in _parts_in_metres(shape, pixel_m)]
         if no_go == "wall":
             before = np.count_nonzero(free)
             for shape in shapes:
-                _take_out(shape, free, box)
+                _remove_pixels(shape, free, box)
             area = (before - np.count_nonzero(free)) * pixel_m**2
-            done = f"obstacles on {area:.2f} m2 of floor"
-        notes.append(f"{what} in the map: {len(shapes)}, {done}")
+            effect = f"obstacles on {area:.2f} m2 of floor"
+        notes.append(f"{what} in the map: {len(shapes)}, {effect}")
     return areas
 
 
-def _forbidden(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
-    """Return where a no-go area is, or the band a pixel wide round a virtual wall [pixels]."""
+def _no_go_shape(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
+    """Return the shape of a no-go area, or a band a pixel wide along a virtual wall [pixels]."""
     if kind == "virtual_wall":
         if len(corners) < 2:
             return Polygon()
@@ -272,14 +270,14 @@ def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
     return [part for part in shapely.get_parts(metres).tolist() if part.geom_type == "Polygon"]
 
 
-def _take_out(shape: BaseGeometry, free: Mask, box: PixelBox) -> None:
-    """Take out of the free pixels those that a shape [pixels] reaches into."""
+def _remove_pixels(shape: BaseGeometry, free: Mask, box: PixelBox) -> None:
+    """Remove from the free pixels those that a shape [pixels] overlaps."""
     shape = shape.buffer(-TINY, join_style="mitre")
     x0, y0, x1, y1 = shape.bounds
     first, last = (int(np.clip(y - box.row, 0, box.rows - 1)) for y in (y0, y1))
     left, right = (int(np.clip(x - box.column, 0, box.columns - 1)) for x in (x0, x1))
     shapely.prepare(shape)
-    for row in range(first, last + 1):  # by rows, to be modest in memory
+    for row in range(first, last + 1):  # by rows, to save memory
         columns = left + np.flatnonzero(free[row, left : right + 1])
         x, y = columns + float(box.column), np.full(len(columns), float(box.row + row))
         pixels = shapely.box(*np.stack([x, y, x + 1, y + 1]))
@@ -287,7 +285,7 @@ def _take_out(shape: BaseGeometry, free: Mask, box: PixelBox) -> None:
 
 
 def _charger(content: dict[str, Any], free: Mask, box: PixelBox) -> list[PlacedObject]:
-    """Return the vacuum's charger, and where one stands in front of it."""
+    """Return the vacuum's charger, with a place to stand in front of it."""
     at = read_charger(content)
     if at is None:
         return []
@@ -308,7 +306,7 @@ def _charger(content: dict[str, Any], free: Mask, box: PixelBox) -> list[PlacedO
 
 
 def _note_entities(content: dict[str, Any], notes: list[str]) -> None:
-    """Say what the map has that the plan hasn't."""
+    """Add notes on what the map has in addition to the plan."""
     charger = read_charger(content)
     if charger is not None:
         notes.append(f"the vacuum's charger is at ({charger[0]:.2f}, {charger[1]:.2f}) m")

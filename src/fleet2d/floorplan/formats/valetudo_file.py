@@ -1,7 +1,7 @@
-"""The content of a Valetudo map file: layers of pixels and entities, checked; JSON, version 2.
+"""The content of a Valetudo map file (JSON, version 2): its layers of pixels and its entities.
 
-Its pixels are numbered from the top and its lengths are in centimetres. Here the place (x, y) [cm]
-of a map is (x / 100, -y / 100) [m], so that y points up and nothing is mirrored.
+The file numbers pixels from the top and has lengths in centimetres. A place (x, y) [cm] of the file
+is (x / 100, -y / 100) [m] here, so that y points up and nothing is mirrored.
 """
 
 import unicodedata
@@ -33,7 +33,6 @@ CM_PER_M = 100
 
 Mask = NDArray[np.bool_]
 
-
 _LIMIT_CM = MAX_COORDINATE_M * CM_PER_M
 _OBJECTS = TypeAdapter(Listed[dict[str, Any]])
 _PIXELS = TypeAdapter(
@@ -47,22 +46,22 @@ class PixelLayer:
     """Pixels of one kind.
 
     Attributes:
-        kind: floor, segment or wall.
-        name: Of a segment: what people call it, or segment_… and its id.
-        named: Whether people gave it the name.
-        runs: First column, row and length of rows of pixels, int64 (n, 3); rows count upwards from
-            the map's upper edge, so they are negative.
+        kind: `floor`, `segment` or `wall`.
+        name: The name that people gave to a segment, or `segment_` and its id.
+        is_named: Whether people gave it the name.
+        runs: Horizontal runs of pixels: first column, row and length, int64 (n, 3). Rows count
+            upwards from the map's upper edge, so they are negative.
     """
 
     kind: str
     name: str
-    named: bool
+    is_named: bool
     runs: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class PixelBox:
-    """A window of pixels: its lowest column and row, and how many of them it has."""
+    """A window of pixels: its lowest column and row, and its numbers of columns and rows."""
 
     column: int
     row: int
@@ -86,12 +85,12 @@ class PixelBox:
         return box
 
     def window(self, part: "PixelBox") -> tuple[slice, slice]:
-        """Return where `part` lies in an array over this box."""
+        """Return the slices of `part` in an array over this box."""
         row, column = part.row - self.row, part.column - self.column
         return slice(row, row + part.rows), slice(column, column + part.columns)
 
     def paint(self, runs: NDArray[np.int64]) -> Mask:
-        """Return which pixels the runs cover, bool (rows, columns), the first row at the bottom."""
+        """Return the pixels that the runs cover, bool (rows, columns), first row at the bottom."""
         steps = np.zeros((self.rows, self.columns + 1), np.int32)
         row, column = runs[:, 1] - self.row, runs[:, 0] - self.column
         np.add.at(steps, (row, column), 1)
@@ -101,7 +100,7 @@ class PixelBox:
 
 
 def check_map(content: dict[str, Any]) -> dict[str, Any]:
-    """Return the content if it is a map of the version that we read."""
+    """Return the content, after checking that it is a map of the known version."""
     if content.get("__class") != MAP_CLASS:
         raise FloorPlanError(f'no Valetudo map: "__class" is not "{MAP_CLASS}"')
     version = _meta(content).get("version")
@@ -134,7 +133,7 @@ def pixel_side(content: dict[str, Any]) -> float:
 
 
 def note_size(content: dict[str, Any], box: PixelBox, notes: list[str]) -> None:
-    """Say if the pixels in `box` go beyond the size that the map states [cm]."""
+    """Add a note if the pixels in `box` reach beyond the size that the map states."""
     size = content.get("size")
     if size is None:
         return
@@ -157,7 +156,7 @@ def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], 
 
 
 def read_layers(content: dict[str, Any], notes: list[str]) -> list[PixelLayer]:
-    """Return the layers with pixels, in the file's order; say what is odd about any of them."""
+    """Return the layers with pixels, in the file's order; what is odd is added to the notes."""
     layers: list[PixelLayer] = []
     for layer, where in objects_in(content, "layers"):
         kind = layer.get("type")
@@ -165,7 +164,7 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[PixelLayer]:
             notes.append(f"{where} is of the unknown type {shown_value(kind)}: ignored")
             continue
         runs = _runs(layer, where)
-        name, named = _segment_name(layer, len(layers))
+        name, is_named = _segment_name(layer, len(layers))
         what = f"the segment {name}" if kind == "segment" else f"the layer {where}, {kind},"
         if not len(runs):
             notes.append(f"{what} has no pixels: ignored")
@@ -177,7 +176,7 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[PixelLayer]:
             notes.append(
                 f"{what} has {pixels} pixels, though its pixelCount says {shown_value(stated)}"
             )
-        layers.append(PixelLayer(kind, name, named, runs))
+        layers.append(PixelLayer(kind, name, is_named, runs))
     if all(layer.kind == "wall" for layer in layers):
         raise FloorPlanError("it has no floor: no layer of type floor or segment has any pixel")
     return layers
@@ -217,11 +216,11 @@ def _whole_numbers(
     return np.array(values, np.int64).reshape(-1, group)
 
 
-# --- Entities: what lies on the floor ----------------------------------------------------------
+# --- Entities --------------------------------------------------------------------------------
 
 
 def entities_of(content: dict[str, Any], kind: str) -> Iterator[tuple[dict[str, Any], str]]:
-    """Return the entities of a type, and how to name each in an error."""
+    """Return the entities of a type, each with its place in the file."""
     return ((e, where) for e, where in objects_in(content, "entities") if e.get("type") == kind)
 
 
@@ -238,7 +237,7 @@ def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
 
 
 def read_charger(content: dict[str, Any]) -> tuple[float, float] | None:
-    """Return where the first charger is (x, y) [m], if the map has one."""
+    """Return the place of the first charger (x, y) [m], if the map has one."""
     for entity, where in entities_of(content, "charger_location"):
         for x, y in read_points(entity, where)[:1].tolist():
             return x, y
