@@ -21,28 +21,40 @@ void repeat(Array<T, 2>& rows, i64 t) {
     std::copy_n(before.data, row.size(), row.data);
 }
 
-// As NumPy's pairwise sum over fewer than 129 numbers; number i is at data[i * step].
-f64 pairwise_sum(const f64* data, i64 count, i64 step) {
-    f64 sum = 0;
+// The sums of the columns of rows (count, width), each as NumPy's pairwise sum; fewer than 129 rows.
+void sum_few_rows(const f64* rows, i64 count, i64 width, f64* sum) {
+    constexpr i64 lanes = 8;
     i64 i = 0;
-    if (count >= 8) {
-        f64 part[8];
-        for (i64 k = 0; k < 8; ++k) part[k] = data[k * step];
-        for (i = 8; i < count - count % 8; i += 8) {
-            for (i64 k = 0; k < 8; ++k) part[k] += data[(i + k) * step];
+    if (count < lanes) {
+        std::fill_n(sum, width, 0.0);
+    } else {
+        std::vector<f64> parts(rows, rows + lanes * width);
+        f64* part = parts.data();
+        for (i = lanes; i < count - count % lanes; i += lanes) {
+            for (i64 k = 0; k < lanes * width; ++k) part[k] += rows[i * width + k];
         }
-        sum = ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
+        for (i64 k = 0; k < width; ++k) {
+            const auto lane = [&](i64 number) { return part[number * width + k]; };
+            sum[k] = ((lane(0) + lane(1)) + (lane(2) + lane(3))) + ((lane(4) + lane(5)) + (lane(6) + lane(7)));
+        }
     }
-    for (; i < count; ++i) sum += data[i * step];
-    return sum;
+    for (; i < count; ++i) {
+        for (i64 k = 0; k < width; ++k) sum[k] += rows[i * width + k];
+    }
 }
 
-// As NumPy's pairwise sum: halves of more than 128 numbers apart.
-f64 whole_sum(const f64* data, i64 count, i64 step) {
-    if (count <= 128) return pairwise_sum(data, count, step);
+// The same of any number of rows: halves of more than 128 apart.
+void sum_rows(const f64* rows, i64 count, i64 width, f64* sum) {
+    if (count <= 128) {
+        sum_few_rows(rows, count, width, sum);
+        return;
+    }
     i64 half = count / 2;
     half -= half % 8;
-    return whole_sum(data, half, step) + whole_sum(data + half * step, count - half, step);
+    std::vector<f64> rest(static_cast<std::size_t>(width));
+    sum_rows(rows, half, width, sum);
+    sum_rows(rows + half * width, count - half, width, rest.data());
+    for (i64 k = 0; k < width; ++k) sum[k] += rest[static_cast<std::size_t>(k)];
 }
 
 // Set one bin's shares from its cells (robots, 2, patches).
@@ -75,31 +87,72 @@ void share(View<const i64, 3> cells, const PatchSizes& patches, i64 bin_steps, i
     }
 }
 
-// Set what adds up of one bin: values (users + 1, 2 places + 1).
-void values_of(View<const f64, 3> chains, View<const bool> unknown, i64 users, i64 t, View<f64, 2> values) {
-    const i64 places = chains.shape[2], rooms = places - 1;
-    for (i64 user = 0; user < chains.shape[0]; ++user) {
-        const View<const f64> chain = chains[user][t];
-        std::copy(chain.begin(), chain.end(), values[user].begin());
+// Goes along a chain, bin by bin.
+class Cursor {
+public:
+    explicit Cursor(const Chain& chain) : chain_(chain), left_(chain.bins.size() > 0 ? chain.bins[0] : 0) {}
+
+    View<const f64> next() {
+        if (left_ == 0) left_ = chain_.bins[++stretch_];
+        --left_;
+        return chain_.places[stretch_];
     }
-    if (users > 0) {
-        const View<f64> anyone = values[users];
-        bool seen = false;
-        for (i64 room = 0; room < rooms; ++room) {
-            f64 empty = unknown[room] ? 0.0 : 1.0;
-            seen |= unknown[room];
-            for (i64 user = 0; user < users; ++user) empty *= 1 - std::min(chains(user, t, room), 1.0);
-            anyone[room] = 1 - empty;
+
+private:
+    Chain chain_;
+    i64 stretch_ = 0;
+    i64 left_;  // bins of the stretch
+};
+
+// What is known of anyone in the bins of an hour, from the users one by one: (bins, places).
+class Anyone {
+public:
+    Anyone(View<const bool, 2> unknown, i64 begin, i64 end)
+        : empty_(Array<f64, 2>::empty({end - begin, unknown.shape[1] + 1})) {
+        for (i64 t = begin; t < end; ++t) {
+            const View<f64> row = empty_[t - begin];
+            bool seen = false;
+            for (i64 room = 0; room < unknown.shape[1]; ++room) {
+                row[room] = unknown(t, room) ? 0.0 : 1.0;
+                seen |= unknown(t, room);
+            }
+            row[unknown.shape[1]] = seen ? 0.0 : 1.0;
         }
-        f64 gone = seen ? 0.0 : 1.0;
-        for (i64 user = 0; user < users; ++user) gone *= chains(user, t, rooms);
-        anyone[rooms] = gone;
     }
-    for (i64 who = 0; who < values.size(); ++who) {
-        const View<f64> row = values[who];
-        for (i64 place = 0; place < places; ++place) row[places + place] = row[place] * (1 - row[place]);
-        row[2 * places] = 1;
+
+    void take(i64 bin, View<const f64> places) {
+        const View<f64> row = empty_[bin];
+        const i64 rooms = row.size() - 1;
+        for (i64 room = 0; room < rooms; ++room) row[room] *= 1 - std::min(places[room], 1.0);
+        row[rooms] *= places[rooms];
     }
+
+    // The probability of each room that somebody is there, and last that nobody is at home.
+    View<const f64> places(i64 bin) {
+        const View<f64> row = empty_[bin];
+        for (i64 room = 0; room + 1 < row.size(); ++room) row[room] = 1 - row[room];
+        return row;
+    }
+
+private:
+    Array<f64, 2> empty_;
+};
+
+// What adds up of one bin: values (2 places + 1,).
+void set_values(View<const f64> places, View<f64> values) {
+    const i64 count = places.size();
+    for (i64 place = 0; place < count; ++place) {
+        values[place] = places[place];
+        values[count + place] = places[place] * (1 - places[place]);
+    }
+    values[2 * count] = 1;
+}
+
+// Sum rows as add.reduceat does: the first one and the sum of the rest.
+void reduce(const Array<f64, 2>& values, i64 count, View<f64> sum) {
+    const i64 width = sum.size();
+    sum_rows(values.data() + width, count - 1, width, sum.data);
+    for (i64 k = 0; k < width; ++k) sum[k] = values[0][k] + sum[k];
 }
 
 }  // namespace
@@ -124,23 +177,28 @@ Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_
     return views;
 }
 
-Array<f64, 3> sum_places(View<const f64, 3> chains, View<const bool, 2> unknown, i64 users, View<const i64> first) {
-    const i64 bins = chains.shape[1], width = 2 * chains.shape[2] + 1, rows = users > 0 ? users + 1 : 1;
+Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users,
+                         View<const i64> first) {
+    const i64 bins = unknown.size(), width = 2 * (unknown.shape[1] + 1) + 1, rows = users > 0 ? users + 1 : 1;
     auto sums = Array<f64, 3>::empty({first.size(), rows, width});
-    Array<f64, 3> values;
-    i64 room = 0;  // bins that `values` has room for
+    std::vector<Cursor> cursors(chains.begin(), chains.end());
+    Array<f64, 2> values;
     for (i64 h = 0; h < first.size(); ++h) {
-        const i64 begin = first[h], end = h + 1 < first.size() ? first[h + 1] : bins;
-        if (end - begin > room) {
-            room = end - begin;
-            values = Array<f64, 3>::empty({room, rows, width});
+        const i64 begin = first[h], end = h + 1 < first.size() ? first[h + 1] : bins, count = end - begin;
+        if (values.size() < count || h == 0) values = Array<f64, 2>::empty({count, width});
+        Anyone anyone(unknown, begin, end);
+        i64 row = 0;
+        for (Cursor& cursor : cursors) {
+            for (i64 t = 0; t < count; ++t) {
+                const View<const f64> places = cursor.next();
+                set_values(places, values[t]);
+                if (users > 0) anyone.take(t, places);
+            }
+            reduce(values, count, sums[h][row++]);
         }
-        for (i64 t = begin; t < end; ++t) values_of(chains, unknown[t], users, t, values[t - begin]);
-        const f64* data = values.data();
-        f64* sum = sums.data() + h * rows * width;
-        for (i64 k = 0; k < rows * width; ++k) {
-            sum[k] = data[k] + whole_sum(data + rows * width + k, end - begin - 1, rows * width);
-        }
+        if (users == 0) continue;
+        for (i64 t = 0; t < count; ++t) set_values(anyone.places(t), values[t]);
+        reduce(values, count, sums[h][row]);
     }
     return sums;
 }

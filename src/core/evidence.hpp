@@ -2,6 +2,7 @@
 #pragma once
 
 #include <tuple>
+#include <vector>
 
 #include "array.hpp"
 
@@ -26,12 +27,19 @@ struct Views {
 // at one step, and lie in one piece; of several robots, the one that saw most counts.
 Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_steps);
 
+// Where a person was in consecutive stretches of bins.
+struct Chain {
+    View<const f64, 2> places;  // (stretches, places) probability of each place, away last
+    View<const i64> bins;       // (stretches,) how many bins each has, 1 at least
+};
+
 // Sum what presence adds up by hour, in the order in which NumPy's add.reduceat sums over the first axis.
 //
-// Each user's chain is in `chains` (users, bins, places), away last. `unknown` (bins, places - 1) says in which rooms
-// somebody was who is no user. `first` are the bins at which hours begin, the first of them 0. Of each hour come, for
-// each user and for anyone (a last one, unless there is but one chain and `users` is 0), the sums of the probability p
-// of each place, of p (1 - p), and of 1: (hours, users + 1, 2 places + 1).
-Array<f64, 3> sum_places(View<const f64, 3> chains, View<const bool, 2> unknown, i64 users, View<const i64> first);
+// There is a chain of each user, all of as many bins. `unknown` (bins, places - 1) says in which rooms somebody was
+// who is no user. `first` are the bins at which hours begin, the first of them 0. Of each hour come, for each user and
+// for anyone (a last one, unless there is but one chain and `users` is 0), the sums of the probability p of each place,
+// of p (1 - p), and of 1: (hours, users + 1, 2 places + 1).
+Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users,
+                         View<const i64> first);
 
 }  // namespace fleet2d

@@ -4,7 +4,10 @@
 // and where a robot goes because of it, is the same everywhere.
 #pragma once
 
+#include <algorithm>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "lattice.hpp"
 #include "random.hpp"
@@ -46,6 +49,50 @@ inline void count_sightings(View<const i64> step, View<const i64> user, View<con
             ++seen(bin, who, where);
         }
     }
+}
+
+// At how many steps of each bin users were perceived in each room, where that isn't 0: arrays of one length, by user,
+// bin and room, ascending.
+struct SightingCounts {
+    Array<i64> user, bin, room, steps;
+};
+
+// What `count_sightings` would add to zeros of `shape`.
+inline SightingCounts list_sightings(View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps,
+                                     std::array<i64, 3> shape) {
+    struct Entry {
+        i64 user, bin, room, steps, last;  // the step that was counted last
+    };
+    std::vector<Entry> entries;
+    const auto [bins, users, rooms] = shape;
+    auto newest = Array<i64, 2>::filled({users, rooms}, -1);  // entry
+    for (i64 i = 0; i < step.size(); ++i) {
+        const i64 at = step[i], where = room[i], bin = floor_div(at, bin_steps);
+        if (where < 0 || bin < 0 || bin >= bins) continue;
+        for (const i64 who : {user[i], users - 1}) {
+            if (who < 0) continue;
+            i64& number = newest(who, where);
+            if (number < 0 || entries[static_cast<std::size_t>(number)].bin != bin) {
+                number = static_cast<i64>(entries.size());
+                entries.push_back({who, bin, where, 0, -1});
+            }
+            Entry& entry = entries[static_cast<std::size_t>(number)];
+            if (entry.last == at) continue;
+            entry.last = at;
+            ++entry.steps;
+        }
+    }
+    std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+        return std::tie(a.user, a.bin, a.room) < std::tie(b.user, b.bin, b.room);
+    });
+    const std::array<i64, 1> count{static_cast<i64>(entries.size())};
+    SightingCounts made{Array<i64>::empty(count), Array<i64>::empty(count), Array<i64>::empty(count),
+                        Array<i64>::empty(count)};
+    for (i64 i = 0; i < count[0]; ++i) {
+        const Entry& entry = entries[static_cast<std::size_t>(i)];
+        made.user[i] = entry.user, made.bin[i] = entry.bin, made.room[i] = entry.room, made.steps[i] = entry.steps;
+    }
+    return made;
 }
 
 // Sums of days drawn with replacement, (replicates, values), each of as many as there are: `days` is

@@ -305,30 +305,22 @@ namespace {
 
 // Where a user was perceived in a bin.
 struct Sighting {
-    i64 patches = 0;  // in how many patches
-    i64 patch = -1;   // in which, the last if there are several; -1: in none
-};
+    i64 begin = 0;  // its numbers among the sightings
+    i64 end = 0;
+    i64 patch = -1;  // in which patch, the last if there are several; -1: in none
 
-Sighting sighting_of(View<const i64> seen) {
-    i64 any = 0;
-    for (const i64 steps : seen) any |= steps;
-    Sighting sighting;
-    if (any == 0) return sighting;
-    for (i64 p = 0; p < seen.size(); ++p) {
-        if (seen[p] > 0) sighting = {sighting.patches + 1, p};
-    }
-    return sighting;
-}
+    i64 patches() const { return end - begin; }
+};
 
 // Whether bins are alike, each with what was in view and where the user was perceived.
 bool alike(View<const u8> shown, Sighting sighting, View<const u8> shown_before, Sighting before) {
-    return sighting.patches < 2 && before.patches < 2 && sighting.patch == before.patch &&
+    return sighting.patches() < 2 && before.patches() < 2 && sighting.patch == before.patch &&
            std::equal(shown.begin(), shown.end(), shown_before.begin());
 }
 
 }  // namespace
 
-OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, View<const i64, 2> seen, i64 longest) {
+OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, const PatchCounts& seen, i64 longest) {
     struct Opening {
         i64 bin;  // the first of a stretch
         Sighting sighting;
@@ -338,13 +330,14 @@ OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, Vi
     i64 sightings = 0;
     const i64 bins = shown.size(), patches = shown.shape[1];
     for (i64 t = 0; t < bins; ++t) {
-        const Sighting now = sighting_of(seen[t]);
+        Sighting now{before.end, before.end, -1};
+        for (; now.end < seen.bin.size() && seen.bin[now.end] == t; ++now.end) now.patch = seen.patch[now.end];
         const bool goes_on = t > 0 && t - openings.back().bin < longest &&
                              floor_div(minute[openings.back().bin], 60) == floor_div(minute[t], 60) &&
                              alike(shown[t], now, shown[t - 1], before);
         if (!goes_on) {
             openings.push_back({t, now});
-            sightings += now.patches;
+            sightings += now.patches();
         }
         before = now;
     }
@@ -367,15 +360,12 @@ OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, Vi
         const auto [bin, sighting] = openings[static_cast<std::size_t>(i)];
         made.hour[i] = floor_div(minute[bin], 60);
         std::copy(shown[bin].begin(), shown[bin].end(), made.shown[i].begin());
-        if (sighting.patches > 0) {
-            f64 total = 0.0;
-            for (const i64 steps : seen[bin]) total += static_cast<f64>(steps);
-            for (i64 p = 0; p < patches; ++p) {
-                if (seen(bin, p) <= 0) continue;
-                made.patch[used] = p;
-                made.share[used] = static_cast<f64>(seen(bin, p)) / total;
-                ++used;
-            }
+        f64 total = 0.0;
+        for (i64 k = sighting.begin; k < sighting.end; ++k) total += static_cast<f64>(seen.steps[k]);
+        for (i64 k = sighting.begin; k < sighting.end; ++k) {
+            made.patch[used] = seen.patch[k];
+            made.share[used] = static_cast<f64>(seen.steps[k]) / total;
+            ++used;
         }
         made.begin[i + 1] = used;
     }

@@ -103,11 +103,17 @@ struct OwnedStretches {
     Array<f64> share;
 };
 
+// At how many steps of each bin a user was perceived in each patch, where that isn't 0; by bin and patch, ascending.
+struct PatchCounts {
+    View<const i64> bin;
+    View<const i64> patch;
+    View<const i64> steps;
+};
+
 // Take together bins in which the same was in view and the user was perceived alike, at most `longest`.
 //
 // Bins in which the user was perceived in several patches stay by themselves, and no stretch goes on into another
-// hour. `minute` (bins,) is that since midnight; `shown` (bins, patches) as in Stretches, without away; `seen`
-// (bins, patches) counts the steps at which the user was perceived in each patch.
-OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, View<const i64, 2> seen, i64 longest);
+// hour. `minute` (bins,) is that since midnight; `shown` (bins, patches) as in Stretches, without away.
+OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, const PatchCounts& seen, i64 longest);
 
 }  // namespace fleet2d

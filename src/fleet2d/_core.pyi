@@ -2,6 +2,7 @@
 The compiled core of Fleet2D: arrays and integers in, arrays and integers out.
 """
 
+from collections.abc import Sequence
 import enum
 from typing import Any, overload
 
@@ -1032,6 +1033,23 @@ def count_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.
         seen: int64 (bins, users + 1, rooms), to be added to; the last user is anybody.
     """
 
+def list_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, bins: int, users: int, rooms: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+    """
+    List what `count_sightings` would add to zeros (bins, users, rooms), where it isn't 0.
+
+    Args:
+        step: int64 (n,), in order of time, from the beginning of the first bin.
+        user: int64 (n,), below 0 for somebody unknown.
+        room: int64 (n,), below 0 for none.
+        bin_steps: Steps of a bin.
+        bins: How many bins there are.
+        users: How many users there are, and one more for anybody.
+        rooms: How many rooms there are.
+
+    Returns:
+        User, bin, room, and number of steps, int64 (n,) each, in ascending order.
+    """
+
 def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64], replicates: int) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sum days drawn with replacement.
@@ -1061,12 +1079,13 @@ def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.ND
         one step: float64 (bins, patches); and that in parts of 255: uint8 (bins, patches).
     """
 
-def sum_places(chains: numpy.typing.NDArray[numpy.float64], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
+def sum_places(chains: Sequence[tuple[Any, ...]], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sum what presence adds up, by hour, in the order of NumPy's add.reduceat over the first axis.
 
     Args:
-        chains: float64 (users, bins, places), probability of each place, away last.
+        chains: Of each user, consecutive stretches of bins: float64 (stretches, places), probability of each place,
+            away last; and int64 (stretches,), how many bins each has.
         unknown: bool (bins, places - 1), where somebody was perceived who is no user.
         users: How many users there are; 0: `chains` holds one person, who is anyone.
         first: int64 (hours,), the bins at which hours begin, the first 0.
@@ -1121,7 +1140,7 @@ class Legs:
 
 WHOLE_PATCH: int = 255
 
-def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], seen: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], bin: numpy.typing.NDArray[numpy.int64], patch: numpy.typing.NDArray[numpy.int64], steps: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
     """Take together bins that are alike; see `fleet2d.kernels.stays`."""
 
 def follow(ways: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:

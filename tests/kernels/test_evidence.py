@@ -61,18 +61,27 @@ def values(chains: F64, unknown: NDArray[np.bool_], users: int) -> F64:
     return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
 
 
+def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, NDArray[np.int64]]:
+    """Return probabilities of places in stretches of up to five bins, and their lengths."""
+    cuts = np.cumsum(random.integers(1, 6, bins))
+    lengths = np.diff([0, *cuts[cuts < bins], bins])
+    places = random.dirichlet(np.full(6, 0.1), len(lengths))
+    places[::3] *= 1 + 1e-15  # sums are one up to rounding
+    return places, lengths
+
+
 @pytest.mark.parametrize("users", [0, 1, 2, 5])
 @pytest.mark.parametrize("longest", [1, 7, 9, 60, 700])
 def test_sums_by_hour_are_those_of_numpy(users: int, longest: int) -> None:
     random = np.random.default_rng(users)
     ends = np.cumsum(random.integers(1, longest + 1, 9))
-    chains = random.dirichlet(np.full(6, 0.1), (max(users, 1), ends[-1]))
-    chains[:, ::3] *= 1 + 1e-15  # sums are one up to rounding
+    stretches = [chain_of(random, int(ends[-1])) for _ in range(max(users, 1))]
+    chains = np.stack([np.repeat(places, bins, axis=0) for places, bins in stretches])
     unknown = random.random((ends[-1], 5)) < 0.05
     first = np.array([0, *ends[:-1]])
     expected = np.add.reduceat(values(chains, unknown, users), first, axis=0)
 
-    found = sum_places(chains, unknown, users, first)
+    found = sum_places(stretches, unknown, users, first)
 
     assert np.array_equal(expected, found)
     for sums, (a, b) in zip(found, pairwise([0, *ends.tolist()]), strict=True):
@@ -80,10 +89,15 @@ def test_sums_by_hour_are_those_of_numpy(users: int, longest: int) -> None:
 
 
 def test_wrong_sizes_are_refused() -> None:
-    chains, unknown = np.full((2, 4, 3), 1 / 3), np.zeros((4, 2), bool)
+    chain, unknown = (np.full((2, 3), 1 / 3), np.array([3, 1])), np.zeros((4, 2), bool)
+    chains = [chain, chain]
     with pytest.raises(ValueError, match="no users"):
         sum_places(chains, unknown, 3, np.array([0]))
-    with pytest.raises(ValueError, match="unknown"):
+    wrong = (chain[0][:, :2], chain[1]), (chain[0][:1], chain[1]), (chain[0], np.array([4, 0]))
+    for other in wrong:
+        with pytest.raises(ValueError, match="a chain must be"):
+            sum_places([chain, other], unknown, 2, np.array([0]))
+    with pytest.raises(ValueError, match="a chain must be"):
         sum_places(chains, unknown[:3], 2, np.array([0]))
     for first in ([1], [0, 0], [0, 4]):
         with pytest.raises(ValueError, match="ascend"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fleet2d.kernels.presence import advance, count_sightings, resampled
+from fleet2d.kernels.presence import advance, count_sightings, list_sightings, resampled
 from fleet2d.kernels.random import random_below, random_bits
 
 
@@ -40,3 +40,9 @@ def test_sightings_are_the_steps_with_each_user_in_each_room(seed: int) -> None:
     for at, who, where in np.ndindex(seen.shape):
         steps = {s for s, u, r in rows if r == where and who in (u, users)}
         assert sum(s // bin_steps == at for s in steps) == seen[at, who, where]
+
+    *where, counts = list_sightings(step, user, room, bin_steps, *seen.shape)
+
+    by_user = seen.transpose(1, 0, 2)
+    assert [place.tolist() for place in np.nonzero(by_user)] == [place.tolist() for place in where]
+    assert by_user[tuple(where)].tolist() == counts.tolist()

@@ -5,7 +5,53 @@
 
 namespace fleet2d {
 
+template <>
+struct border::Fields<Chain> {
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
+    static constexpr auto members = std::tuple(&Chain::places, &Chain::bins);
+};
+
+// The chains of some people.
+struct Chains {
+    std::vector<Chain> all;
+};
+
+}  // namespace fleet2d
+
+namespace nanobind::detail {
+
+// A list of chains.
+template <>
+struct type_caster<fleet2d::Chains> {
+    NB_TYPE_CASTER(fleet2d::Chains, const_name("collections.abc.Sequence[tuple[typing.Any, ...]]"))
+    std::vector<make_caster<fleet2d::Chain>> casters;  // they own what had to be copied
+
+    bool from_python(handle source, uint32_t flags, cleanup_list* cleanup) noexcept {
+        if (!PyList_Check(source.ptr())) return false;
+        casters = decltype(casters)(static_cast<std::size_t>(PyList_Size(source.ptr())));
+        for (auto& caster : casters) {
+            handle item = PyList_GetItem(source.ptr(), static_cast<Py_ssize_t>(value.all.size()));
+            if (!caster.from_python(item, flags, cleanup)) return false;
+            value.all.push_back(caster.value);
+        }
+        return true;
+    }
+};
+
+}  // namespace nanobind::detail
+
+namespace fleet2d {
+
 namespace {
+
+// Whether a chain is of so many places and bins.
+bool is_chain(const Chain& chain, i64 places, i64 bins) {
+    if (chain.places.size() != chain.bins.size() || chain.places.shape[1] != places) return false;
+    if (!all_in_range(chain.bins, 1, i64{1} << 31)) return false;
+    i64 sum = 0;
+    for (const i64 length : chain.bins) sum += length;
+    return sum == bins;
+}
 
 // Whether numbers ascend from 0, by one at most, to `count` - 1.
 bool numbers_all(View<const i64> rooms, i64 count) {
@@ -57,19 +103,22 @@ Returns:
     one step: float64 (bins, patches); and that in parts of 255: uint8 (bins, patches).)");
     m.def(
         "sum_places",
-        [](View<const f64, 3> chains, View<const bool, 2> unknown, i64 users, View<const i64> first) {
-            require(chains.shape[0] == std::max(users, i64{1}) && chains.shape[2] > 0,
-                    "chains must be (users, bins, places), of one person if there are no users");
-            require(unknown.shape[0] == chains.shape[1] && unknown.shape[1] == chains.shape[2] - 1,
-                    "unknown must be (bins, places - 1)");
-            require(begins(first, chains.shape[1]), "first must ascend from 0, below the number of bins");
-            return sum_places(chains, unknown, users, first);
+        [](const Chains& chains, View<const bool, 2> unknown, i64 users, View<const i64> first) {
+            const i64 count = static_cast<i64>(chains.all.size()), bins = unknown.size();
+            require(count == std::max(users, i64{1}), "there must be a chain of each user, one if there are no users");
+            for (const Chain& chain : chains.all) {
+                require(is_chain(chain, unknown.shape[1] + 1, bins),
+                        "a chain must be probabilities (stretches, places), and how many bins each stretch has");
+            }
+            require(begins(first, bins), "first must ascend from 0, below the number of bins");
+            return sum_places(chains.all, unknown, users, first);
         },
         "chains"_a, "unknown"_a, "users"_a, "first"_a, Unlocked(),
         R"(Sum what presence adds up, by hour, in the order of NumPy's add.reduceat over the first axis.
 
 Args:
-    chains: float64 (users, bins, places), probability of each place, away last.
+    chains: Of each user, consecutive stretches of bins: float64 (stretches, places), probability of each place,
+        away last; and int64 (stretches,), how many bins each has.
     unknown: bool (bins, places - 1), where somebody was perceived who is no user.
     users: How many users there are; 0: `chains` holds one person, who is anyone.
     first: int64 (hours,), the bins at which hours begin, the first 0.

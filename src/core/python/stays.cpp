@@ -9,14 +9,19 @@ void bind_stays(nb::module_& m) {
 
     m.def(
         "take_together",
-        [](View<const i64> minute, View<const u8, 2> shown, View<const i64, 2> seen, i64 longest) {
-            require(minute.size() == shown.size() && seen.shape == shown.shape,
-                    "minute must be (bins,), shown and seen (bins, patches)");
-            OwnedStretches made = take_together(minute, shown, seen, longest);
+        [](View<const i64> minute, View<const u8, 2> shown, View<const i64> bin, View<const i64> patch,
+           View<const i64> steps, i64 longest) {
+            require(minute.size() == shown.size(), "minute must be (bins,), shown (bins, patches)");
+            require(bin.size() == patch.size() && bin.size() == steps.size(),
+                    "bin, patch and steps must have one length");
+            require(all_in_range(bin, 0, shown.size()) && all_in_range(patch, 0, shown.shape[1]) &&
+                        std::is_sorted(bin.begin(), bin.end()),
+                    "bin must ascend and hold numbers of bins, patch numbers of patches");
+            OwnedStretches made = take_together(minute, shown, {bin, patch, steps}, longest);
             return std::tuple(std::move(made.bins), std::move(made.hour), std::move(made.shown), std::move(made.begin),
                               std::move(made.patch), std::move(made.share));
         },
-        "minute"_a, "shown"_a, "seen"_a, "longest"_a, Unlocked(),
+        "minute"_a, "shown"_a, "bin"_a, "patch"_a, "steps"_a, "longest"_a, Unlocked(),
         "Take together bins that are alike; see `fleet2d.kernels.stays`.");
     m.def(
         "follow",

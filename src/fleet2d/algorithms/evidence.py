@@ -1,16 +1,92 @@
 """Evidence: what robots watched, and which users they perceived there, in bins of time."""
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.patches import Patches
 from fleet2d.kernels.evidence import gather_views
-from fleet2d.kernels.presence import count_sightings
+from fleet2d.kernels.presence import count_sightings, list_sightings
+
+I64 = NDArray[np.int64]
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000
+
+
+class SightingCounts(NamedTuple):
+    """At how many steps of each bin users were perceived in each place, where that isn't 0.
+
+    Attributes:
+        user: int64 (n,), ascending, row of the user; the last row counts anybody.
+        bin: int64 (n,), ascending for each user.
+        place: int64 (n,), ascending for each user and bin; a patch, or a room.
+        steps: int64 (n,), number of steps.
+        shape: Numbers of bins, of users + 1, and of places.
+    """
+
+    user: I64
+    bin: I64
+    place: I64
+    steps: I64
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, seen: I64) -> Self:
+        """Return the counts in an array (bins, users + 1, places).
+
+        Example:
+            >>> counts = SightingCounts.of(np.array([[[0, 7], [0, 7]]]))
+            >>> counts.user.tolist(), counts.place.tolist(), counts.dense.tolist()
+            ([0, 1], [1, 1], [[[0, 7], [0, 7]]])
+        """
+        by_user = seen.transpose(1, 0, 2)
+        user, seen_bin, place = np.nonzero(by_user)
+        bins, users, places = seen.shape
+        return cls(user, seen_bin, place, by_user[user, seen_bin, place], (bins, users, places))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the counts of consecutive bins as one."""
+        if len(parts) == 1:
+            return parts[0]
+        first = np.cumsum([0, *(part.shape[0] for part in parts)]).tolist()
+        user, place, steps = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("user", "place", "steps")
+        )
+        bins = np.concatenate([part.bin + begin for part, begin in zip(parts, first, strict=False)])
+        order = np.argsort(user, kind="stable")
+        shape = (first[-1], *parts[0].shape[1:])
+        return cls(user[order], bins[order], place[order], steps[order], shape)
+
+    def between(self, begin: int, end: int) -> Self:
+        """Return the counts of the bins `begin` to `end` - 1."""
+        rows = (begin <= self.bin) & (self.bin < end)
+        columns = (self.user[rows], self.bin[rows] - begin, self.place[rows], self.steps[rows])
+        return type(self)(*columns, (end - begin, *self.shape[1:]))
+
+    def of_user(self, user: int) -> tuple[I64, I64, I64]:
+        """Return the bins, places and steps of a user, each (n,)."""
+        begin, end = np.searchsorted(self.user, [user, user + 1])
+        return self.bin[begin:end], self.place[begin:end], self.steps[begin:end]
+
+    @property
+    def dense(self) -> I64:
+        """The counts as an array: int64 (bins, users + 1, places)."""
+        seen = np.zeros(self.shape, np.int64)
+        seen[self.bin, self.user, self.place] = self.steps
+        return seen
+
+    @property
+    def unknown(self) -> NDArray[np.bool_]:
+        """Where anybody was perceived at more steps than all users: bool (bins, places)."""
+        bins, users, places = self.shape
+        signed = np.where(self.user == users - 1, self.steps, -self.steps)
+        excess = np.bincount(self.bin * places + self.place, signed, bins * places)
+        return (excess > 0).reshape(bins, places)
 
 
 class Parts(NamedTuple):
@@ -22,7 +98,7 @@ class Parts(NamedTuple):
         watched: float64 (bins, patches), as in Evidence.
         shown: float64 (bins, patches), the largest share of each patch's cells in view at one step
             of the bin; with several robots, that of the robot that saw most of it.
-        seen: int64 (bins, users + 1, patches), as in Evidence.
+        sightings: Where users were perceived, by patches.
         shown_parts: uint8 (bins, patches), `shown` times 255; None: not computed yet.
     """
 
@@ -30,8 +106,13 @@ class Parts(NamedTuple):
     cells: NDArray[np.int64]
     watched: NDArray[np.float64]
     shown: NDArray[np.float64]
-    seen: NDArray[np.int64]
+    sightings: SightingCounts
     shown_parts: NDArray[np.uint8] | None = None
+
+    @property
+    def seen(self) -> I64:
+        """As in Evidence, by patches: int64 (bins, users + 1, patches), made anew."""
+        return self.sightings.dense
 
 
 class Evidence(NamedTuple):
@@ -107,21 +188,21 @@ def gather(
     watched, by_patch, shown, shown_parts = gather_views(
         cells, patches.room, patches.cells, patches.room_cells, bin_steps
     )
-    sizes = (first, len(cells), bin_steps, users)
-    in_room = sightings._replace(room=patches.room[sightings.room])
-    seen = count_seen(sightings, *sizes, count)
-    parts = Parts(patches.room, patches.cells, by_patch, shown, seen, shown_parts)
-    in_rooms = count_seen(in_room, *sizes, len(patches.first))
+    bins, in_room = len(cells), sightings._replace(room=patches.room[sightings.room])
+    user, patch = sightings.user.astype(np.int64), sightings.room.astype(np.int64)
+    shape = (bins, users + 1, count)
+    counts = list_sightings(sightings.step - first, user, patch, bin_steps, *shape)
+    parts = Parts(
+        patches.room, patches.cells, by_patch, shown, SightingCounts(*counts, shape), shown_parts
+    )
+    in_rooms = count_seen(in_room, first, bins, bin_steps, users, len(patches.first))
     return Evidence(first, bin_steps, watched, in_rooms, parts)
 
 
 def count_seen(
     sightings: SightingRows, begin: int, bins: int, bin_steps: int, users: int, rooms: int
 ) -> NDArray[np.int64]:
-    """Return Evidence.seen: a user perceived twice at a step in a room counts once.
-
-    With patches in place of rooms it returns Parts.seen.
-    """
+    """Return Evidence.seen: a user perceived twice at a step in a room counts once."""
     seen = np.zeros((bins, users + 1, rooms), np.int64)
     user, room = sightings.user.astype(np.int64), sightings.room.astype(np.int64)
     count_sightings(sightings.step - begin, user, room, bin_steps, seen)

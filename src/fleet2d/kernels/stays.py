@@ -81,7 +81,9 @@ class Moments(NamedTuple):
     rests: F64
 
 
-def take_together(minute: I64, shown: U8, seen: I64, longest: int) -> Stretches:
+def take_together(
+    minute: I64, shown: U8, seen_bin: I64, patch: I64, steps: I64, longest: int
+) -> Stretches:
     """Take together bins in which the same was in view and the user was perceived alike.
 
     Bins in which the user was perceived in several patches stay by themselves.
@@ -89,10 +91,12 @@ def take_together(minute: I64, shown: U8, seen: I64, longest: int) -> Stretches:
     Args:
         minute: (bins,) since midnight; no stretch goes on into another hour.
         shown: (bins, patches), as in Stretches, away left out.
-        seen: (bins, patches), steps at which the user was perceived in each.
+        seen_bin: (sightings,), ascending, the bins in which the user was perceived.
+        patch: (sightings,), where, ascending in each bin.
+        steps: (sightings,), at how many steps.
         longest: Most bins of a stretch.
 
     Raises:
         ValueError: The arrays aren't of the same bins and patches.
     """
-    return Stretches(*_core.take_together(minute, shown, seen, longest))
+    return Stretches(*_core.take_together(minute, shown, seen_bin, patch, steps, longest))

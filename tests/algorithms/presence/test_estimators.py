@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from tests.algorithms.presence.worlds import MONDAY, any_evidence, bins_of, pieces
 from tests.reference import presence as slow
 
-from fleet2d.algorithms.evidence import Evidence, Parts
+from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.fremen import Fremen
@@ -107,7 +107,7 @@ def test_exposure_ratio_by_patches_finds_who_is_always_in_the_corner() -> None:
     shown = np.eye(4)[looks][:, :3] * 1.0
     seen = np.repeat((np.eye(3)[where] * shown)[:, None], 2, axis=1).astype(np.int64)
     room, first = np.array([0, 0, 1]), [0, 2]
-    parts = Parts(room, np.array([5, 5, 10]), shown, shown, seen)
+    parts = Parts(room, np.array([5, 5, 10]), shown, shown, SightingCounts.of(seen))
     by_room = np.add.reduceat(shown * parts.cells, first, axis=1) / 10
     found = Evidence(0, 1, by_room, np.add.reduceat(seen, first, axis=2), parts)
     presence = learned(ExposureRatio(detection=1.0), bins_of(found), rooms=2, users=1, length=9999)

@@ -7,7 +7,7 @@ import pytest
 from tests.algorithms.presence.worlds import MONDAY
 from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
-from fleet2d.algorithms.evidence import Evidence, Parts
+from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.presence.counts import Bins, in_time
 from fleet2d.algorithms.presence.person import (
     STAY,
@@ -92,7 +92,7 @@ def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
     shown, seen = np.array(shown, float), np.repeat(np.array(seen)[:, None], 2, axis=1)
     room = np.array([0, 0, 1])
     by_room = np.stack([shown[:, :2].mean(axis=1), shown[:, 2]], axis=1)
-    parts = Parts(room, np.array([4, 4, 8]), shown, shown, seen)
+    parts = Parts(room, np.array([4, 4, 8]), shown, shown, SightingCounts.of(seen))
     in_rooms = np.stack([seen[..., :2].sum(axis=-1), seen[..., 2]], axis=-1)
     return in_time(Evidence(start * 10, 10, by_room, in_rooms, parts), MONDAY, 6_000_000)
 
@@ -113,7 +113,8 @@ def test_bins_that_are_alike_are_taken_together_within_the_hour() -> None:
 def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
     assert bins.by_patch is not None
-    bins.by_patch.seen[0, 1, 2] = 4  # anybody, but not the user
+    seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
+    bins = bins._replace(by_patch=bins.by_patch._replace(sightings=SightingCounts.of(seen)))
     assert [255, 255, 0, 0] == stretches_of(bins, 0, longest=1).shown[0].tolist()
 
 
@@ -122,12 +123,13 @@ def test_who_was_never_in_the_patch_looked_at_may_always_be_in_the_other() -> No
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
     person = Person(StateLayout.of(bins, 1), prior)
-    places = person.end_day(stretches_of(bins, 0, longest=5))
+    places = person.end_day(stretches_of(bins, 0, longest=5)).by_bin
     assert places[300, 0] > 0.1
     assert places[300, 1] < 0.01
     hidden = bins_of([[0.5, 0, 1]] * 600, seen)
     person = Person(StateLayout.of(hidden, 1), prior)
-    assert places[300, 0] + 0.02 < person.end_day(stretches_of(hidden, 0, longest=5))[300, 0]
+    again = person.end_day(stretches_of(hidden, 0, longest=5)).by_bin
+    assert places[300, 0] + 0.02 < again[300, 0]
 
 
 def test_days_gone_through_again_count_once() -> None:
@@ -154,7 +156,7 @@ def test_taking_together_leaves_nothing_out() -> None:
         random = np.random.default_rng(seed)
         shown = random.choice([0, 255], (90, 3), p=[0.9, 0.1]).astype(np.uint8)
         seen = random.choice([0, 3], (90, 3), p=[0.95, 0.05]).astype(np.int64)
-        found = take_together(np.arange(90), shown, seen, 4)
+        found = take_together(np.arange(90), shown, *np.nonzero(seen), seen[seen > 0], 4)
         assert 90 == found.bins.sum()
         assert found.bins.max() <= 4
         at = np.repeat(np.arange(len(found.bins)), found.bins)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.evidence import Evidence, Parts
+from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS
 
@@ -45,7 +45,7 @@ class Bins(NamedTuple):
             return self.by_patch
         rooms = self.watched.shape[1]
         room, cells = np.arange(rooms, dtype=np.int64), np.ones(rooms, np.int64)
-        return Parts(room, cells, self.watched, self.watched, self.seen)
+        return Parts(room, cells, self.watched, self.watched, SightingCounts.of(self.seen))
 
     def part(self, begin: int, end: int) -> "Bins":
         """Return the bins from `begin` to `end` - 1."""
@@ -90,7 +90,7 @@ def _part(parts: Parts | None, rows: slice) -> Parts | None:
     return parts._replace(
         watched=parts.watched[rows],
         shown=parts.shown[rows],
-        seen=parts.seen[rows],
+        sightings=parts.sightings.between(*rows.indices(len(parts.watched))[:2]),
         shown_parts=shown_parts,
     )
 
@@ -110,7 +110,7 @@ def joined(parts: Sequence[Bins]) -> Bins:
         and first.by_patch._replace(
             watched=np.concatenate([part.parts.watched for part in parts]),
             shown=np.concatenate([part.parts.shown for part in parts]),
-            seen=np.concatenate([part.parts.seen for part in parts]),
+            sightings=SightingCounts.joined([part.parts.sightings for part in parts]),
             shown_parts=None,
         ),
     )

@@ -9,10 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d.algorithms.evidence import SightingCounts
 from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import Person, Prior, StateLayout, watched_patches
+from fleet2d.algorithms.presence.person import (
+    Person,
+    Prior,
+    StateLayout,
+    StretchPlaces,
+    watched_patches,
+)
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places
@@ -166,17 +173,17 @@ class Likelihood(Estimator):
                     " estimator, or one with other stages"
                 )
 
-    def _by_hour(self, places: list[F64], day: "DayEvidence") -> tuple[I64, F64]:
+    def _by_hour(self, places: list[StretchPlaces], day: "DayEvidence") -> tuple[I64, F64]:
         """Return the hours of the bins, as ordinal * 24 + hour, and the sums of each hour.
 
         The sums are those of p, p (1 - p), and 1: float64 (hours, users + 1, width).
         """
         hour = day.minute // 60
         first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
-        sums = sum_places(np.stack(places), day.unknown, self.users, first)
+        sums = sum_places(places, day.unknown, self.users, first)
         return day.number * 24 + hour[first], sums
 
-    def _whole_day(self, places: list[F64], day: "DayEvidence") -> F64:
+    def _whole_day(self, places: list[StretchPlaces], day: "DayEvidence") -> F64:
         """Return the sums of each hour of a day: float64 (24, users + 1, width)."""
         hours, sums = self._by_hour(places, day)
         by_hour = np.zeros((24, *sums.shape[1:]))
@@ -237,78 +244,32 @@ class DayEvidence(NamedTuple):
     minute: I64
     unknown: NDArray[np.bool_]
     watched: NDArray[np.uint8] | None
-    sightings: "SightingCounts | None"
+    sightings: SightingCounts | None
 
     @classmethod
     def of(cls, bins: Bins) -> Self:
         """Return the evidence of bins of one day."""
         number, watched = int(bins.day[0]), watched_patches(bins)
-        return cls(
-            number, bins.minute, unknown_seen(bins), watched, SightingCounts.of(bins.parts.seen)
-        )
+        return cls(number, bins.minute, unknown_seen(bins), watched, bins.parts.sightings)
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return consecutive parts of a day as one."""
         if len(parts) == 1:
             return parts[0]
-        lengths = [len(part.minute) for part in parts]
         return cls(
             parts[0].number,
             np.concatenate([part.minute for part in parts]),
             np.concatenate([part.unknown for part in parts]),
             np.concatenate([part.watched for part in parts if part.watched is not None]),
-            SightingCounts.joined([part.sightings for part in parts if part.sightings], lengths),
+            SightingCounts.joined([part.sightings for part in parts if part.sightings]),
         )
 
     def stretches(self, user: int, longest: int) -> Stretches:
         """Return the evidence of one user, with equal bins merged."""
         assert self.watched is not None
         assert self.sightings is not None
-        seen = self.sightings.of_user(user, self.watched.shape)
-        return take_together(self.minute, self.watched, seen, longest)
-
-
-class SightingCounts(NamedTuple):
-    """Where users were perceived, as sparse counts: arrays of one length.
-
-    Attributes:
-        user: int64 (n,), ascending, row of the user.
-        bin: int64 (n,), ascending for each user.
-        patch: int64 (n,), the patch.
-        steps: int64 (n,), number of steps at which the user was perceived there.
-    """
-
-    user: I64
-    bin: I64
-    patch: I64
-    steps: I64
-
-    @classmethod
-    def of(cls, seen: I64) -> Self:
-        """Return the sightings in counts (bins, users + 1, patches), as in Parts."""
-        steps = seen.ravel()
-        places = np.flatnonzero(steps > 0)  # quicker than np.nonzero over three axes
-        bins, user, patch = np.unravel_index(places, seen.shape)
-        return cls(user, bins, patch, steps[places])._by_user()
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self], lengths: Sequence[int]) -> Self:
-        """Return sightings in consecutive parts of `lengths` bins as one."""
-        first = np.cumsum([0, *lengths[:-1]])
-        shifted = [part._replace(bin=part.bin + at) for part, at in zip(parts, first, strict=True)]
-        return cls(*(np.concatenate(column) for column in zip(*shifted, strict=True)))._by_user()
-
-    def _by_user(self) -> Self:
-        order = np.argsort(self.user, kind="stable")
-        return type(self)(*(column[order] for column in self))
-
-    def of_user(self, user: int, shape: tuple[int, ...]) -> I64:
-        """Return the sightings of a user as counts: int64 (bins, patches), of a given shape."""
-        begin, end = np.searchsorted(self.user, [user, user + 1])
-        seen = np.zeros(shape, np.int64)
-        seen[self.bin[begin:end], self.patch[begin:end]] = self.steps[begin:end]
-        return seen
+        return take_together(self.minute, self.watched, *self.sightings.of_user(user), longest)
 
 
 def by_day(bins: Bins) -> list[Bins]:

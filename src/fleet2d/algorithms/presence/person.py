@@ -105,6 +105,23 @@ def ways_of(moments: Moments, layout: StateLayout, prior: Prior) -> Ways:
     return Ways(stay, follow, spread, np.minimum(restless, 1), first, prior.detection)
 
 
+class StretchPlaces(NamedTuple):
+    """Where a person was in consecutive stretches of bins.
+
+    Attributes:
+        probability: float64 (stretches, rooms + 1), of each room, and of away.
+        bins: int64 (stretches,), number of bins of each stretch.
+    """
+
+    probability: F64
+    bins: I64
+
+    @property
+    def by_bin(self) -> F64:
+        """The probability in each bin: float64 (bins, rooms + 1)."""
+        return np.repeat(self.probability, self.bins, axis=0)
+
+
 @dataclass
 class PersonDay:
     """The evidence of one day of a person, and what was learned from it.
@@ -150,28 +167,20 @@ class Person:
         length: F64 = (time + STAY) / (ends + 1)
         return length
 
-    def follow(self, stretches: Stretches) -> F64:
-        """Filter over the next stretches.
-
-        Returns:
-            P(room | evidence up to the bin) of each bin, float64 (bins, rooms + 1).
-        """
+    def follow(self, stretches: Stretches) -> StretchPlaces:
+        """Filter over the next stretches; return P(room | evidence up to the stretch)."""
         now = np.stack([np.zeros_like(self.now), self.now])
         places = follow(self.ways, stretches, now, self.layout.unknown_view())
         self.now = now[0] + now[1]
-        return np.repeat(places, stretches.bins, axis=0)
+        return StretchPlaces(places, stretches.bins)
 
-    def end_day(self, stretches: Stretches) -> F64:
-        """Smooth the finished day as a whole, and learn from it.
-
-        Returns:
-            P(room) of each of its bins, float64 (bins, rooms + 1).
-        """
+    def end_day(self, stretches: Stretches) -> StretchPlaces:
+        """Smooth the finished day as a whole, and learn from it."""
         moments = self.layout.no_moments()
         self.days.append(PersonDay(stretches, self.dawn, self.ones, moments))
         return self.revisit(len(self.days) - 1, 1.0)
 
-    def revisit(self, number: int, weight: float) -> F64:
+    def revisit(self, number: int, weight: float) -> StretchPlaces:
         """Smooth a day with the present model, and update the model by the difference.
 
         The day before and the next day get new boundary messages, which they use when they are
@@ -197,7 +206,7 @@ class Person:
         )
         day.moments = moments
         self.ways = ways_of(self.total, self.layout, self.prior)
-        return np.repeat(places, day.stretches.bins, axis=0)
+        return StretchPlaces(places, day.stretches.bins)
 
     def fade(self, weight: float) -> None:
         """Multiply the moments learned so far by a weight."""
@@ -227,14 +236,13 @@ def watched_patches(bins: Bins) -> NDArray[np.uint8]:
 
     A patch in which an unknown person was perceived, who may be any user, counts as unwatched.
     """
-    seen, users = bins.parts.seen, bins.parts.seen.shape[1] - 1
     shown = bins.parts.shown_parts
     if shown is None:
         whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
         shown = np.rint(whole).astype(np.uint8)
-    if users:
-        known = seen[:, 0] if users == 1 else seen[:, :-1].sum(axis=1)
-        shown = np.where(seen[:, -1] > known, np.uint8(0), shown)
+    sightings = bins.parts.sightings
+    if sightings.shape[1] > 1:
+        shown = np.where(sightings.unknown, np.uint8(0), shown)
     return shown
 
 
@@ -250,5 +258,4 @@ def stretches_of(
         watched: `watched_patches` of these bins, the same for all users; None: it is computed.
     """
     watched = watched_patches(bins) if watched is None else watched
-    seen = np.ascontiguousarray(bins.parts.seen[:, user])
-    return take_together(bins.minute, watched, seen, longest)
+    return take_together(bins.minute, watched, *bins.parts.sightings.of_user(user), longest)
