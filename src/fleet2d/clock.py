@@ -56,6 +56,11 @@ class Clock:
         return -(-elapsed_us // self.step_us)
 
 
+def midnight_of(moment: datetime) -> datetime:
+    """Return the midnight that begins the day of a moment."""
+    return datetime.combine(moment.date(), time())
+
+
 def next_time(text: str, now: datetime) -> datetime:
     """Return the next moment at a time of day, which may be the present one.
 

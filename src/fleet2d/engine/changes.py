@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from fleet2d.clock import Clock
+from fleet2d.clock import Clock, midnight_of
 from fleet2d.engine.passing import crossings, way_ahead
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.motion import Track
@@ -291,7 +291,7 @@ class Changes:
 
     def _schedule(self, number: int, door: Door) -> None:
         """Put the schedule of a door into the queue, for all days of the run."""
-        midnight = datetime.combine(self.clock.start.date(), datetime.min.time())
+        midnight = midnight_of(self.clock.start)
         end = self.clock.time(self.clock.steps)
         while midnight < end:
             for turn in door.schedule:

@@ -15,7 +15,7 @@ from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.giving_way import TOUCHING, Crowd
+from fleet2d.entities.giving_way import TOUCHING, Surroundings
 from fleet2d.events import Event
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import Poses
@@ -65,9 +65,9 @@ class Clearance:
         waiting = robot.waiting
         if waiting is None:
             return end
-        x, y, was_away = waiting.crowd.everybody.T[:, :, None]
+        x, y, was_away = waiting.surroundings.everybody.T[:, :, None]
         has_changed = ((xs != x) | (ys != y) | (away != was_away)).any(axis=0)
-        has_changed |= waiting.crowd.arrangement != robot.arrangement
+        has_changed |= waiting.surroundings.arrangement != robot.arrangement
         column = int(has_changed.argmax())
         return waiting.look_from(max(first + column, first + 1)) if has_changed[column] else end
 
@@ -76,7 +76,7 @@ class Clearance:
         waiting = self.robots[row].waiting if row in self.robots else None
         if waiting is None or waiting.look_from(step) != step:
             return False
-        return not waiting.crowd.is_as(self.crowd(self.robots[row]))
+        return not waiting.surroundings.is_as(self.surroundings(self.robots[row]))
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Advance to a step."""
@@ -102,7 +102,7 @@ class Clearance:
         meeting = self._first(robot, poses, x, y, away, step, begin=0)
         return None if meeting is None else self._users[meeting[1]]
 
-    def crowd(self, robot: DecidingActor) -> Crowd:
+    def surroundings(self, robot: DecidingActor) -> Surroundings:
         """Return the present places of people."""
         units = robot.home.plan.lattice.units_per_m
         rows = [
@@ -112,7 +112,7 @@ class Clearance:
         ]
         everybody = [(u.state.x, u.state.y, u.state.away) for u in self._users]
         people = np.array(rows, np.int64).reshape(-1, 3)
-        return Crowd(people, np.array(everybody, np.int64), robot.arrangement)
+        return Surroundings(people, np.array(everybody, np.int64), robot.arrangement)
 
     def _first(
         self,

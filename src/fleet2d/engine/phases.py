@@ -77,7 +77,7 @@ def decide(state: State, span: Span) -> None:
             if not due:
                 state.end_plan(row, step)
             situation = Situation(actor, step, (), state.learners.readable)
-            actor.give_way(situation, in_way.name, clearance.crowd(actor))
+            actor.give_way(situation, in_way.name, clearance.surroundings(actor))
             state.bodies.follow(row, actor.plan)
         begins = due or in_way is not None
         if row in blocking.rows:

@@ -24,7 +24,7 @@ NEVER = 1 << 62
 """The step of what never happens."""
 
 
-class Bodies(Protocol):
+class RunBodies(Protocol):
     """All bodies of a run.
 
     Attributes:
@@ -97,12 +97,12 @@ class Body:
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
         self._places: tuple[Space, dict[tuple[str, int], PlaceAt]] = self._space[1], {}
-        self._bodies: Bodies | None = None
+        self._bodies: RunBodies | None = None
         self._state: Pose
         self._state_step = 0
         self.row = 0
 
-    def join(self, bodies: Bodies, row: int) -> None:
+    def join(self, bodies: RunBodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""
         self._bodies, self.row = bodies, row
 

@@ -47,7 +47,7 @@ class GivesWay(Settings):
     )
 
 
-class Crowd(NamedTuple):
+class Surroundings(NamedTuple):
     """The people and obstacles around a robot that waits; it waits while they stay the same.
 
     Attributes:
@@ -61,13 +61,13 @@ class Crowd(NamedTuple):
     everybody: I64
     arrangement: tuple[int, int]
 
-    def is_as(self, other: "Crowd") -> bool:
+    def is_as(self, other: "Surroundings") -> bool:
         """Tell whether no person and no object has moved."""
         same = np.array_equal(self.everybody, other.everybody)
         return same and self.arrangement == other.arrangement
 
 
-class Waiting:
+class Wait:
     """The wait of a robot that has stopped in front of a person.
 
     The steps at which it looks are fixed beforehand. A look is skipped if nothing has moved since
@@ -79,14 +79,19 @@ class Waiting:
         step: The step at which it stopped following it.
         since: The step at which it first stopped in front of a person.
         interrupts: The events that interrupt that plan.
-        crowd: The people and obstacles at its last look.
+        surroundings: The people and obstacles at its last look.
     """
 
     def __init__(
-        self, broken: Plan, step: int, since: int, interrupts: frozenset[str], crowd: Crowd
+        self,
+        broken: Plan,
+        step: int,
+        since: int,
+        interrupts: frozenset[str],
+        surroundings: Surroundings,
     ) -> None:
         self.broken, self.step, self.since = broken, step, since
-        self.interrupts, self.crowd = interrupts, crowd
+        self.interrupts, self.surroundings = interrupts, surroundings
         self._step_us = broken.step_us
 
     def look_from(self, step: int) -> int:
@@ -135,7 +140,7 @@ class Waiting:
 
         Args:
             now: The situation.
-            people: As `Crowd.people`.
+            people: As `Surroundings.people`.
             distance: The gap to keep where there is room [m].
         """
         actor, lattice = now.actor, now.actor.home.plan.lattice

@@ -6,6 +6,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
+from fleet2d.clock import midnight_of
 from fleet2d.problems import problem, shown
 from fleet2d.units import format_time_of_day, parse_time_of_day
 from fleet2d.weekdays import weekdays_of
@@ -30,7 +31,7 @@ class HoursSpan(NamedTuple):
 
     def holds_at(self, time: datetime) -> datetime | None:
         """Return the end of the hours that a moment lies in; None if it lies outside."""
-        midnight = _midnight(time)
+        midnight = midnight_of(time)
         for day in (midnight - DAY, midnight):
             if day.weekday() in self.days and day + self.begin <= time < day + self.end:
                 return day + self.end
@@ -38,7 +39,7 @@ class HoursSpan(NamedTuple):
 
     def next_begin(self, time: datetime) -> datetime:
         """Return when the hours begin next after a moment."""
-        midnight = _midnight(time)
+        midnight = midnight_of(time)
         days = (midnight + i * DAY for i in range(8))
         begins = (day + self.begin for day in days if day.weekday() in self.days)
         return next(begin for begin in begins if begin > time)
@@ -67,10 +68,6 @@ def parse_span(value: object) -> HoursSpan:
     names = "" if len(words) == 1 else f"{words[0]} "
     text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"
     return HoursSpan(tuple(days), begin, end if end > begin else end + DAY, text)
-
-
-def _midnight(time: datetime) -> datetime:
-    return datetime.combine(time.date(), datetime.min.time())
 
 
 def _parse_hours(value: object) -> tuple[HoursSpan, ...]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
-from fleet2d.clock import Clock
+from fleet2d.clock import Clock, midnight_of
 from fleet2d.component import Settings
 from fleet2d.events import Event
 from fleet2d.floorplan.home.change import format_moment, parse_moment
@@ -32,7 +32,7 @@ class ClockTime(NamedTuple):
 
     def moments(self, clock: Clock) -> Iterator[datetime]:
         """Yield all such moments of a run, in order."""
-        midnight = datetime.combine(clock.start.date(), datetime.min.time())
+        midnight = midnight_of(clock.start)
         end = clock.time(clock.steps)
         while midnight < end:
             moment = midnight + self.time

@@ -45,16 +45,6 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
         raise LogError(f"{path} can't be read: {error.strerror or error}") from error
 
 
-def check_days(first: date, last: date, path: Path) -> None:
-    """Refuse a log that is longer than the bound on days, as one of its dates must be wrong.
-
-    Raises:
-        LogError: It is longer.
-    """
-    days = (last - first).days + 1
-    LOG_DAYS.check(days, f"{path} runs from {first} to {last}: it", LogError)
-
-
 class LogError(InputError):
     """A log can't be read, or contradicts itself; the message says where and what to do."""
 

@@ -15,7 +15,7 @@ from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioErro
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.home.home import Home
 from fleet2d.published.entities import body_keys, convert_robot, convert_users, free_name
-from fleet2d.published.reader import Reader
+from fleet2d.published.reader import ConfigReader
 from fleet2d.published.sections import (
     convert_floorplan,
     convert_outputs,
@@ -44,7 +44,7 @@ def convert_file(old: Path, new: Path) -> list[str]:
     """
     old, new = Path(old), Path(new)
     _check_target(new)
-    reader = Reader(_read(old), str(old))
+    reader = ConfigReader(_read(old), str(old))
     reader.check_kind()
     data = _convert(reader, old, new)
     remarks = reader.finish()
@@ -60,7 +60,7 @@ def _read(old: Path) -> Document:
         raise ScenarioError(f"{error}{hint if ':python/' in str(error) else ''}") from None
 
 
-def _convert(reader: Reader, old: Path, new: Path) -> dict[str, Any]:
+def _convert(reader: ConfigReader, old: Path, new: Path) -> dict[str, Any]:
     """Return the scenario as plain data; starts in or near walls are moved to free points."""
     step = read_step(reader)
     floorplan, plan_file = convert_floorplan(reader, old, new)
@@ -97,7 +97,11 @@ def _validate(data: dict[str, Any], plan_file: Path | None, shown_as: str) -> Sc
 
 
 def _move_starts(
-    reader: Reader, data: dict[str, Any], scenario: Scenario, plan: Path, paths: Mapping[str, Keys]
+    reader: ConfigReader,
+    data: dict[str, Any],
+    scenario: Scenario,
+    plan: Path,
+    paths: Mapping[str, Keys],
 ) -> None:
     """Move every start at which its body doesn't fit to the nearest point at which it does."""
     home = Home(read_houseexpo(plan, data["floorplan"]["cell"]))

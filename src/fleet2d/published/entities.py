@@ -14,7 +14,7 @@ from typing import Any
 
 from fleet2d.document import Keys
 from fleet2d.problems import shown
-from fleet2d.published.reader import Reader, tidy
+from fleet2d.published.reader import ConfigReader, tidy
 from fleet2d.sight.camera import Camera
 from fleet2d.units import micros
 
@@ -27,7 +27,7 @@ _WIDEST_M = 2
 _SLOWEST_M_S = 0.01
 
 
-def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict[str, Keys]]:
+def convert_users(reader: ConfigReader, step: timedelta) -> tuple[dict[str, Any], dict[str, Keys]]:
     """Return the users by name, and the keys of each one's settings in the old file."""
     keys: Keys = ("users", "names")
     names = reader.get(keys, whole=True)
@@ -59,7 +59,7 @@ def convert_users(reader: Reader, step: timedelta) -> tuple[dict[str, Any], dict
     return users, paths
 
 
-def body_keys(reader: Reader, keys: Keys) -> Keys:
+def body_keys(reader: ConfigReader, keys: Keys) -> Keys:
     """Return the keys of an entity's settings: those of the section that its `type` names."""
     kind = reader.text((*keys, "type")) or "base"
     if reader.get((*keys, kind)) is None:
@@ -71,7 +71,7 @@ def body_keys(reader: Reader, keys: Keys) -> Keys:
     return (*keys, kind)
 
 
-def _body(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
+def _body(reader: ConfigReader, keys: Keys, step: timedelta) -> dict[str, Any]:
     """Return the keys that users and robots have in common."""
     result: dict[str, Any] = {}
     radius = reader.number((*keys, "radius"), least=0, most=_WIDEST_M)
@@ -101,7 +101,7 @@ def _body(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
     return result | _walk(reader, (*keys, "pose_config", "meander_strategy"), step)
 
 
-def _walk(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
+def _walk(reader: ConfigReader, keys: Keys, step: timedelta) -> dict[str, Any]:
     """Return the keys of the random walk."""
     if reader.get(keys) is None:
         reader.remark(keys, "missing; it stands still")
@@ -118,7 +118,7 @@ def _walk(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
     }
 
 
-def _speed(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
+def _speed(reader: ConfigReader, keys: Keys, step_s: Fraction) -> float | None:
     """Return the speed [m/s], in metres per step in the old file; None: it stands still."""
     stride = reader.number(keys, least=0)
     speed = float(Fraction(repr(stride)) / step_s) if stride else 0.0
@@ -140,7 +140,7 @@ def _speed(reader: Reader, keys: Keys, step_s: Fraction) -> float | None:
     return speed
 
 
-def _turns(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
+def _turns(reader: ConfigReader, keys: Keys, step_s: Fraction) -> dict[str, float]:
     """Return the keys of random turns, whose deviation is in degrees per step in the old file."""
     deviation = abs(reader.number(keys, least=-_WIDEST_TURN_DEG, most=_WIDEST_TURN_DEG) or 0.0)
     if not deviation:
@@ -157,12 +157,12 @@ def _turns(reader: Reader, keys: Keys, step_s: Fraction) -> dict[str, float]:
     return {"turn_std_deg": tidy(deviation / math.sqrt(step_s)), "turn_rate_deg": tidy(limit)}
 
 
-def convert_robot(reader: Reader, keys: Keys, step: timedelta) -> dict[str, Any]:
+def convert_robot(reader: ConfigReader, keys: Keys, step: timedelta) -> dict[str, Any]:
     """Return the robot whose settings are at `keys`."""
     return _body(reader, keys, step) | {"camera": _camera(reader, (*keys, "fov_config"))}
 
 
-def _camera(reader: Reader, keys: Keys) -> dict[str, Any]:
+def _camera(reader: ConfigReader, keys: Keys) -> dict[str, Any]:
     """Return the camera; missing keys have the defaults of cameras here."""
     for key in ("load_fov_file", "lazy_compute"):
         if reader.get((*keys, key)) is not None:
@@ -178,7 +178,7 @@ def _camera(reader: Reader, keys: Keys) -> dict[str, Any]:
     return camera
 
 
-def _range(reader: Reader, keys: Keys) -> list[float]:
+def _range(reader: ConfigReader, keys: Keys) -> list[float]:
     """Return the nearest and the farthest distance of the camera [m]."""
     distance = reader.number((*keys, "distance"), above=0)
     if distance is None:

@@ -17,7 +17,7 @@ _UNITS = {"weeks", "days", "hours", "minutes", "seconds", "milliseconds", "micro
 _BOOLEANS = {"yes": True, "on": True, "no": False, "off": False}  # of YAML 1.1, as it is read there
 
 
-class Reader:
+class ConfigReader:
     """A reader of an old configuration: checks values, collects remarks, and notes unread keys."""
 
     def __init__(self, document: Document, shown_as: str) -> None:

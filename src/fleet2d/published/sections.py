@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.document import Keys
 from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.problems import shown
-from fleet2d.published.reader import Reader, tidy
+from fleet2d.published.reader import ConfigReader, tidy
 from fleet2d.units import format_duration, parse_duration
 
 _NOTHING_STORED = {
@@ -22,7 +22,7 @@ _SIMULATION: Keys = ("simulation",)
 _PLAN: Keys = ("floorplan", "he")
 
 
-def read_step(reader: Reader) -> timedelta:
+def read_step(reader: ConfigReader) -> timedelta:
     """Return the length of a step."""
     keys = (*_SIMULATION, "delta")
     step = reader.duration(keys)
@@ -34,7 +34,7 @@ def read_step(reader: Reader) -> timedelta:
     return step
 
 
-def convert_simulation(reader: Reader, step: timedelta) -> dict[str, Any]:
+def convert_simulation(reader: ConfigReader, step: timedelta) -> dict[str, Any]:
     """Return the section `simulation`: start, duration, step, seed and speedup."""
     duration_keys = (*_SIMULATION, "duration")
     duration = reader.duration(duration_keys)
@@ -74,7 +74,7 @@ def convert_simulation(reader: Reader, step: timedelta) -> dict[str, Any]:
     }
 
 
-def _start(reader: Reader) -> datetime | None:
+def _start(reader: ConfigReader) -> datetime | None:
     keys = (*_SIMULATION, "start_ts")
     value = reader.get(keys)
     if value is None:
@@ -96,7 +96,7 @@ def _start(reader: Reader) -> datetime | None:
     return value.replace(tzinfo=None)
 
 
-def _windows(reader: Reader) -> None:
+def _windows(reader: ConfigReader) -> None:
     """Read the keys about watching a run, which have no place in a scenario."""
     picture: Keys = (*_SIMULATION, "visualization")
     every = reader.get((*picture, "every_n_steps"))
@@ -110,7 +110,7 @@ def _windows(reader: Reader) -> None:
         reader.remark((*_SIMULATION, "show_progress"), "left out: `fleet2d run --quiet` shows none")
 
 
-def convert_sight(reader: Reader) -> dict[str, Any]:
+def convert_sight(reader: ConfigReader) -> dict[str, Any]:
     """Return the section `sight`: the method with the name of the provider, if there is one."""
     keys: Keys = (*_SIMULATION, "fov_provider")
     provider = reader.text(keys)
@@ -122,7 +122,7 @@ def convert_sight(reader: Reader) -> dict[str, Any]:
     return {}
 
 
-def convert_outputs(reader: Reader, step: timedelta) -> dict[str, Any]:
+def convert_outputs(reader: ConfigReader, step: timedelta) -> dict[str, Any]:
     """Return the section `artifacts`: what is stored, and how often."""
     keys: Keys = (*_SIMULATION, "outputs")
     for key in ("output_dir", "prefix"):
@@ -153,7 +153,9 @@ def convert_outputs(reader: Reader, step: timedelta) -> dict[str, Any]:
     return {"trajectories": stored}
 
 
-def convert_floorplan(reader: Reader, old: Path, new: Path) -> tuple[dict[str, Any], Path | None]:
+def convert_floorplan(
+    reader: ConfigReader, old: Path, new: Path
+) -> tuple[dict[str, Any], Path | None]:
     """Return the section `floorplan`, and the plan's file if it exists."""
     kind = reader.get(("floorplan", "type"))
     if kind != "he":

@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 
 from pydantic_core import PydanticCustomError
 
-from fleet2d.clock import Clock
+from fleet2d.clock import Clock, midnight_of
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.units import parse_duration
@@ -81,7 +81,7 @@ def _elapsed_us(text: str, clock: Clock) -> int | None:
         parts = [int(part or 0) for part in day.groups()[1:]]
         if parts[0] > 24 or parts[1] > 59 or parts[2] > 59 or len(day[1]) > 6:
             return None
-        midnight = datetime.combine(clock.start.date(), datetime.min.time())
+        midnight = midnight_of(clock.start)
         since = timedelta(days=int(day[1]) - 1, hours=parts[0], minutes=parts[1], seconds=parts[2])
         return clock.elapsed(midnight) + since // timedelta(microseconds=1)
     try:

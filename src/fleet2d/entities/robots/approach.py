@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.behavior import Situation
+from fleet2d.entities.nearby import points_at_distance
 from fleet2d.errors import ScenarioError
-from fleet2d.kernels.headings import TURN, UNIT, cosine, heading_of, sine, turn_between
+from fleet2d.kernels.headings import TURN, heading_of, turn_between
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -78,16 +79,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     reach = math.ceil(distance * lattice.units_per_m)
     if _distance(person, position) >= reach:
         return position
-    room, spots = home.plan.room_at(x, y), []
-    for i in range(DIRECTIONS):
-        heading = i * TURN // DIRECTIONS
-        spot = (
-            person[0] + reach * cosine(heading) // UNIT,
-            person[1] + reach * sine(heading) // UNIT,
-        )
-        in_room = home.plan.room_at(*lattice.to_metres(spot).tolist()) == room
-        if in_room and _is_free(actor, np.array(spot)):
-            spots.append(spot)
+    spots = points_at_distance(actor, person, reach, DIRECTIONS)
     return min(spots, key=lambda spot: _distance(spot, position), default=position)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from fleet2d.clock import midnight_of
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Command, Situation
 from fleet2d.entities.plan import Plan
@@ -290,6 +291,6 @@ class Find(Behavior):
             return start + ((after - start) // self.every + 1) * self.every
         if not self.at:
             return None
-        midnight = datetime.combine(after.date(), datetime.min.time())
+        midnight = midnight_of(after)
         times = sorted(midnight + i * DAY + at for i in range(2) for at in self.at)
         return next(time for time in times if time > after)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
+from fleet2d.clock import midnight_of
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.furniture import stop_at
@@ -93,7 +94,7 @@ class Scheduled(Behavior):
 
     def _due(self, since: datetime) -> Iterator[tuple[datetime, int]]:
         """Yield time and number of the visits due within eight days after a moment, in order."""
-        midnight = datetime.combine(since.date(), datetime.min.time())
+        midnight = midnight_of(since)
         for ahead in range(9):
             day = midnight + ahead * DAY
             today = [

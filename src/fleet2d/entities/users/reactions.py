@@ -1,6 +1,5 @@
 """Reactions: how people react to robots."""
 
-from collections.abc import Iterator
 from datetime import timedelta
 from typing import TYPE_CHECKING, ClassVar
 
@@ -8,9 +7,9 @@ from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
+from fleet2d.entities.nearby import points_at_distance
 from fleet2d.entities.plan import Plan
-from fleet2d.kernels.headings import TURN, cosine, heading_of, sine, turn_between
-from fleet2d.kernels.headings import UNIT as SINE_UNIT
+from fleet2d.kernels.headings import TURN, heading_of, turn_between
 from fleet2d.routines.laws import Law
 from fleet2d.routines.manners import Manners
 from fleet2d.streams import Draws
@@ -104,7 +103,7 @@ class Reactions(Behavior):
         self._maybe_stop(now, draws)
         at_x, at_y = _robot(now, event)
         distance_m = max(MEET_M, self.used_manners.too_close + CLEAR_M)
-        points = [p for p in _around(now, at_x, at_y, distance_m) if plan.reaches(*p)]
+        points = [p for p in self._points_around(now, (at_x, at_y), distance_m) if plan.reaches(*p)]
         if points:
             plan.go_to_point(*min(points, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
         self._look_at(now, plan, event, self.laws["comes_for"], draws)
@@ -125,7 +124,7 @@ class Reactions(Behavior):
         # Across the robot's way; along it, the robot would come closer again.
         across = [
             (x, y)
-            for x, y in _around(now, plan.x, plan.y, STEP_M)
+            for x, y in self._points_around(now, (plan.x, plan.y), STEP_M)
             if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
             <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
         ]
@@ -140,6 +139,13 @@ class Reactions(Behavior):
         plan.turn_by(turn_between(plan.heading, heading_of(x - plan.x, y - plan.y)) / TURN)
         plan.stay(timedelta(seconds=law.draw(draws)))
 
+    def _points_around(
+        self, now: Situation, center: tuple[int, int], distance_m: float
+    ) -> list[tuple[int, int]]:
+        """Return free points at a distance [m] from a point, in the same room."""
+        distance = round(distance_m * now.home.plan.lattice.units_per_m)
+        return list(points_at_distance(now.actor, center, distance, DIRECTIONS))
+
     def _maybe_stop(self, now: Situation, draws: Draws) -> None:
         if draws.uniform() < self.used_manners.stops:
             for behavior in now.actor.behaviors:
@@ -149,20 +155,6 @@ class Reactions(Behavior):
 def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
     x, y = now.home.plan.lattice.point_at((event.x, event.y))
     return x, y
-
-
-def _around(now: Situation, x: int, y: int, distance_m: float) -> Iterator[tuple[int, int]]:
-    """Yield the points at a distance from a point where the body can stand, in the same room."""
-    actor, lattice = now.actor, now.home.plan.lattice
-    room = now.home.plan.room_at(*lattice.to_metres([x, y]).tolist())
-    distance = round(distance_m * lattice.units_per_m)
-    for i in range(DIRECTIONS):
-        heading = i * TURN // DIRECTIONS
-        at_x = x + distance * cosine(heading) // SINE_UNIT
-        at_y = y + distance * sine(heading) // SINE_UNIT
-        same_room = now.home.plan.room_at(*lattice.to_metres([at_x, at_y]).tolist()) == room
-        if same_room and actor.space.part_at(at_x, at_y) == actor.part:
-            yield at_x, at_y
 
 
 def _squared(dx: int, dy: int) -> int:

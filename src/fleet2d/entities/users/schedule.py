@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
+from fleet2d.clock import midnight_of
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.furniture import seat_at
@@ -121,7 +122,7 @@ class Schedule(Behavior):
             seat = seat_at(now.actor, entry.place) if entry.place else None
             if now.step or now.actor.entity.start or seat is not None:
                 _add(plan, entry)
-        self.until = datetime.combine(now.time.date(), datetime.min.time()) + DAY
+        self.until = midnight_of(now.time) + DAY
         for begins, entry in self._between(since, self.until):
             _add(plan.stay(until=begins), entry)
         self.plan = plan.stay(until=self.until)
@@ -142,7 +143,7 @@ class Schedule(Behavior):
 
     def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, AgendaEntry]]:
         """Yield the entries that begin from `since` on and before the midnight `until`."""
-        midnight = datetime.combine(since.date(), datetime.min.time())
+        midnight = midnight_of(since)
         while midnight < until:
             for entry in self.week[midnight.weekday()]:
                 if midnight + entry.begins >= since:
@@ -159,7 +160,7 @@ class Schedule(Behavior):
     @staticmethod
     def _current(week: list[list[AgendaEntry]], time: datetime) -> AgendaEntry | None:
         """Return the last entry that began before `time`, up to a week ago."""
-        midnight = datetime.combine(time.date(), datetime.min.time())
+        midnight = midnight_of(time)
         for back in range(8):
             day = midnight - back * DAY
             earlier = [entry for entry in week[day.weekday()] if day + entry.begins < time]
