@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import fleet2d_process
+from tests.scenes import Cli, fleet2d_process
 
 from fleet2d.engine import arrays
 from fleet2d.engine.snapshot import read_state
@@ -56,15 +56,16 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("command", "run"), [("reproduce", "run"), ("resume", "half")])
-def test_code_runs_only_when_it_is_named(home: Path, command: str, run: str) -> None:
-    refused = fleet2d_process(command, run, cwd=home)
-    assert 2 == refused.returncode
-    assert f"{home}/mine.py (algorithms.count.type)" in refused.stderr
-    assert f"--trust {home}/mine.py" in refused.stderr
-    other = fleet2d_process(command, run, "--trust", str(Path(__file__)), cwd=home)
-    assert 2 == other.returncode
-    wrong = fleet2d_process(command, run, "--trust", str(home), cwd=home)
-    assert "name it by --trust-dir" in wrong.stderr
+def test_code_runs_only_when_it_is_named(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path, command: str, run: str
+) -> None:
+    monkeypatch.chdir(home)
+    code, _, err = fleet2d(command, run)
+    assert 2 == code
+    assert f"{home}/mine.py (algorithms.count.type)" in err
+    assert f"--trust {home}/mine.py" in err
+    assert 2 == fleet2d(command, run, "--trust", __file__)[0]
+    assert "name it by --trust-dir" in fleet2d(command, run, "--trust", home)[2]
     assert not (home / "ran").exists()
     named = fleet2d_process(
         command,
@@ -76,17 +77,18 @@ def test_code_runs_only_when_it_is_named(home: Path, command: str, run: str) -> 
     (home / "ran").unlink()
 
 
-def test_verify_runs_nothing(home: Path) -> None:
-    done = fleet2d_process("verify", "run", cwd=home)
-    assert 0 == done.returncode, done.stderr
-    assert done.stdout.startswith("verified: seal ")
+def test_verify_runs_nothing(fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
+    monkeypatch.chdir(home)
+    code, out, err = fleet2d("verify", "run")
+    assert 0 == code, err
+    assert out.startswith("verified: seal ")
     assert not (home / "ran").exists()
     path = home / "run" / "events.parquet"
     content = path.read_bytes()
     path.write_bytes(content[:-1] + b"?")
-    changed = fleet2d_process("verify", "run", cwd=home)
+    code, _, err = fleet2d("verify", "run")
     path.write_bytes(content)
-    assert (1, "events.parquet was changed\n") == (changed.returncode, changed.stderr)
+    assert (1, "events.parquet was changed\n") == (code, err)
 
 
 class Call:

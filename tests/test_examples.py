@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 import yaml
-from tests.scenes import fleet2d_process, process
+from tests.scenes import Cli, process
+from tests.thorough import THOROUGH
 
-import fleet2d
+from fleet2d.runs.run import open_run
 from fleet2d.studies.driver import check_study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -37,7 +38,9 @@ def test_there_are_examples_of_an_own_behavior_and_an_own_algorithm() -> None:
 @pytest.mark.parametrize("path", RUNNABLE, ids=lambda path: path.name)
 def test_a_script_runs(examples: Path, path: Path) -> None:
     script = examples / path.relative_to(EXAMPLES)
-    fewer = ["2"] if "sys.argv" in script.read_text() else []  # days, seeds or homes
+    fewer = ["1" if path.stem == "compare_find" else "2"]  # days, seeds or homes
+    if "sys.argv" not in script.read_text():
+        fewer = []
     done = process(str(script), *fewer, cwd=examples.parent, timeout=300)
     assert 0 == done.returncode, done.stderr
     assert "" == done.stderr
@@ -45,15 +48,13 @@ def test_a_script_runs(examples: Path, path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: str(path.relative_to(EXAMPLES)))
-def test_a_scenario_runs_from_anywhere(examples: Path, path: Path) -> None:
-    target = examples.parent / "run"
+def test_a_scenario_runs_from_anywhere(fleet2d: Cli, examples: Path, path: Path) -> None:
     content = yaml.safe_load(path.read_text())
-    done = fleet2d_process(
-        "run", str(examples / path.relative_to(EXAMPLES)), "--out", str(target), "--quiet",
-        cwd=examples.parent, timeout=300,
-    )  # fmt: skip
-    assert (0, "", "") == (done.returncode, done.stdout, done.stderr)
-    stored = fleet2d.open_run(target)
+    week = content["simulation"].get("duration") == {"days": 7}
+    fewer = ["simulation.duration=2 d"] if week and not THOROUGH else []
+    file = examples / path.relative_to(EXAMPLES)
+    assert (0, "", "") == fleet2d("run", file, *fewer, "--out", "run", "--quiet")
+    stored = open_run("run")
     assert "complete" == stored.status
     assert all(rows.num_rows for name, rows in stored.tables.items() if name not in MAY_BE_EMPTY)
     for name in (name for name, algorithm in content.get("algorithms", {}).items() if algorithm):

@@ -153,7 +153,7 @@ ALGORITHMS = {
     "sum": ["presence of 'ana' is no distribution", "sum to 1.1"],
     "algorithm": ["'lpt'", "did you mean 'ltp'?", "There are: ltp, rtp, mine"],
     "silent": ["'rtp'", "has put out nothing so far"],
-    "user": ["'an'", "tells of: ana, anyone"],
+    "user": ["'an'", "There are: ana, anyone"],
     "body": ["'astor'", "no such body", "astro"],
     "truth": ["'ana'", "only metrics know"],
     "layer": ["no layer 'dust'"],
@@ -234,7 +234,7 @@ class Greedy(Algorithm):
 
 
 def test_exposure_between_other_steps_than_updates_is_refused_not_wrong() -> None:
-    with pytest.raises(ComponentError, match="from update to update, and step 1234 is none"):
+    with pytest.raises(ComponentError, match="from update to update, and none is at step 1234"):
         run(content(algorithms={"mine": {"type": f"{MINE}Greedy"}}))
 
 

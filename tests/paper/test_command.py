@@ -17,7 +17,10 @@ TINY = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")
 
 @pytest.fixture
 def reproduce(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    serial: None,
 ) -> Callable[..., Result]:
     """The command in this process, in an empty folder: (exit code, stdout, stderr)."""
     monkeypatch.chdir(tmp_path)

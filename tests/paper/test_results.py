@@ -24,7 +24,7 @@ TWO = PaperOptions(quick=True, seeds=2, days=2)
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Result]:
+def results(serial: None) -> dict[str, Result]:
     """The results that are months, of two days."""
     sizes = {"ltp-gap": TWO, "rtp-gap": TINY, "feedback": TINY}
     return {name: reproduce(name, size, ignore_progress) for name, size in sizes.items()}
@@ -44,7 +44,7 @@ def test_a_result_is_kept_and_drawn(results: dict[str, Result], name: str, tmp_p
         assert all(len(table.columns) == len(row) for row in table.rows)
 
 
-def test_a_result_is_the_same_again(results: dict[str, Result]) -> None:
+def test_a_result_is_the_same_again(results: dict[str, Result], serial: None) -> None:
     assert numbers_of(results["ltp-gap"]) == numbers_of(reproduce("ltp-gap", TWO, ignore_progress))
 
 

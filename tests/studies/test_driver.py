@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, base, digests, run, small
+from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
 from fleet2d.studies import catalogue, driver, identity, jobs
@@ -283,7 +284,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
     assert {jobs.CHANGED} == set(study.failures["error"])
 
 
-@pytest.mark.parametrize("workers", [1, 2, 4])
+@pytest.mark.parametrize("workers", some([2, 1, 4], 3))
 def test_results_are_the_same_with_any_number_of_workers(
     whole: Path, tmp_path: Path, workers: int
 ) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 from tests.studies.scenes import SPEED, base, digests, run, small
-from tests.thorough import THOROUGH
+from tests.thorough import THOROUGH, some
 
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import Observer
@@ -20,7 +20,7 @@ from fleet2d.studies.reader import open_study
 from fleet2d.studies.record import VariantRecord
 from fleet2d.studies.results import count
 
-KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "15"))
+KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "8"))
 ROOT = Path(__file__).parents[2]
 MOST = 3  # variants until a study is killed: something is left for all kills
 SEEDS = KILLS * MOST // 4 + 1
@@ -114,7 +114,7 @@ def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]") -> None:
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
-@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("sign", some([signal.SIGINT, signal.SIGTERM, signal.SIGKILL], 2))
 def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
     tmp_path: Path, sign: signal.Signals
 ) -> None:
@@ -142,7 +142,7 @@ def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
 def test_a_worker_that_dies_loses_only_what_it_ran_and_that_is_run_again(tmp_path: Path) -> None:
     process = start(tmp_path, "--workers", "2")
-    for _ in range(3):
+    for _ in range(3 if THOROUGH else 1):
         wait_for_results(tmp_path, process)
         os.kill(workers_of(process)[0], signal.SIGKILL)
         time.sleep(0.5)

@@ -155,7 +155,7 @@ def test_several_objectives_end_in_several_settings(tmp_path: Path) -> None:
 
 
 def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
-    assert 3 == tuned(tmp_path, LocalExecutor(2), trials=3).trials["complete"]
+    assert 3 == tuned(tmp_path, LocalExecutor(1), trials=3).trials["complete"]
 
 
 @pytest.mark.parametrize(

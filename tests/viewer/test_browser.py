@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.thorough import THOROUGH
 
 import fleet2d
 from fleet2d.viewer.export import embedded_run, export_html, html_of
@@ -329,8 +330,15 @@ def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> N
     page.close()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("panel", ["now", "inspect", "beliefs", "events", "metrics", "layers"])
+@pytest.mark.parametrize(
+    ("panel", "scheme"),
+    [
+        (panel, scheme)
+        for panel in ("now", "inspect", "beliefs", "events", "metrics", "layers")
+        for scheme in ("light", "dark")
+        if THOROUGH or scheme == "light" or panel == "now"
+    ],
+)
 def test_axe_finds_nothing_serious(browser: Any, address: str, scheme: str, panel: str) -> None:
     if not AXE.exists():
         pytest.skip("axe-core is not installed: npm ci in page/")
