@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.change import HomeChanges
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 WITHHELD = "withheld"
 """Stands for an output that nobody may read."""
@@ -97,10 +97,7 @@ class Outputs(Mapping[str, Any]):
                 f"{name!r} has put out nothing so far: ask by outputs.get({name!r}), which is None"
                 " until then"
             )
-        raise ComponentError(
-            f"there is no algorithm {name!r}{did_you_mean(name, self._known)}"
-            f" There are: {', '.join(self._known) or 'none'}"
-        )
+        raise ComponentError(f"there is no algorithm {name!r}{suggest(name, self._known)}")
 
     def get(self, name: str, default: Any = None) -> Any:
         """Return an output, or `default` if there is none so far."""

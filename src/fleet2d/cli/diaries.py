@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from fleet2d.errors import InputError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 
 def show_diary(what: str | None, out: Path | None, days: int, seed: int) -> list[str]:
@@ -30,8 +30,8 @@ def show_diary(what: str | None, out: Path | None, days: int, seed: int) -> list
     path = Path(what)
     if what not in bundled_names() and not path.is_file():
         raise InputError(
-            f"there is no persona {what!r}{did_you_mean(what, bundled_names())} There are:"
-            f" {', '.join(bundled_names())}; your own is the path of a YAML file"
+            f"there is no persona {what!r}{suggest(what, bundled_names())}; your own is the path of"
+            " a YAML file"
         )
     try:
         persona = TypeAdapter(AnyPersona).validate_python(what)

@@ -6,7 +6,7 @@ from datetime import timedelta
 
 from fleet2d.errors import ScenarioError
 from fleet2d.events import KINDS, SIGHTS, EventKind
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.units import format_duration
 
 # Kinds of events that only one type of behavior records.
@@ -78,10 +78,7 @@ class Scene:
         """
         names = list(dict.fromkeys(known))
         if name not in names:
-            raise self.error(
-                f"{of}: there is no {what} {name!r}{did_you_mean(name, names)}"
-                f" There are: {', '.join(names) or 'none'}"
-            )
+            raise self.error(f"{of}: there is no {what} {name!r}{suggest(name, names)}")
 
     def check_body(self, name: str, of: object) -> None:
         """Refuse a name that is neither a user's nor a robot's.

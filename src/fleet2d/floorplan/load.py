@@ -15,7 +15,7 @@ from fleet2d.floorplan.formats.native import native_plan, read_native
 from fleet2d.floorplan.formats.native_file import FORMAT
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML, FloorPlanSource, read_document, read_yaml
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 USUAL_CELL_M = 0.05
 IMAGES = (".pgm", ".png")
@@ -59,7 +59,7 @@ def load_floorplan(
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
             f"there is no floor plan file {str(plan)!r}, and no bundled home of that name"
-            f"{did_you_mean(plan, names)} Bundled homes: {', '.join(names)}; synthetic ones:"
+            f"{suggest(plan, names, 'Bundled homes')}; synthetic ones:"
             " synthetic:0, synthetic:1, …"
         )
     return _load_document(path, cell)

@@ -6,7 +6,7 @@ from itertools import count
 from typing import Protocol, TypeVar
 
 from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 
 class Named(Protocol):
@@ -35,10 +35,7 @@ def find_named(
     names = [thing.name for thing in things]
     if name in names:
         return things[names.index(str(name))]
-    raise error(
-        f"{owner} has no {noun} {name!r}{did_you_mean(name, names)}"
-        f" Its {noun}s are: {', '.join(names) or 'none'}"
-    )
+    raise error(f"{owner} has no {noun} {name!r}{suggest(name, names, f'Its {noun}s are')}")
 
 
 def number_names(names: Sequence[str | None], types: Sequence[str], what: str) -> list[str]:

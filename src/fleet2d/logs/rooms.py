@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.logs.log import AWAY, LogError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 RoomChoice = tuple[str, ...]
 
@@ -84,14 +84,13 @@ def _check_overrides(
     for label, choice in overrides.items():
         if label not in labels:
             raise LogError(
-                f"rooms: the log has no room {label!r}{did_you_mean(label, labels)}"
-                f" It has: {', '.join(sorted(labels))}"
+                f"rooms: the log has no room {label!r}{suggest(label, sorted(labels), 'It has')}"
             )
         if choice is not None and _first_fit(choice, rooms) is None:
             names = _names(rooms)
             raise LogError(
                 f"rooms: {label!r} is to be {' or '.join(choice)}, but there is no such room"
-                f"{did_you_mean(choice[0], names)} There are: {', '.join(names)}, away, door"
+                f"{suggest(choice[0], names)}, away, door"
             )
 
 

@@ -6,7 +6,7 @@ from fleet2d.errors import InputError
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
 from fleet2d.paper.months import OnProgress, PaperOptions
 from fleet2d.paper.result import Result
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 RESULTS: dict[str, Callable[[PaperOptions, OnProgress], Result]] = {
     speed.NAME: speed.reproduce,
@@ -28,10 +28,7 @@ def check_names(names: Sequence[str]) -> list[str]:
     """
     for name in names:
         if name not in RESULTS:
-            raise InputError(
-                f"there is no result {name!r}{did_you_mean(name, RESULTS)} There are:"
-                f" {', '.join(RESULTS)}"
-            )
+            raise InputError(f"there is no result {name!r}{suggest(name, RESULTS)}")
     return [name for name in RESULTS if name in names or not names]
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
 from fleet2d.document import read_document
-from fleet2d.problems import did_you_mean, problem
+from fleet2d.problems import problem, suggest
 from fleet2d.routines import laws
 from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.units import Duration, PositiveDuration, format_duration
@@ -164,6 +164,6 @@ def find_activity(name: str, own: dict[str, Activity]) -> Activity:
         return catalogue()[name]
     known = sorted({*own, *catalogue()})
     raise problem(
-        f"there is no activity {name!r}{did_you_mean(name, known)} There are: {', '.join(known)};"
+        f"there is no activity {name!r}{suggest(name, known)};"
         " a new one is described under 'activities'"
     )

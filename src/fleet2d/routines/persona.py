@@ -18,7 +18,7 @@ from fleet2d.component import Settings
 from fleet2d.document import read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
-from fleet2d.problems import did_you_mean, problem, problem_at, shown
+from fleet2d.problems import did_you_mean, problem, problem_at, shown, suggest
 from fleet2d.routines.activity import Activity, AnyDurationLaw, catalogue, find_activity
 from fleet2d.routines.interruptions import InterruptionRules, interruption_rules
 from fleet2d.routines.manners import Manners
@@ -342,8 +342,8 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
         path = folder_of(value) / Path(value).expanduser()
     if not path.is_file():
         raise problem(
-            f"there is no persona {str(value)!r}{did_you_mean(value, bundled_names())} There are:"
-            f" {', '.join(bundled_names())}; your own is the path of a YAML file"
+            f"there is no persona {str(value)!r}{suggest(value, bundled_names())}; your own is the"
+            " path of a YAML file"
         )
     if str(path.resolve()) in chain:
         raise problem(f"the persona {path.name} extends itself")

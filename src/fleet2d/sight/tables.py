@@ -40,7 +40,7 @@ from fleet2d.kernels.perception import (
     UserDraw,
 )
 from fleet2d.kernels.random import BELL_STD
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.sight.camera import Lens
 from fleet2d.sight.curve import chance, cumulative, decay
 from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
@@ -219,7 +219,7 @@ def _check_users(names: Mapping[str, object], key: str, context: TableContext) -
         if name not in context.users:
             raise ScenarioError(
                 f"{context.path}: perception: {key} names {name!r}, who is no user"
-                f"{did_you_mean(name, context.users)} There are: {', '.join(context.users)}"
+                f"{suggest(name, context.users)}"
             )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet2d.errors import InputError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.studies.intervals import MeanEstimate, estimate
 from fleet2d.studies.parts import VARIANT
 
@@ -26,10 +26,7 @@ def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
     """
     for axis in axes:
         if axis not in columns:
-            raise InputError(
-                f"the study has no axis {axis!r}{did_you_mean(axis, columns)} It has:"
-                f" {', '.join(columns)}"
-            )
+            raise InputError(f"the study has no axis {axis!r}{suggest(axis, columns, 'It has')}")
 
 
 def paired(
@@ -60,8 +57,7 @@ def paired(
     values = frame.get_column(axis).unique(maintain_order=True).drop_nulls().to_list()
     if reference not in values:
         raise InputError(
-            f"no variant with {metric} has {axis} = {reference!r}{did_you_mean(reference, values)}"
-            f" There are: {', '.join(map(str, values))}"
+            f"no variant with {metric} has {axis} = {reference!r}{suggest(reference, values)}"
         )
     references = frame.filter(pl.col(axis) == reference)
     rows = []

@@ -9,7 +9,7 @@ from typing import Any
 
 from fleet2d.document import Document
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.choice import Choice, Label, key_path
@@ -262,8 +262,7 @@ def _check_conditions(specification: Specification, design: Design) -> None:
                     place = specification.places.place((*location, column))
                     raise ScenarioError(
                         f"{place}{': ' * bool(place)}{'.'.join(map(str, location))}.{column}: no"
-                        f" variant has {value!r}{did_you_mean(value, labels)} There are:"
-                        f" {', '.join(map(str, labels))}"
+                        f" variant has {value!r}{suggest(value, labels)}"
                     )
 
 

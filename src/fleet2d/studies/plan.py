@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.choice import Label
 from fleet2d.studies.design import SWITCHES, Design
@@ -192,8 +192,7 @@ def _check_tables(tables: Sequence[str], known: set[str]) -> None:
     for name in tables:
         if name not in names and not name.startswith(layers):
             raise ScenarioError(
-                f"keep.tables: no variant has a table {name!r}{did_you_mean(name, names)} There"
-                f" are: {', '.join(names)}"
+                f"keep.tables: no variant has a table {name!r}{suggest(name, names)}"
             )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fleet2d.errors import ArtifactError, InputError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import did_you_mean, suggest
 from fleet2d.studies import answers
 from fleet2d.studies.catalogue import stored_scenario
 from fleet2d.studies.directory import StudyDirectory
@@ -113,8 +113,8 @@ class Study:
 
         if table not in self.tables:
             raise ArtifactError(
-                f"the study has no table {table!r}{did_you_mean(table, self.tables)} It has:"
-                f" {', '.join(self.tables) or 'none'}; keep.tables in the study file names them"
+                f"the study has no table {table!r}{suggest(table, self.tables, 'It has')};"
+                " keep.tables in the study file names them"
             )
         storage = self._directory.storage
         files = [

@@ -12,7 +12,7 @@ from fleet2d.component import Settings
 from fleet2d.document import Document, read_document
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
-from fleet2d.problems import did_you_mean, problem, problem_at
+from fleet2d.problems import problem, problem_at, suggest
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.explain import explain
 from fleet2d.scenario.model import Scenario
@@ -169,8 +169,7 @@ def _check_columns(
         if column not in known:
             raise problem_at(
                 (*location, column) if isinstance(columns, Mapping) else location,
-                f"there is no axis {column!r}{did_you_mean(column, known)} The {noun}:"
-                f" {', '.join(known) or 'none'}",
+                f"there is no axis {column!r}{suggest(column, known, f'The {noun}')}",
             )
 
 

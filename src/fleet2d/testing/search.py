@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.document import Document
 from fleet2d.errors import InputError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 from fleet2d.studies.engine import describe_error
 from fleet2d.studies.execution import Executor, Lost
 from fleet2d.studies.record import WorkerTask
@@ -282,8 +282,7 @@ def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
     tests = [n for n, value in vars(module).items() if hasattr(value, ATTRIBUTE)]
     if name not in tests:
         raise InputError(
-            f"{path} has no test {name!r} with a trial{did_you_mean(name, tests)} It has:"
-            f" {', '.join(tests) or 'none'}"
+            f"{path} has no test {name!r} with a trial{suggest(name, tests, 'It has')}"
         )
     function = getattr(module, name)
     others = [name for name in signature(function).parameters if name != "trial"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import ComponentError
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 F64 = NDArray[np.float64]
 
@@ -119,10 +119,7 @@ class Presence:
         """
         row = self._rows.get(user)
         if row is None:
-            raise ComponentError(
-                f"there is no presence of {user!r}{did_you_mean(user, self.names)} There are:"
-                f" {', '.join(self.names)}"
-            )
+            raise ComponentError(f"there is no presence of {user!r}{suggest(user, self.names)}")
         return row
 
     def share(self, user: str = ANYONE) -> F64:

@@ -11,7 +11,7 @@ from fleet2d.entities.users.inhabitant import SECOND_US, Inhabitant, rooms_at
 from fleet2d.entities.users.private_rooms import private_rooms
 from fleet2d.entities.users.spots import Spots
 from fleet2d.errors import PlacementError
-from fleet2d.problems import did_you_mean, problem
+from fleet2d.problems import problem, suggest
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import WELCOME, AnyHousehold, Lives
 from fleet2d.routines.life import Life
@@ -77,7 +77,7 @@ class Routine(Inhabitant):
             if actor.name not in members:
                 raise PlacementError(
                     f"{actor.path}: it is no member of its household"
-                    f"{did_you_mean(actor.name, members)} Its members are: {', '.join(members)}"
+                    f"{suggest(actor.name, members, 'Its members are')}"
                 )
             first = actor.clock.start.toordinal() - 1
             rooms = private_rooms(self.household, actor.home)

@@ -9,7 +9,7 @@ from shapely import Polygon
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.objects import Blocks, PlacedObject, Point, Posture, UsePlace
 from fleet2d.kernels.headings import QUARTER, TURN, UNIT, cosine, in_radians, sine
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 Range = tuple[float, float]
 
@@ -134,8 +134,7 @@ def furniture_type(name: str) -> Furniture:
     """
     if name not in FURNITURE:
         raise FloorPlanError(
-            f"there is no furniture of type {name!r}{did_you_mean(name, FURNITURE)}"
-            f" Known types: {', '.join(sorted(FURNITURE))}"
+            f"there is no furniture of type {name!r}{suggest(name, sorted(FURNITURE))}"
         )
     return FURNITURE[name]
 

@@ -15,7 +15,7 @@ from fleet2d.floorplan.home.standing import BODY_RADIUS, standing_cells, with_ap
 from fleet2d.floorplan.objects import Blocks, PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.headings import TURN
-from fleet2d.problems import did_you_mean, problem_at
+from fleet2d.problems import problem_at, suggest
 from fleet2d.units import AngleDeg, Length, PositiveLength
 
 # How far a piece may reach into a wall [m]: tape measures and traced walls differ by as much.
@@ -56,8 +56,8 @@ class FurniturePiece(Settings):
         if self.type not in FURNITURE:
             raise problem_at(
                 ("type",),
-                f"there is no furniture of type {self.type!r}{did_you_mean(self.type, FURNITURE)}"
-                f" Known: {', '.join(sorted(FURNITURE))}",
+                f"there is no furniture of type {self.type!r}"
+                f"{suggest(self.type, sorted(FURNITURE))}",
                 self.type,
             )
         return self
