@@ -1,5 +1,6 @@
 """Bodies in each other's way: they wait, go round, squeeze past; the same for every span."""
 
+import copy
 from itertools import combinations
 from typing import Any
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span
 from tests.scenes import digests, everything, path, run, scenario
+
+import fleet2d
 
 BLOCK = {"people_block": "3 s"}
 WALK = {"type": "tests.own_components:Scripted", "speed": 1.0}
@@ -171,3 +174,24 @@ def test_a_family_lives_its_day() -> None:
         ]
         same = len(set(activities[0]) & set(activities[1])) / len(set(activities[1]))
         assert same > 0.8
+
+
+@pytest.mark.parametrize("step", ["250 ms", "2 s"])
+def test_steps_of_any_length_and_copies_give_the_same(step: str) -> None:
+    users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo")}
+    robots = {
+        "astro": {
+            "type": "patrol",
+            "dwell": "5 s",
+            "gives_way": {},
+            "camera": {"lost_after": "6 s"},
+        }
+    }
+    content = home("5 min", {**BLOCK, "step": step}, users=users, robots=robots)
+    content["sight"] = {"people_occlude": True}
+    stored = assert_same_for_every_max_span(content, 61)
+    simulation = fleet2d.Simulation(content)
+    simulation.advance(83)
+
+    assert digests(stored) == digests(copy.deepcopy(simulation).run()) == digests(simulation.run())
+    assert gives_way(stored)

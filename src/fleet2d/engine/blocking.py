@@ -109,6 +109,8 @@ class Blocking:
     def in_way(self, bodies: Bodies, row: int) -> int | None:
         """Return the row of the body into which one would walk next; None if its way is free."""
         step = bodies.step
+        if bodies.pose_at(row, step)[:2] == bodies.pose_at(row, step + 1)[:2]:
+            return None  # mostly it rests
         (x, y, _, away), (next_x, next_y, _, next_away) = bodies.poses(step), bodies.poses(step + 1)
         poses = PoseColumns(
             np.stack([x, next_x], axis=1),

@@ -106,8 +106,8 @@ def _go_on(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64) ->
     def moved(time_us: int) -> int:
         return time_us + later if time_us <= edge else max(time_us, edge + later)
 
-    shifted = rest.copy()
-    shifted[:, 0] = [moved(time_us) for time_us in rest[:, 0].tolist()]
+    times, shifted = rest[:, 0], rest.copy()
+    shifted[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     plan.notes += [
         Note(moved(max(note.time_us, since_us)), note.event, note.detail)
         for note in broken.notes
