@@ -67,34 +67,16 @@ def load_floorplan(
 
 def _load_document(path: Path, cell: float | None) -> FloorPlan:
     """Read a file whose content determines its format."""
-    usual = USUAL_CELL_M if cell is None else cell
     content = read_document(path)
     kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
+    if kind is None:
+        raise _unknown_format(path)
     if kind == "native":
-        return native_plan(content, path, usual)
-    if kind is not None:
-        return _load_foreign(kind, path, cell)
-    raise _unknown_format(path)
-
-
-def _load_foreign(kind: str, path: Path, cell: float | None) -> FloorPlan:
-    """Read a file in a foreign format."""
-    usual = USUAL_CELL_M if cell is None else cell
-    if kind == "houseexpo":
-        from fleet2d.floorplan.formats.houseexpo import read_houseexpo
-
-        return read_houseexpo(path, usual)
-    if kind == "geojson":
-        from fleet2d.floorplan.formats.geojson import read_geojson
-
-        return read_geojson(path, usual)
-    if kind == "valetudo":
-        from fleet2d.floorplan.formats.valetudo import read_valetudo
-
-        return read_valetudo(path, cell)
-    from fleet2d.floorplan.formats.ros import read_ros
-
-    return read_ros(path, cell)
+        return native_plan(content, path, USUAL_CELL_M if cell is None else cell)
+    settings: dict[str, Any] = {"path": path} if cell is None else {"path": path, "cell": cell}
+    source = lookup("floorplan", kind).model_construct(**settings)
+    assert isinstance(source, FloorPlanSource)
+    return source.load()
 
 
 def is_floorplan(plan: str | Path) -> bool:

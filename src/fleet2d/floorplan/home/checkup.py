@@ -374,7 +374,7 @@ def _uses(plan: FloorPlan) -> Iterator[Finding]:
             window, beside = grown_cells(plan.lattice, thing.footprint, reach)
             reached = bool((standing[window] & beside).any())
         if not reached:
-            text = f"nobody can get to {thing.name}: there is no room to stand from where to use it"
+            text = f"nobody can get to {thing.name}: there is no free place to use it from"
             yield Finding("object", "wrong", text, _centre(thing), thing.footprint)
 
 
