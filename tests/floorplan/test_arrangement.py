@@ -23,7 +23,7 @@ def thing(name: str, kind: str = "chair") -> PlacedObject:
     return PlacedObject(name, kind, shapely.box(0, 0, 0.5, 0.5))
 
 
-def test_objects_without_a_name_are_numbered_by_type_past_given_names() -> None:
+def test_objects_without_a_name_are_numbered_by_type_and_skip_own_names() -> None:
     things = number_objects([thing(""), thing("chair_1"), thing(""), thing("", "bed")])
     assert ["chair_0", "chair_1", "chair_2", "bed_0"] == [o.name for o in things]
 
@@ -53,7 +53,7 @@ def test_object_moved_back_is_where_it_was() -> None:
     assert SOFA.footprint.equals(back.footprint)
 
 
-def test_description_tells_objects_apart() -> None:
+def test_descriptions_of_different_objects_differ() -> None:
     (use,) = SOFA.uses
     others = [
         move_object(SOFA, LATTICE, (5, 5)),

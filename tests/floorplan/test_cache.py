@@ -78,7 +78,7 @@ def test_changed_file_is_read_anew(tmp_path: Path) -> None:
     assert (first.name, changed.name) == ("family_home", "another")
 
 
-def test_what_is_shared_is_read_only() -> None:
+def test_shared_arrays_are_read_only() -> None:
     simulation = fleet2d.Simulation(None, SHORT, seed=4)
     plan, space = simulation.home.plan, simulation.home.space(0.15)
     hangout: Any = next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))

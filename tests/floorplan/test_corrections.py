@@ -102,7 +102,7 @@ def test_correction_that_fits_nowhere_is_an_error(
         ({"at": [1, 1], "nmae": "den"}, "did you mean 'name'"),
     ],
 )
-def test_correction_that_says_too_little_is_refused(content: object, message: str) -> None:
+def test_incomplete_correction_is_refused(content: object, message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         RoomCorrection.model_validate(content)
 

@@ -123,7 +123,7 @@ def test_plan_without_area_is_refused(free: shapely.Polygon) -> None:
 
 def test_rounding_that_would_change_the_area_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Known failure 7: an area that doesn't survive rounding is an error, not a surprise."""
-    # No outline is known that snaps so badly, so the snapping is made to.
+    # No known outline snaps so badly, so snapping is replaced.
     import fleet2d.floorplan.geometry.free_space as module
     from fleet2d.floorplan.geometry.mesh import Snapped
 

@@ -75,7 +75,7 @@ def test_lettering_becomes_free_below_the_speck_area(tmp_path: Path) -> None:
     assert read(tmp_path).area_m2 == pytest.approx(read(tmp_path, pixels).area_m2 + 0.04)
 
 
-def test_rooms_without_a_way_to_the_rest_are_left_out_and_said(tmp_path: Path) -> None:
+def test_rooms_without_a_way_to_the_rest_are_left_out_with_a_note(tmp_path: Path) -> None:
     pixels = HOME.copy()
     pixels[34:46, 58:62] = WALL
 
@@ -85,7 +85,7 @@ def test_rooms_without_a_way_to_the_rest_are_left_out_and_said(tmp_path: Path) -
     assert "left out: 5.72 m2 of free space" in plan.notes[0]
 
 
-def test_resolution_scales_and_is_the_cell_unless_one_is_given(tmp_path: Path) -> None:
+def test_resolution_scales_and_is_the_default_cell(tmp_path: Path) -> None:
     path = draw(tmp_path)
 
     assert 0.02 == read_image(path, 0.02).lattice.cell

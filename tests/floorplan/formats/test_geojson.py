@@ -206,7 +206,7 @@ def test_door_that_leads_outside_stays_shut_and_is_the_entrance(tmp_path: Path) 
     assert "the door front leads outside: it stays shut" in plan.notes
 
 
-def test_door_in_no_wall_is_ignored_and_said(tmp_path: Path) -> None:
+def test_door_in_no_wall_is_ignored_with_a_note(tmp_path: Path) -> None:
     plan = read(tmp_path, KITCHEN, feature(line((20, 1), (20, 2)), "door"))
 
     assert ("the door features[1] is in no room's wall: ignored",) == plan.notes
@@ -375,7 +375,7 @@ def test_longitude_and_latitude_become_metres(
     assert any("became metres east and north of" in note for note in plan.notes)
 
 
-def test_units_can_be_said_by_the_file_and_by_the_setting(tmp_path: Path) -> None:
+def test_units_can_be_set_by_the_file_and_by_the_setting(tmp_path: Path) -> None:
     small = feature(box(0, 0, 0.3, 0.3), "room")
     path = write(tmp_path, small, units="m")
 
@@ -498,7 +498,7 @@ def test_other_json_is_refused(tmp_path: Path) -> None:
         read_geojson(path)
 
 
-def test_outline_that_crosses_itself_is_repaired_and_said(tmp_path: Path) -> None:
+def test_outline_that_crosses_itself_is_repaired_with_a_note(tmp_path: Path) -> None:
     bow = {"type": "Polygon", "coordinates": [[[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]]}
 
     plan = read(tmp_path, feature(bow, "room"))

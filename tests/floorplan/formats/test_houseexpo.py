@@ -67,7 +67,7 @@ def test_every_plan_keeps_its_area_and_is_covered_by_disjoint_rooms(
             assert room is plan.room_at(*room.anchor_xy), path.name
 
 
-def test_every_room_of_every_plan_hangs_together(sample: list[Path]) -> None:
+def test_every_room_of_every_plan_is_connected(sample: list[Path]) -> None:
     """One walks from any cell of a room to any other without leaving it."""
     for path in sample:
         plan = read_houseexpo(path)

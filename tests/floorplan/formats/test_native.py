@@ -151,8 +151,8 @@ def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
     assert [("bed_0", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
 
 
-def test_doorways_that_a_file_leaves_out_are_looked_for(tmp_path: Path) -> None:
-    """And those that it says it hasn't are not."""
+def test_doorways_that_a_file_leaves_out_are_searched(tmp_path: Path) -> None:
+    """An empty list means that there are none."""
     pinched = [[0, 0], [3, 0], [3, 1], [3.1, 1], [3.1, 0], [6, 0], [6, 3], [3.1, 3], [3.1, 1.9]]
     pinched += [[3, 1.9], [3, 3], [0, 3]]
     rooms = [

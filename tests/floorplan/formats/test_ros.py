@@ -161,7 +161,7 @@ def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path: Pat
 # --- Cells --------------------------------------------------------------------------------------
 
 
-def test_cell_is_the_resolution_unless_given(tmp_path: Path) -> None:
+def test_cell_is_the_resolution_by_default(tmp_path: Path) -> None:
     path = write(tmp_path, resolution=0.04)
 
     assert 0.04 == read_ros(path).lattice.cell
@@ -179,7 +179,7 @@ def test_resolution_below_the_smallest_cell_takes_that(tmp_path: Path) -> None:
 # --- Free, occupied, unknown --------------------------------------------------------------------
 
 
-def test_negate_takes_white_for_occupied(tmp_path: Path) -> None:
+def test_negate_makes_white_occupied(tmp_path: Path) -> None:
     plain = read_ros(write(tmp_path))
 
     assert plain == read_ros(write(tmp_path, 255 - ROOM, negate=1))
@@ -296,7 +296,7 @@ def test_image_may_be_absolute(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("image", ["/home/robot/maps/map.pgm", "C:\\maps\\map.pgm"])
-def test_image_that_stayed_on_another_computer_is_taken_from_beside_with_a_note(
+def test_image_path_of_another_computer_is_replaced_by_the_file_beside_the_map_with_a_note(
     tmp_path: Path, image: str
 ) -> None:
     plan = read_ros(write(tmp_path, image=image))

@@ -160,7 +160,7 @@ def test_real_segments_are_rooms_of_the_area_that_the_file_states(
 
 @pytest.mark.parametrize("name", MAPS)
 def test_real_path_runs_on_the_floor_of_the_plan(shared_data: Path, name: str) -> None:
-    """So the frame of entities is that of the pixels: mirrored or shifted, it would leave it."""
+    """Entities and pixels share a frame: a mirrored or shifted path would leave the floor."""
     path = shared_data / "valetudo" / f"{name}.json"
     plan = read_valetudo(path)
     charger = read_valetudo_charger(path)
@@ -190,7 +190,7 @@ def test_real_map_with_german_names_has_rooms_of_known_types(shared_data: Path) 
     assert expected == {room.name: room.type for room in plan.rooms}
 
 
-def test_real_no_go_area_is_kept_out_of_and_no_wall(shared_data: Path) -> None:
+def test_real_no_go_area_is_an_area_and_no_wall(shared_data: Path) -> None:
     path = shared_data / "valetudo" / "roborock_s6_segments.json"
 
     plan, open_plan = read_valetudo(path), read_valetudo(path, no_go="ignore")
@@ -252,7 +252,7 @@ def test_overlapping_runs_count_once(tmp_path: Path) -> None:
     assert_box((0.5, -1.0, 1.5, -0.5), plan)
 
 
-def test_wall_takes_floor_away_and_is_said(tmp_path: Path) -> None:
+def test_wall_removes_floor_with_a_note(tmp_path: Path) -> None:
     plan = home(tmp_path, KITCHEN, layer("wall", [*runs(20, 20, 22, 22), *runs(0, 0, 90, 5)]))
 
     assert pytest.approx((40 * 30 - 4) * PIXEL_AREA) == plan.area_m2
@@ -394,7 +394,9 @@ def test_no_go_areas_can_be_ignored(tmp_path: Path) -> None:
         entity("virtual_wall"),
     ],
 )
-def test_no_go_area_without_extent_is_ignored_and_said(tmp_path: Path, bad: dict[str, Any]) -> None:
+def test_no_go_area_without_extent_is_ignored_with_a_note(
+    tmp_path: Path, bad: dict[str, Any]
+) -> None:
     plan = home(tmp_path, KITCHEN, entities=[bad])
 
     assert 1200 == plan.rooms[0].cells
@@ -506,7 +508,7 @@ def test_component_takes_the_cell_from_the_map(tmp_path: Path) -> None:
     assert source.load() == load_floorplan(path)
 
 
-def test_given_cell_is_used(tmp_path: Path) -> None:
+def test_cell_setting_is_used(tmp_path: Path) -> None:
     path = write(tmp_path, vacuum_map())
 
     for plan in (Valetudo(path=path, cell=0.1).load(), load_floorplan(path, 0.1)):
@@ -583,7 +585,7 @@ def test_noise_is_refused_quickly(tmp_path: Path) -> None:
     assert "noise" in refusal(tmp_path, vacuum_map(layer("floor", chequered)))
 
 
-def test_odd_things_are_said(tmp_path: Path) -> None:
+def test_odd_layers_are_noted(tmp_path: Path) -> None:
     short = {**KITCHEN, "dimensions": {"pixelCount": 1300}}
     empty = layer("segment", [], segmentId="9")
 
@@ -597,7 +599,7 @@ def test_odd_things_are_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("box", [(-5, 0, 20, 20), (0, -1, 20, 20), (100, 0, 130, 9), (0, 9, 9, 90)])
-def test_pixels_beyond_the_stated_size_are_said(
+def test_pixels_beyond_the_stated_size_are_noted(
     tmp_path: Path, box: tuple[int, int, int, int]
 ) -> None:
     plan = home(tmp_path, layer("floor", runs(*box)))

@@ -40,7 +40,7 @@ def test_only_what_is_tall_blocks_sight(furniture: Furniture) -> None:
 
 
 @pytest.mark.parametrize("furniture", ALL)
-def test_one_stands_beside_what_blocks_and_not_in_it(furniture: Furniture) -> None:
+def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture: Furniture) -> None:
     thing = stand_furniture(furniture.type, (0.0, 0.0))
     x0, y0, x1, y1 = thing.footprint.bounds
     for use in thing.uses:
@@ -61,7 +61,7 @@ def test_one_stands_beside_what_blocks_and_not_in_it(furniture: Furniture) -> No
         (3 * QUARTER, 3.0, 1.35, 0.5 * math.pi),
     ],
 )
-def test_one_stands_before_a_stove_and_faces_it(
+def test_person_stands_before_a_stove_and_faces_it(
     heading: int, x: float, y: float, facing: float
 ) -> None:
     (use,) = stand_furniture("stove", (3.0, 2.0), heading, (0.6, 0.6)).uses

@@ -1,4 +1,4 @@
-"""Furniture by rule: in free space, apart, off the doorways, and nobody is cut off or shut out."""
+"""Furniture by rule: in free space, apart, off the doorways, and all rooms stay reachable."""
 
 from collections import Counter
 from functools import cache
@@ -51,7 +51,7 @@ def check_stands_free(empty: FloorPlan, plan: FloorPlan) -> None:
 
 
 def check_ways(empty: FloorPlan, plan: FloorPlan) -> None:
-    """What a body could walk between in the empty home, it still can, where both are free."""
+    """Free places that were connected in the empty home still are."""
     before, after = Space(empty, BODY_RADIUS), Home(plan).space(BODY_RADIUS)
     cell = plan.lattice.cell
     for part in range(before.parts):
@@ -184,7 +184,7 @@ def test_every_rule_is_for_a_type_of_the_vocabulary() -> None:
     assert set(RULES) <= set(PRIORITY)
 
 
-def test_density_nought_leaves_what_is_needed() -> None:
+def test_density_zero_leaves_only_essential_furniture() -> None:
     plan = one_room("bedroom")
 
     assert {"bed", "nightstand", "wardrobe"} == set(types(furnish(plan, density=0)))

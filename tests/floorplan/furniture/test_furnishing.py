@@ -33,7 +33,7 @@ def test_piece_blocks_what_the_scenario_says() -> None:
     assert "sight" == plan.object("screen").blocks
 
 
-def test_nothing_asked_for_leaves_the_plan_as_it_is() -> None:
+def test_no_pieces_and_no_rules_leave_the_plan_as_it_is() -> None:
     assert load_floorplan() == Bundled().plan()
 
 

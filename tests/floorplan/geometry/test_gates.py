@@ -81,7 +81,7 @@ def compare(home: Home, rng: np.random.Generator, doors: int, eyes: int, points:
 
 @given(homes(), seeds())
 @settings(max_examples=examples(60))
-def test_who_sees_what_past_shut_and_open_doors_is_as_every_wall_says(
+def test_sight_past_shut_and_open_doors_equals_a_test_of_every_wall(
     polygons: list[shapely.Polygon], seed: int
 ) -> None:
     assume(len(home_of(polygons).cells))

@@ -44,7 +44,7 @@ def test_to_lattice_rounds_half_to_even() -> None:
 
 
 @pytest.mark.parametrize("cell", [0.01, 0.05, 0.3, 1.0])
-def test_one_point_is_taken_as_all_are(cell: float) -> None:
+def test_single_point_is_converted_as_arrays_are(cell: float) -> None:
     lattice = Lattice.around((-3.0, 2.0, 9.0, 7.0), cell)
     for x, y in np.random.default_rng(1).uniform(-3, 9, (500, 2)).tolist():
         point = lattice.point_at((x, y))

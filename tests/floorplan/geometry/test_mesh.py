@@ -1,4 +1,4 @@
-"""From outlines to a mesh: every triangle accounted for, whatever the outlines touch."""
+"""Meshes of outlines: their triangles fill the free space, also where outlines touch."""
 
 from pathlib import Path
 
@@ -155,7 +155,7 @@ def test_snapping_drops_what_is_thinner_than_the_lattice() -> None:
     assert snap_polygon(shapely.box(0, 0, 500, 0.3)).polygons == []
 
 
-def test_a_crossed_outline_falls_into_its_loops_and_shows_in_the_area() -> None:
+def test_crossed_outline_becomes_its_loops_and_changes_the_area() -> None:
     bow_tie = Polygon([(0, 0), (200, 200), (200, 0), (0, 200)])
 
     snapped = snap_polygon(bow_tie)

@@ -1,4 +1,4 @@
-"""The check-up finds each fault in a home made to have it, and none in a sound one."""
+"""The check-up finds each fault in a home that has it, and none in a home without faults."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Ways that mind costs: they keep away from walls and out of no-go areas, and are the cheapest."""
+"""Routes of least cost, which keep away from walls and out of no-go areas."""
 
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def test_no_go_areas_are_what_the_settings_say(no_go: str, inside: int) -> None:
     assert 1600 + 100 == pytest.approx(cells_within(HALL, HALL.no_go).sum(), abs=100)
 
 
-def test_way_leads_round_a_no_go_area_or_through_it_as_it_is_told(space: Space) -> None:
+def test_route_avoids_or_crosses_a_no_go_area_by_the_settings(space: Space) -> None:
     a, b = at(HALL, 1.0, 2.0), at(HALL, 5.0, 2.0)
     area = HALL.no_go[0]
     ways = {}
@@ -91,7 +91,7 @@ def test_goal_in_a_forbidden_area_is_out_of_reach_and_a_start_there_is_left(spac
     assert route_by_cost(space, np.full(costs.shape, -1), outside, outside) is None
 
 
-def test_way_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
+def test_route_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
     plan = fleet2d.load_floorplan(flat_path())
     space = Home(plan).space(0.15)
     free = np.zeros(plan.free.shape, np.int64)
@@ -108,7 +108,7 @@ def test_way_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
     assert worst < 1.06
 
 
-def test_way_stays_in_the_space_and_is_cheaper_than_the_shortest() -> None:
+def test_route_stays_in_the_space_and_is_cheaper_than_the_shortest() -> None:
     plan = fleet2d.load_floorplan(flat_path())
     space = Home(plan).space(0.15)
     costs = costs_of(plan, CostmapSettings(clearance=0.6, wall_cost=400))
@@ -135,7 +135,7 @@ def test_way_stays_in_the_space_and_is_cheaper_than_the_shortest() -> None:
     assert cheaper > 5
 
 
-def test_goal_outside_the_space_has_no_way(space: Space) -> None:
+def test_goal_outside_the_space_has_no_route(space: Space) -> None:
     costs = costs_of(HALL, CostmapSettings(no_go="ignore"))
 
     assert route_by_cost(space, costs, at(HALL, 1, 2), at(HALL, 5.99, 2)) is None
@@ -180,7 +180,7 @@ def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_costed_space_is_what_a_walk_over_its_cells_says(seed: int) -> None:
+def test_costed_space_equals_a_search_over_its_cells(seed: int) -> None:
     plan = fleet2d.load_floorplan(flat_path())
     base = Home(plan).space(0.15)
     rng = np.random.default_rng(seed)
@@ -209,7 +209,7 @@ def test_costed_space_is_what_a_walk_over_its_cells_says(seed: int) -> None:
             assert (start, goal) == (tuple(way[0].tolist()), tuple(way[-1].tolist()))
 
 
-def test_costed_space_is_another_only_when_the_costs_are() -> None:
+def test_costed_space_is_new_only_when_costs_change() -> None:
     home = Home(fleet2d.load_floorplan(flat_path()))
     base = home.space(0.15)
     assert home.costed(base) is base

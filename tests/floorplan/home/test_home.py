@@ -19,7 +19,7 @@ def home_with(
 
 
 def way_out(home: Home, part: int = 0, radius: float = 0.2) -> tuple[float, float]:
-    """Return where one leaves [m]."""
+    """Return the way out (x, y) [m]."""
     space = home.space(radius)
     at = home.way_out(space, part)
     assert part == space.part_at(*at)
@@ -50,7 +50,7 @@ def test_rooms_are_those_of_the_plan() -> None:
     assert home.plan.rooms == home.rooms
 
 
-def test_way_out_is_the_place_a_body_can_be_that_is_nearest_to_the_entrance() -> None:
+def test_way_out_is_the_free_place_nearest_to_the_entrance() -> None:
     x, y = way_out(home_with(("hallway", 0, 2), entrance=(5.99, 1.5)))
 
     assert abs(x - 5.775) < 0.05
@@ -66,7 +66,7 @@ def test_way_out_is_the_place_a_body_can_be_that_is_nearest_to_the_entrance() ->
         ([("bedroom", 0, 4), ("bathroom", 4, 6)], (0, 4)),
     ],
 )
-def test_way_out_without_an_entrance_is_in_the_room_one_most_likely_leaves_from(
+def test_way_out_without_an_entrance_is_in_the_likeliest_room(
     labels: list[tuple[str, float, float]], expected: tuple[float, float]
 ) -> None:
     x, _ = way_out(home_with(*labels))
@@ -82,7 +82,7 @@ def test_way_out_of_another_part_is_in_that_part() -> None:
         assert 8 < x < 10
 
 
-def test_way_out_of_another_part_is_in_a_room_that_one_can_get_to() -> None:
+def test_way_out_of_another_part_is_in_a_reachable_room() -> None:
     """Not where that part comes nearest to the hallway, which is out of reach."""
     home = home_with(("hallway", 0, 2), ("bedroom", 8, 9), ("kitchen", 9, 10))
 
@@ -91,7 +91,7 @@ def test_way_out_of_another_part_is_in_a_room_that_one_can_get_to() -> None:
     assert 9 < x < 10
 
 
-def test_way_out_of_a_part_that_is_not_there_says_so() -> None:
+def test_way_out_of_a_missing_part_is_an_error() -> None:
     home = home_with(("kitchen", 0, 2))
 
     with pytest.raises(PlacementError, match=r"a body of radius 0\.2 m fits nowhere in test home"):

@@ -19,7 +19,7 @@ def home() -> Home:
     return Home(fleet2d.load_floorplan(flat_path()))
 
 
-def test_layer_holds_its_fill_and_what_is_written(home: Home) -> None:
+def test_layer_holds_its_fill_and_written_values(home: Home) -> None:
     layer = home.layers.add("dust", "float32", fill=1.5, unit="g", description="on the floor")
     layer.values[home.plan.free] += 1
     layer.set_at(1.0, 3.0, 7)
@@ -74,7 +74,7 @@ def test_wrong_layer_is_refused(home: Home, arguments: Any, why: str) -> None:
     assert 0 == len(home.layers)
 
 
-def test_unknown_layer_says_which_there_are_and_how_to_get_it(home: Home) -> None:
+def test_unknown_layer_names_the_known_ones_and_how_to_add_it(home: Home) -> None:
     home.layers.add("dust")
 
     with pytest.raises(ComponentError, match=r"did you mean 'dust'.*There are: dust; add it by"):
@@ -98,7 +98,7 @@ def test_copies_of_a_home_have_layers_of_their_own(home: Home) -> None:
     assert twin["values"].all()
 
 
-def test_layers_that_the_run_keeps_are_only_read(home: Home) -> None:
+def test_layers_of_the_run_are_read_only(home: Home) -> None:
     from fleet2d.floorplan.home.layers import LayerSettings
 
     layers = Layers(home.plan)

@@ -1,4 +1,4 @@
-"""Where a body can be: as far from every wall as it is wide, and no farther than stated."""
+"""The space of a body: its radius away from every wall, and at most the stated excess more."""
 
 import copy
 import math
@@ -87,7 +87,7 @@ def cells_of(space: Space, rng: np.random.Generator, count: int) -> Int64:
 
 
 def check_routes(space: Space, rng: np.random.Generator, count: int) -> int:
-    """Compare paths with the twin, and keep them off the walls; return how many bend."""
+    """Check routes against the twin and the distance from walls; return how many bend."""
     vertices, free = space.mesh.vertices, region(space)
     graph, walls = graph_of(free, vertices), walls_around(space.plan)
     ends = cells_of(space, rng, 2 * count)
@@ -146,7 +146,7 @@ def _is_pinched(space: Space) -> bool:
 
 @pytest.mark.parametrize("name", HOMES)
 @pytest.mark.parametrize("radius", RADII)
-def test_space_is_what_is_a_radius_off_the_walls_and_no_farther_off_than_stated(
+def test_space_keeps_the_radius_from_walls_and_at_most_the_stated_excess(
     shared_data: Path, name: str, radius: float
 ) -> None:
     """Every cell's centre nearer than the radius is out; every one farther than stated is in."""
@@ -262,7 +262,7 @@ def test_space_of_a_turned_and_mirrored_real_home_is_the_same_to_the_grid_of_wal
     check_symmetry(plan_of(shared_data / "houseexpo" / f"{name}.json"), 0.2, 2.0)
 
 
-def test_route_from_the_border_of_the_space_steps_back_in() -> None:
+def test_route_from_the_border_of_the_space_first_leads_inside() -> None:
     space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     walls = walls_of(space.plan.polygons)
     goal = tuple(space.plan.lattice.to_lattice((3.0, 2.4)).tolist())

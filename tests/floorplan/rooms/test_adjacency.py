@@ -1,4 +1,4 @@
-"""Ways between rooms: doorways, and borders without a wall."""
+"""Links between rooms: doorways, and borders without a wall."""
 
 import numpy as np
 import shapely
@@ -20,7 +20,7 @@ def test_open_border_is_as_long_as_its_longer_side() -> None:
     assert [((0, 1), "open", 1.0)] == [(link.rooms, link.kind, link.width_m) for link in links]
 
 
-def test_cells_that_happen_to_touch_once_make_no_way() -> None:
+def test_single_pair_of_touching_cells_is_no_link() -> None:
     assert () == open_borders(LATTICE, rooms("00..", "0011", "...1"), ())
 
 
@@ -29,7 +29,7 @@ def test_border_along_a_passage_is_that_doorway_and_no_open_border() -> None:
     assert () == open_borders(LATTICE, rooms("0011", "0011"), [((side, 0), (side, side))])
 
 
-def test_graph_has_doorways_first_and_neighbors_go_by_it() -> None:
+def test_room_graph_has_doorways_first_and_gives_the_neighbors() -> None:
     free = shapely.box(0, 0, 6, 3) - shapely.box(4, 1, 4.1, 3)
     labels = [
         LabelledRegion((kind,), shapely.box(x0, 0, x1, 3))

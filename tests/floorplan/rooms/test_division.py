@@ -1,4 +1,4 @@
-"""Rough boxes over walls, and maps without labels: what rooms come of them."""
+"""The rooms of plans with rough boxes over walls, and of maps without labels."""
 
 from pathlib import Path
 
@@ -170,7 +170,7 @@ MAPS = {
 
 @pytest.mark.parametrize("name", list(MAPS))
 def test_real_maps_without_labels_become_rooms(shared_data: Path, name: str) -> None:
-    """As one would draw them on the picture; pillars and furniture part nothing."""
+    """As a person would draw them on the picture; pillars and furniture separate no rooms."""
     plan = load_floorplan(shared_data / name)
 
     assert MAPS[name] == (len(plan.rooms), len(plan.doorways))

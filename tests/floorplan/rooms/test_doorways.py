@@ -1,4 +1,4 @@
-"""Door lines fitted to walls, and what doorways are called."""
+"""Door lines fitted to walls, and the names of doorways."""
 
 from pathlib import Path
 
@@ -46,12 +46,12 @@ def test_doorway_is_named_after_the_rooms_on_its_left_and_right() -> None:
     assert plan.doorway("kitchen_0-bathroom_0") is plan.doorways[0]
 
 
-def test_line_the_other_way_round_swaps_left_and_right() -> None:
+def test_reversed_line_swaps_left_and_right() -> None:
     plan = flat(DoorLine((2.05, 1.9), (2.05, 1.0)))
     assert "bathroom_0-kitchen_0" == plan.doorways[0].name
 
 
-def test_given_name_stays() -> None:
+def test_own_name_stays() -> None:
     assert "hatch" == flat(DoorLine((2.05, 1.0), (2.05, 1.9), name="hatch")).doorways[0].name
 
 
@@ -97,7 +97,7 @@ def test_stored_plan_has_the_same_doorways() -> None:
     assert plan == flat(*lines)
 
 
-def test_unknown_doorway_is_refused_with_those_there_are() -> None:
+def test_unknown_doorway_is_refused_with_the_known_ones() -> None:
     with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_0-bathroom_0"):
         flat(DoorLine((2.05, 1.0), (2.05, 1.9))).doorway("kitchen")
 

@@ -131,7 +131,7 @@ def test_polygons_take_the_cells_inside_them() -> None:
     assert np.array_equal(expected, room_of_cell == rooms["loggia_0"].index)
 
 
-def test_given_names_stay_and_numbers_step_round_them() -> None:
+def test_own_names_stay_and_numbering_skips_them() -> None:
     _, rooms, _ = assign(
         region("Bedroom", 0, 0, 1, 3),
         LabelledRegion(("Bedroom",), shapely.box(1, 0, 2, 3), name="bedroom_0"),

@@ -1,4 +1,4 @@
-"""Chambers joined into rooms: what is too small to be one."""
+"""Chambers that are too small to be rooms are joined to others."""
 
 import numpy as np
 

@@ -45,7 +45,7 @@ def reachable_rooms(plan: FloorPlan) -> set[int]:
 
 
 def content(house: House) -> str:
-    """The digest of all that a floor plan is made of; independent of how plans are stored."""
+    """The digest of the content of a floor plan, independent of how plans are stored."""
     gaps = [(*gap.wall, gap.low, gap.high, gap.leaf) for gap in (*house.gaps, house.front_door)]
     kinds = [brief.kind for brief in house.briefs]
     return hashlib.sha256(json.dumps([kinds, house.boxes, gaps]).encode()).hexdigest()[:16]
@@ -80,7 +80,7 @@ def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed: i
     assert front.rooms[0] == front.rooms[1] == plan.room_at(*plan.entrance).index
     inner = [door for door in plan.doorways if door is not front]
     assert all(door.rooms[0] != door.rooms[1] for door in inner)
-    # Nobody walks through a bath or a bedroom, but to what belongs to it.
+    # No route leads through a bathroom or a bedroom, except to a room that belongs to it.
     for room in (room for room in plan.rooms if room.type in PRIVATE):
         doors = [door for door in inner if room.index in door.rooms]
         others = {plan.rooms[sum(d.rooms) - room.index].type for d in doors}
