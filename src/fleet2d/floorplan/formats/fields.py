@@ -207,7 +207,9 @@ Point = Annotated[
     WithJsonSchema(_POINT),
 ]
 """A place (x, y) [m]."""
-Box = Annotated[tuple[float, float, float, float], PlainValidator(lambda box: _numbers(box, 4))]
+BoxSides = Annotated[
+    tuple[float, float, float, float], PlainValidator(lambda box: _numbers(box, 4))
+]
 """The sides of a box (x0, y0, x1, y1) [m]."""
 RING_SCHEMA = {"type": "array", "items": _POINT, "minItems": 3}
 Ring = Annotated[

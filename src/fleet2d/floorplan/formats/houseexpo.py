@@ -10,7 +10,7 @@ from shapely.geometry import MultiPolygon
 
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import Box, Listed, Point, Ring, list_of, validate
+from fleet2d.floorplan.formats.fields import BoxSides, Listed, Point, Ring, list_of, validate
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
 from fleet2d.paths import InputPath
@@ -22,9 +22,9 @@ class _HouseFile(BaseModel):
     model_config = ConfigDict(defer_build=True)
 
     verts: Ring
-    room_category: dict[str, Annotated[Listed[Box], list_of("boxes [x0, y0, x1, y1]")]] | None = (
-        None
-    )
+    room_category: (
+        dict[str, Annotated[Listed[BoxSides], list_of("boxes [x0, y0, x1, y1]")]] | None
+    ) = None
 
 
 _HOUSE_FILE = TypeAdapter(_HouseFile)
@@ -95,7 +95,7 @@ def _free_space(corners: list[Point]) -> tuple[Polygon | MultiPolygon, list[str]
     return MultiPolygon(parts), [note]
 
 
-def _regions(categories: dict[str, list[Box]]) -> tuple[list[LabelledRegion], list[str]]:
+def _regions(categories: dict[str, list[BoxSides]]) -> tuple[list[LabelledRegion], list[str]]:
     """Return the labelled boxes in file order, and a note for each with swapped corners."""
     regions: list[LabelledRegion] = []
     notes: list[str] = []

@@ -34,7 +34,7 @@ FORMAT = "fleet2d-floorplan"
 VERSION = 1
 
 
-class Part(FileModel):
+class AreaEntry(FileModel):
     """An area: an outline and its holes."""
 
     outline: Ring = Field(description="corners, the first not repeated at the end")
@@ -61,7 +61,7 @@ class _CornersAlone:
 
 
 Area = Annotated[
-    Part,
+    AreaEntry,
     BeforeValidator(lambda value: value if isinstance(value, dict) else {"outline": value}),
     _CornersAlone(),
 ]
@@ -75,18 +75,18 @@ def _check_valid(shape: Polygon | MultiPolygon) -> None:
         raise problem(f"is not a valid outline: {reason.lower()}{place}")
 
 
-def space_of(parts: list[Part]) -> Polygon | MultiPolygon:
+def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
     """Return the union of parts [m]."""
     return parts[0].polygon if len(parts) == 1 else MultiPolygon([part.polygon for part in parts])
 
 
-def _check_space(parts: list[Part]) -> list[Part]:
+def _check_space(parts: list[AreaEntry]) -> list[AreaEntry]:
     if len(parts) > 1:
         _check_valid(space_of(parts))
     return parts
 
 
-Space = Annotated[Listed[Part], AfterValidator(_check_space)]
+Space = Annotated[Listed[AreaEntry], AfterValidator(_check_space)]
 
 
 class RoomEntry(FileModel):
