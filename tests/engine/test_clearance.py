@@ -12,7 +12,7 @@ from tests.entities.robots.robots import (
     names,
     rooms,
 )
-from tests.entities.robots.test_find import told
+from tests.entities.robots.test_find import belief
 from tests.scenes import digests, each_step, everything, path, run
 
 import fleet2d
@@ -159,7 +159,7 @@ def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_
 def test_a_place_that_is_taken_is_left_alone_until_it_thinks_again() -> None:
     hangout = {"type": "hangout", "source": "rtp", "explore": 0, "period": "30 min"}
     content = polite(OUT, [hangout], "2 h", gives_up="1 min")
-    content |= told(bathroom_0=1)
+    content |= belief(bathroom_0=1)
     free = run(content)
     x, y = path(free, "astro").x[-1], path(free, "astro").y[-1]
     content["users"]["ana"] = {"type": "schedule", **stands(float(x), float(y))}

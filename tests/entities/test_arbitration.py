@@ -25,7 +25,7 @@ class Errand(Behavior):
     declines: bool = False
 
     def start(self, actor: Any) -> None:
-        self.asked: list[int] = []
+        self.decisions: list[int] = []
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         start = now.actor.clock.start
@@ -33,7 +33,7 @@ class Errand(Behavior):
         return next((time for time in times if time > now.time), None)
 
     def decide(self, now: Situation) -> Plan | None:
-        self.asked.append(now.step)
+        self.decisions.append(now.step)
         if self.declines or now.step // 60 not in self.at:
             return None
         return now.plan().note("errand", str(now.step)).go_to("kitchen").stay(timedelta(minutes=2))
@@ -74,32 +74,32 @@ IDLE = {"type": f"{OWN}:Idle"}
 QUIET = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}
 
 
-def told(content: dict[str, Any], *spans: int) -> list[tuple[str, str]]:
+def noted(content: dict[str, Any], *spans: int) -> list[tuple[str, str]]:
     stored = assert_same_for_every_max_span(content, *(spans or (61,)))
     return [(name, detail) for _, name, detail in events(stored)]
 
 
 def test_the_first_breaks_in_on_those_behind_it_when_it_said() -> None:
-    found = told(home_with([errand(5, 20), IDLE], "30 min", QUIET), 61, 1)
-    assert [("idle", "0"), ("errand", "300")] == found[:2]
-    assert ("errand", "1200") in found
+    rows = noted(home_with([errand(5, 20), IDLE], "30 min", QUIET), 61, 1)
+    assert [("idle", "0"), ("errand", "300")] == rows[:2]
+    assert ("errand", "1200") in rows
 
 
 def test_who_is_behind_or_may_not_break_in_waits() -> None:
-    assert [("idle", "0")] == told(home_with([IDLE, errand(5)], "30 min", QUIET))
-    assert [("idle", "0")] == told(home_with([errand(5, preempts=False), IDLE], "30 min", QUIET))
+    assert [("idle", "0")] == noted(home_with([IDLE, errand(5)], "30 min", QUIET))
+    assert [("idle", "0")] == noted(home_with([errand(5, preempts=False), IDLE], "30 min", QUIET))
 
 
 def test_who_has_nothing_to_do_after_all_leaves_no_trace() -> None:
     alone = run(home_with(["patrol"], "30 min", QUIET))
-    asked = run(home_with([errand(*range(1, 30), declines=True), "patrol"], "30 min", QUIET))
-    assert digests(alone) == digests(asked)
+    with_errand = run(home_with([errand(*range(1, 30), declines=True), "patrol"], "30 min", QUIET))
+    assert digests(alone) == digests(with_errand)
 
 
 def test_only_the_round_that_resumes_goes_on_where_it_was() -> None:
     def stops(kind: str) -> list[str]:
         content = home_with([errand(7), {"type": f"{OWN}:{kind}"}], "30 min", QUIET)
-        return [detail for name, detail in told(content) if name in ("at", "errand")]
+        return [detail for name, detail in noted(content) if name in ("at", "errand")]
 
     assert ["bedroom", "bathroom", "420", "living_room", "bedroom"] == stops("SteadyRound")[:5]
     assert ["bedroom", "bathroom", "420", "bedroom", "bathroom"] == stops("Round")[:5]
@@ -107,8 +107,8 @@ def test_only_the_round_that_resumes_goes_on_where_it_was() -> None:
 
 def test_a_stop_that_was_broken_off_is_made_up_for() -> None:
     content = home_with([errand(7), {"type": f"{OWN}:SteadyRound"}], "30 min", QUIET)
-    found = [(detail, step) for step, _, detail in events(run(content))]
-    begun = dict(reversed(found))  # the first of each
+    rows = [(detail, step) for step, _, detail in events(run(content))]
+    begun = dict(reversed(rows))  # the first of each
     # The errand's two minutes, and the ways to it and back.
     assert 120 < begun["living_room"] - begun["bathroom"] - 300 < 200
 
@@ -122,12 +122,12 @@ def test_hours_begin_and_end_a_behavior() -> None:
 
 
 def test_outside_its_hours_a_behavior_is_not_asked() -> None:
-    assert [] == told(home_with([{**IDLE, "when": "08:00-09:00"}], "30 min", QUIET))
+    assert [] == noted(home_with([{**IDLE, "when": "08:00-09:00"}], "30 min", QUIET))
 
 
 def test_a_cooldown_begins_when_its_turn_is_over() -> None:
     content = home_with([{**errand(*range(60)), "cooldown": "10 min"}, IDLE], "40 min", QUIET)
-    steps = [int(detail) for name, detail in told(content) if name == "errand"]
+    steps = [int(detail) for name, detail in noted(content) if name == "errand"]
     assert len(steps) >= 3
     assert all(b - a >= 720 for a, b in pairwise(steps))
     assert all(b - a < 800 for a, b in pairwise(steps))
@@ -148,7 +148,7 @@ def test_replanning_asks_everybody_anew() -> None:
     simulation.advance(60)
     simulation.replan("astro")
     simulation.advance(60)
-    assert simulation.actors["astro"].behaviors[0].asked == [0, 60]  # type: ignore[attr-defined]
+    assert simulation.actors["astro"].behaviors[0].decisions == [0, 60]  # type: ignore[attr-defined]
 
 
 MONDAY = datetime(2026, 1, 5)

@@ -127,10 +127,10 @@ def test_nobody_moves_otherwise_and_off_is_as_if_it_were_not_there() -> None:
     without, errs = run(lost()), run(lost(**WRONG))
     for name in ("ana", "astro"):
         assert np.array_equal(path(without, name).x, path(errs, name).x)
-    seen, wrong = table(without, "observations"), table(errs, "observations")
-    assert np.array_equal(seen["step"], wrong["step"])
-    assert "true_x" not in seen
-    assert np.array_equal(seen["x"], wrong["true_x"])
+    exact, inexact = table(without, "observations"), table(errs, "observations")
+    assert np.array_equal(exact["step"], inexact["step"])
+    assert "true_x" not in exact
+    assert np.array_equal(exact["x"], inexact["true_x"])
     content = lost()
     content["robots"]["astro"]["localization"] = None
     assert digests(without) == digests(run(content))

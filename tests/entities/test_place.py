@@ -46,8 +46,8 @@ def test_a_body_has_one_room_of_a_kind_however_it_is_listed() -> None:
     for seed in range(6):
         body = actor(seed, home, start="any")
         lists = ("bedroom", ["bedroom", "any"], ["attic", "bedroom"])
-        found = {room_of(body, body.find(place, 0, "spot")) for place in lists}
-        assert 1 == len(found)
+        rooms = {room_of(body, body.find(place, 0, "spot")) for place in lists}
+        assert 1 == len(rooms)
     rooms = {
         room_of(b, b.find("bedroom", 0, "spot"))
         for b in (actor(s, home, start="any") for s in range(12))
@@ -62,9 +62,9 @@ def test_a_point_is_that_point_exactly() -> None:
 
 def test_any_is_every_room_that_can_be_reached() -> None:
     body = actor()
-    found = {room_of(body, body.find(["attic", "any"], k, "spot")) for k in range(200)}
-    assert {room.name for room in body.reachable_rooms()} == found
-    assert "storage_0" not in found
+    rooms = {room_of(body, body.find(["attic", "any"], k, "spot")) for k in range(200)}
+    assert {room.name for room in body.reachable_rooms()} == rooms
+    assert "storage_0" not in rooms
 
 
 def test_spots_fill_the_room_and_keep_the_radius_from_walls() -> None:

@@ -27,7 +27,7 @@ class Told(Behavior):
         return _DECIDE[self.name](now)
 
 
-def told(*functions: Decide, **body: Any) -> dict[str, Any]:
+def entity_with(*functions: Decide, **body: Any) -> dict[str, Any]:
     """The configuration of a body that asks these functions in turn."""
     behaviors = []
     for number, function in enumerate(functions):
@@ -40,20 +40,22 @@ def told(*functions: Decide, **body: Any) -> dict[str, Any]:
 def run(*functions: Decide, duration: str = "5 min", **body: Any) -> Run:
     return fleet2d.run(
         scenario(
-            duration, users={"ana": told(*functions, **body)}, artifacts={"trajectories": "1 s"}
+            duration,
+            users={"ana": entity_with(*functions, **body)},
+            artifacts={"trajectories": "1 s"},
         )
     )
 
 
-def asked_at(function: Decide) -> tuple[list[int], Decide]:
+def recording_steps(function: Decide) -> tuple[list[int], Decide]:
     """A list that fills with the steps at which the function is asked."""
     steps: list[int] = []
 
-    def asked(now: Situation) -> Plan | None:
+    def decide(now: Situation) -> Plan | None:
         steps.append(now.step)
         return function(now)
 
-    return steps, asked
+    return steps, decide
 
 
 def minute(now: Situation) -> Plan:
@@ -71,31 +73,31 @@ def test_a_turn_takes_the_long_way_if_told_to() -> None:
 
 
 def test_staying_until_a_past_time_takes_no_time() -> None:
-    steps, asked = asked_at(
+    steps, decide = recording_steps(
         lambda now: now.plan().stay(until=now.time - timedelta(hours=1)).stay(timedelta(seconds=30))
     )
-    run(asked)
+    run(decide)
     assert list(range(0, 300, 30)) == steps
 
 
 def test_staying_until_a_time_ends_at_it() -> None:
     when = datetime(2026, 1, 5, 7, 1, 40)
-    steps, asked = asked_at(
+    steps, decide = recording_steps(
         lambda now: now.plan().stay(until=when) if now.time < when else now.plan().stay()
     )
-    run(asked)
+    run(decide)
     assert [0, 100] == steps
 
 
 def test_a_plan_that_ends_between_two_steps_is_followed_up_at_the_next() -> None:
-    steps, asked = asked_at(lambda now: now.plan().stay(timedelta(seconds=10.4)))
-    run(asked, duration="1 min")
+    steps, decide = recording_steps(lambda now: now.plan().stay(timedelta(seconds=10.4)))
+    run(decide, duration="1 min")
     assert [0, 11, 22, 33, 44, 55] == steps
 
 
 def test_a_plan_that_takes_no_time_is_asked_for_once_a_step() -> None:
-    steps, asked = asked_at(lambda now: now.plan())
-    run(asked, duration="1 min")
+    steps, decide = recording_steps(lambda now: now.plan())
+    run(decide, duration="1 min")
     assert list(range(60)) == steps
 
 
@@ -174,18 +176,18 @@ def test_notes_are_told_at_the_first_step_not_before_them() -> None:
 
 
 def test_the_first_behavior_with_a_plan_is_followed() -> None:
-    third, asked_third = asked_at(minute)
-    second, asked_second = asked_at(lambda now: minute(now) if now.step >= 120 else None)
-    first, asked_first = asked_at(lambda now: minute(now) if now.step == 180 else None)
-    run(asked_first, asked_second, asked_third)
+    third, decide_third = recording_steps(minute)
+    second, decide_second = recording_steps(lambda now: minute(now) if now.step >= 120 else None)
+    first, decide_first = recording_steps(lambda now: minute(now) if now.step == 180 else None)
+    run(decide_first, decide_second, decide_third)
     assert [0, 60, 120, 180, 240] == first
     assert [0, 60, 120, 240] == second
     assert [0, 60] == third
 
 
 def test_if_nobody_has_a_plan_it_stays_still_and_asks_again() -> None:
-    steps, asked = asked_at(lambda now: None)
-    stored = run(asked)
+    steps, decide = recording_steps(lambda now: None)
+    stored = run(decide)
     assert [0, 60, 120, 180, 240] == steps
     poses = path(stored, "ana")
     assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
@@ -198,17 +200,19 @@ def test_without_behaviors_it_stays_still_for_good() -> None:
 
 
 def test_a_situation_tells_where_and_when_it_is() -> None:
-    seen: list[Any] = []
+    situations: list[Any] = []
 
     def decide(now: Situation) -> Plan:
-        seen.append((now.step, now.time, now.xy, now.room.name if now.room else None, now.events))
+        situations.append(
+            (now.step, now.time, now.xy, now.room.name if now.room else None, now.events)
+        )
         return now.plan().go_to([7.0, 1.0]).stay(timedelta(minutes=2))
 
     run(decide, duration="3 min")
-    assert (0, datetime(2026, 1, 5, 7), (1.0, 3.0), "living_room_0", ()) == seen[0]
-    assert (7.0, 1.0) == seen[1][2]
-    assert "kitchen_0" == seen[1][3]
-    assert datetime(2026, 1, 5, 7) + timedelta(seconds=seen[1][0]) == seen[1][1]
+    assert (0, datetime(2026, 1, 5, 7), (1.0, 3.0), "living_room_0", ()) == situations[0]
+    assert (7.0, 1.0) == situations[1][2]
+    assert "kitchen_0" == situations[1][3]
+    assert datetime(2026, 1, 5, 7) + timedelta(seconds=situations[1][0]) == situations[1][1]
 
 
 def test_draws_depend_on_body_purpose_and_step_only() -> None:
@@ -221,13 +225,18 @@ def test_draws_depend_on_body_purpose_and_step_only() -> None:
             drawn[now.actor.name, purpose, now.step] = again.pop()
         return minute(now)
 
-    fleet2d.run(scenario("3 min", users={"ana": told(decide), "ben": told(decide)}))
+    fleet2d.run(scenario("3 min", users={"ana": entity_with(decide), "ben": entity_with(decide)}))
     assert 12 == len(drawn) == len(set(drawn.values()))
     before = dict(drawn)
     drawn.clear()
     fleet2d.run(
         scenario(
-            "3 min", users={"cleo": told(minute), "ana": told(minute, decide), "ben": told(decide)}
+            "3 min",
+            users={
+                "cleo": entity_with(minute),
+                "ana": entity_with(minute, decide),
+                "ben": entity_with(decide),
+            },
         )
     )
     assert 6 == len(drawn)
@@ -245,30 +254,30 @@ def watched(decide: Decide, *others: Decide, **camera: Any) -> dict[str, Any]:
         return plan.stay(until=datetime(2026, 1, 5, 7, 3, 20)).go_to([1.0, 3.0]).stay()
 
     lens = {"range": [0, 10], "angle_deg": 360, "lost_after": "5 s", **camera}
-    robot = told(decide, *others, start=[1.0, 1.0], camera=lens)
-    return scenario("5 min", users={"ana": told(leave)}, robots={"astro": robot})
+    robot = entity_with(decide, *others, start=[1.0, 1.0], camera=lens)
+    return scenario("5 min", users={"ana": entity_with(leave)}, robots={"astro": robot})
 
 
 def test_events_that_a_plan_names_end_it_at_the_next_step() -> None:
-    asked: list[Any] = []
+    situations: list[Any] = []
 
     def decide(now: Situation) -> Plan:
-        asked.append((now.step, [(e.event, e.user) for e in now.events]))
+        situations.append((now.step, [(e.event, e.user) for e in now.events]))
         return now.plan().interrupt_on("user_seen", "user_lost").stay()
 
     stored = fleet2d.run(watched(decide))
     events = table(stored, "events", entity="astro")
-    told_events = [
+    sight_events = [
         (step + 1, [(event, "ana")])
         for step, event in zip(events["step"].tolist(), events["event"].tolist(), strict=True)
     ]
-    assert [(0, []), *told_events] == asked
+    assert [(0, []), *sight_events] == situations
     assert ["user_seen", "user_lost", "user_seen"] == events["event"].tolist()
     assert events["step"][0] == 0
 
 
 def test_events_that_a_plan_does_not_name_leave_it_alone() -> None:
-    steps, decide = asked_at(lambda now: now.plan().interrupt_on("user_lost").stay())
+    steps, decide = recording_steps(lambda now: now.plan().interrupt_on("user_lost").stay())
     stored = fleet2d.run(watched(decide))
     lost = table(stored, "events", event="user_lost")["step"].tolist()
     assert [0, *(step + 1 for step in lost)] == steps
@@ -293,10 +302,10 @@ def test_an_event_says_where_the_user_was_perceived_last() -> None:
 def test_a_user_counts_as_lost_when_not_noticed_for_so_long() -> None:
     for patience in (5, 20):
         stored = fleet2d.run(watched(lambda now: now.plan().stay(), lost_after=patience))
-        seen = table(stored, "observations")["step"]
+        steps = table(stored, "observations")["step"]
         lost = table(stored, "events", event="user_lost")["step"].tolist()
-        gap = np.flatnonzero(np.diff(seen) > 5)
-        assert [seen[gap[0]] + patience] == lost
+        gap = np.flatnonzero(np.diff(steps) > 5)
+        assert [steps[gap[0]] + patience] == lost
 
 
 def test_an_interrupted_body_goes_on_from_where_it_is() -> None:
@@ -312,11 +321,11 @@ def test_an_interrupted_body_goes_on_from_where_it_is() -> None:
 
 
 def returns_the_same_plan_again() -> Decide:
-    kept: list[Plan] = []
+    plans: list[Plan] = []
 
     def decide(now: Situation) -> Plan:
-        kept.append(minute(now))
-        return kept[0]
+        plans.append(minute(now))
+        return plans[0]
 
     return decide
 
@@ -346,7 +355,7 @@ def test_a_behavior_that_breaks_its_contract_is_named(decide: Decide, words: lis
 
 
 def test_an_event_that_there_is_not_is_refused_with_those_there_are() -> None:
-    decide = told(lambda now: now.plan().interrupt_on("doorbell"))
+    decide = entity_with(lambda now: now.plan().interrupt_on("doorbell"))
     with pytest.raises(ComponentError) as caught:
         fleet2d.run(scenario(robots={"astro": decide}))
     for word in ("robots.astro", "'doorbell'", "user_lost, user_seen"):
@@ -358,7 +367,7 @@ def test_what_was_stored_before_a_failure_is_readable(tmp_path: Any) -> None:
         assert now.step < 120, "enough"
         return minute(now)
 
-    content = scenario(users={"ana": told(decide)})
+    content = scenario(users={"ana": entity_with(decide)})
     with pytest.raises(
         ComponentError, match=r"users\.ana failed at step 120: AssertionError: enough"
     ):

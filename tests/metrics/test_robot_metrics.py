@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.entities.robots.robots import CAMERA, events
-from tests.entities.robots.test_find import told
+from tests.entities.robots.test_find import belief
 from tests.scenes import flat_document, run, scenario, table
 
 from fleet2d import Algorithm, Metric
@@ -49,7 +49,7 @@ def content(period: str = "17 min") -> dict[str, Any]:
         },
         metrics={name: {"period": period} for name in METRICS},
         artifacts={"trajectories": "every step"},
-        **told(bathroom_0=1, kitchen_0=1, away=0.4),
+        **belief(bathroom_0=1, kitchen_0=1, away=0.4),
     )
 
 

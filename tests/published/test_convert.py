@@ -695,9 +695,9 @@ def test_commands_convert_and_validate(folder: Path) -> None:
     from typer.testing import CliRunner
 
     written(folder)
-    told = CliRunner().invoke(app, ["convert", "home/old.yaml", "home/new.yaml"])
-    assert 0 == told.exit_code
-    assert [*(f"note: {remark}" for remark in USUAL), "home/new.yaml"] == told.output.splitlines()
-    told = CliRunner().invoke(app, ["validate", "home/new.yaml"])
-    assert 0 == told.exit_code
-    assert told.output.startswith("ok: 2 users and 1 robot in ")
+    result = CliRunner().invoke(app, ["convert", "home/old.yaml", "home/new.yaml"])
+    assert 0 == result.exit_code
+    assert [*(f"note: {remark}" for remark in USUAL), "home/new.yaml"] == result.output.splitlines()
+    result = CliRunner().invoke(app, ["validate", "home/new.yaml"])
+    assert 0 == result.exit_code
+    assert result.output.startswith("ok: 2 users and 1 robot in ")

@@ -19,43 +19,43 @@ def violations(
     """Say in words what a day breaks, needs and errands left out."""
     day = without_interruptions(day)
     template = persona.days[persona.day(date.fromordinal(ordinal))]
-    found = [f"gap or overlap before {b}" for a, b in pairwise(day) if a.end != b.begin]
-    found += [f"{doing} takes no time" for doing in day if doing.end <= doing.begin]
+    faults = [f"gap or overlap before {b}" for a, b in pairwise(day) if a.end != b.begin]
+    faults += [f"{doing} takes no time" for doing in day if doing.end <= doing.begin]
     if day[-1].end != next_day[0].begin + DAY_S:
-        found.append("the next day doesn't follow")
+        faults.append("the next day doesn't follow")
     if "sleep" != day[-1].activity:
-        found.append("it doesn't end asleep")
-    found += _outside("wake", template.wake, day[0].begin)
-    found += _outside("sleep", template.sleep, day[-1].begin)
+        faults.append("it doesn't end asleep")
+    faults += _outside("wake", template.wake, day[0].begin)
+    faults += _outside("sleep", template.sleep, day[-1].begin)
     if day[-1].end - day[-1].begin < template.sleep.at_least.total_seconds():
-        found.append("too short a night")
-    return found + _broken_tasks(persona, template, day)
+        faults.append("too short a night")
+    return faults + _broken_tasks(persona, template, day)
 
 
 def _broken_tasks(persona: Persona, template: DayTemplate, day: Sequence[Doing]) -> list[str]:
-    found = []
+    faults = []
     at = {doing.task: doing for doing in day if doing.task}
     if len(at) != sum(1 for doing in day if doing.task):
-        found.append("a task is done twice")
+        faults.append("a task is done twice")
     for name, task in template.do.items():
         if name not in at:
             if task.fixed or (task.probability == 1 and not task.after):
-                found.append(f"{name} is left out")
+                faults.append(f"{name} is left out")
             continue
         doing = at[name]
-        found += _outside(name, task, doing.begin)
+        faults += _outside(name, task, doing.begin)
         takes = task.takes or persona.activity(task.activity or name).takes
         lasts = doing.end - doing.begin
         if takes.at_least is not None and lasts < takes.at_least.total_seconds():
-            found.append(f"{name} is too short")
+            faults.append(f"{name} is too short")
         if takes.at_most is not None and lasts > takes.at_most.total_seconds():
-            found.append(f"{name} is too long")
+            faults.append(f"{name} is too long")
         if task.until is not None:
             until = task.until.total_seconds()
             if doing.end > until + DAY_S * (until < day[0].begin - 3600):
-                found.append(f"{name} ends after {task.until}")
-        found += [f"{name} before {o}" for o in task.after if o in at and at[o].end > doing.begin]
-    return found
+                faults.append(f"{name} ends after {task.until}")
+        faults += [f"{name} before {o}" for o in task.after if o in at and at[o].end > doing.begin]
+    return faults
 
 
 def _outside(name: str, timing: object, begin: int) -> list[str]:

@@ -47,9 +47,9 @@ def test_no_day_of_a_crowded_household_breaks_a_constraint() -> None:
     for i in range(60):
         today, after = home.day(MONDAY + i), home.day(MONDAY + i + 1)
         for name, persona in home.household.members.items():
-            found = violations(persona, MONDAY + i, today[name], after[name])
+            faults = violations(persona, MONDAY + i, today[name], after[name])
             # Who finds the bathroom taken all the time does without.
-            assert [] == [v for v in found if "left out" not in v], name
+            assert [] == [v for v in faults if "left out" not in v], name
 
 
 def test_the_bathroom_is_planned_for_one_at_a_time_even_by_those_who_are_up_at_night() -> None:
@@ -71,9 +71,9 @@ def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
     for i in range(100):
         day = home.day(MONDAY + i)
         planned = [doing for name in day for doing in without_interruptions(day[name])]
-        found = {(d.begin, d.end) for d in planned if d.task == "dinner"}
-        assert len(found) == 1
-        times += found
+        dinners = {(d.begin, d.end) for d in planned if d.task == "dinner"}
+        assert len(dinners) == 1
+        times += dinners
     assert len({begin for begin, _ in times}) > 50
 
 

@@ -33,8 +33,8 @@ def drawn(law: Law, count: int = 6000) -> list[int]:
 
 
 def test_the_normal_table_holds_the_quantiles_of_the_normal_law() -> None:
-    wanted = [NormalDist().inv_cdf((i + 0.5) / KNOTS) for i in range(KNOTS)]
-    assert wanted == pytest.approx(list(NORMAL), abs=1e-5)
+    expected = [NormalDist().inv_cdf((i + 0.5) / KNOTS) for i in range(KNOTS)]
+    assert expected == pytest.approx(list(NORMAL), abs=1e-5)
 
 
 @given(st.floats(-30, 30))
@@ -59,8 +59,12 @@ def test_a_gamma_law_has_the_quantiles_of_the_gamma_law() -> None:
     # Shape 4, scale 450 s: the quantiles at 10, 50 and 90 %, from tables of chi-squared / 2.
     law = gamma(1800, 900)
     values = sorted(drawn(law, 20_000))
-    for share, wanted in ((0.1, 3.490 / 2 * 450), (0.5, 7.344 / 2 * 450), (0.9, 13.362 / 2 * 450)):
-        assert wanted == pytest.approx(values[int(share * len(values))], rel=0.03)
+    for share, expected in (
+        (0.1, 3.490 / 2 * 450),
+        (0.5, 7.344 / 2 * 450),
+        (0.9, 13.362 / 2 * 450),
+    ):
+        assert expected == pytest.approx(values[int(share * len(values))], rel=0.03)
 
 
 def test_an_exponential_law_is_that_of_waiting() -> None:
@@ -102,8 +106,8 @@ def test_between_equal_bounds_there_is_one_value() -> None:
 
 def test_weights_are_shares() -> None:
     draws = Draws(KEY, 2)
-    found = [draw_weighted(draws, [1, 0, 3]) for _ in range(4000)]
-    assert 0 == found.count(1)
-    assert 0.25 == pytest.approx(found.count(0) / 4000, abs=0.03)
+    indices = [draw_weighted(draws, [1, 0, 3]) for _ in range(4000)]
+    assert 0 == indices.count(1)
+    assert 0.25 == pytest.approx(indices.count(0) / 4000, abs=0.03)
     with pytest.raises(ValueError, match="bound"):
         draw_weighted(draws, [0, 0])

@@ -44,12 +44,12 @@ def names(stored: Run) -> list[str]:
 def rooms(stored: Run, still_s: int = 20) -> list[str]:
     """The rooms in which the robot stood still, in order."""
     poses = path(stored, "astro")
-    found = []
+    names_of_rooms = []
     for xy, steps in groupby(zip(poses.x.tolist(), poses.y.tolist(), strict=True)):
         if sum(1 for _ in steps) >= still_s:
             room = stored.plan.room_at(*xy)
-            found.append("" if room is None else room.name)
-    return [room for room, _ in groupby(found)]
+            names_of_rooms.append("" if room is None else room.name)
+    return [room for room, _ in groupby(names_of_rooms)]
 
 
 def assert_same_for_every_max_span(content: dict[str, Any], *spans: int) -> Run:

@@ -69,7 +69,7 @@ def home_file(folder: Path, which: str) -> Path:
     ],
 )
 def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which: str) -> None:
-    behaviors, wanted = DAYS[name]
+    behaviors, expected = DAYS[name]
     ana = fleet2d.load_scenario("bundled:base").users["ana"].model_dump(mode="json")
     body = {"battery": BATTERY} if "dock" in behaviors else {}
     content = {
@@ -80,7 +80,7 @@ def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which:
         "algorithms": SHARE,
     }
     stored = run(content)
-    assert wanted <= {event for _, event, _ in events(stored)}
+    assert expected <= {event for _, event, _ in events(stored)}
     # The body never leaves the space that it fits in.
     plan, space = stored.plan, fleet2d.Home(stored.plan).space(0.15)
     poses = path(stored, "astro")
@@ -130,11 +130,11 @@ def product() -> dict[str, Any]:
 
 def test_all_at_once_is_the_same_for_every_max_span_and_for_copies() -> None:
     stored = assert_same_for_every_max_span(product(), 61, 7)
-    wanted = {
+    expected = {
         "docks", "charged", "visits", "find_begins", "found", "approaches", "interacts", "follows",
         "explores", "explored", "gives_way", "relocates",
     }  # fmt: skip
-    assert wanted <= {event for _, event, _ in events(stored)}
+    assert expected <= {event for _, event, _ in events(stored)}
     simulation = fleet2d.Simulation(product())
     for steps in (1234, 3210, 3000):
         simulation.advance(steps)

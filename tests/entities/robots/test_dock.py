@@ -19,8 +19,10 @@ def charged(behaviors: list[Any], duration: str = "6 h", **battery: Any) -> dict
 
 
 def levels(stored: Any) -> list[float]:
-    told = [detail for _, name, detail in events(stored) if name in ("battery", "docks", "charged")]
-    return [float(detail.split(" ")[0]) for detail in told]
+    details = [
+        detail for _, name, detail in events(stored) if name in ("battery", "docks", "charged")
+    ]
+    return [float(detail.split(" ")[0]) for detail in details]
 
 
 def test_it_charges_in_time_and_the_patrol_goes_on() -> None:

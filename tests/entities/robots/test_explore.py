@@ -14,14 +14,14 @@ def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others() -> None:
         ["explore", {"type": "patrol", "rooms": ["kitchen"], "dwell": "1 d"}], "15 min"
     )
     stored = assert_same_for_every_max_span(content, 61)
-    told = [
+    rows = [
         (name, float(detail.split(" ")[0]))
         for _, name, detail in events(stored)
         if name.startswith("explore")
     ]
-    shares = [share for _, share in told]
+    shares = [share for _, share in rows]
     assert shares == sorted(shares)
-    assert ("explored", pytest.approx(98.5, abs=1.5)) == told[-1]
+    assert ("explored", pytest.approx(98.5, abs=1.5)) == rows[-1]
     assert names(stored).count("explored") == 1
     poses = path(stored, "astro")
     assert "kitchen_0" == stored.plan.room_at(float(poses.x[-1]), float(poses.y[-1])).name

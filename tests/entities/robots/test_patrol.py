@@ -28,14 +28,14 @@ def patrol(duration: str = "1 h", **fields: Any) -> dict[str, Any]:
 def stops(stored: Run, still_s: int = 55) -> list[tuple[float, float, int]]:
     """Where it stood for long, in order: x, y and for how many steps."""
     poses = path(stored, "astro")
-    found = []
+    stops = []
     for key, steps in groupby(
         zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True)
     ):
         count = sum(1 for _ in steps)
         if count >= still_s:
-            found.append((key[0], key[1], count))
-    return found
+            stops.append((key[0], key[1], count))
+    return stops
 
 
 def room_names(stored: Run) -> list[str]:
@@ -72,8 +72,8 @@ def test_it_stands_at_the_middle_of_a_room() -> None:
 def test_waypoints_are_met_exactly() -> None:
     points = [(1.0, 1.0), (7.0, 1.0), (7.0, 6.0)]
     places = [place[:2] for place in stops(run(patrol(waypoints=points, look_around=False)))]
-    for place, wanted in zip(places[:6], points * 2, strict=True):
-        assert place == pytest.approx(wanted, abs=1e-3)
+    for place, expected in zip(places[:6], points * 2, strict=True):
+        assert place == pytest.approx(expected, abs=1e-3)
 
 
 def test_a_look_around_is_one_whole_turn() -> None:

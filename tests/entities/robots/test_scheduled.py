@@ -21,10 +21,10 @@ REST = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_aroun
 def test_visits_are_made_at_their_times_and_days() -> None:
     content = home_with([{"type": "scheduled", "visits": VISITS}, REST])
     stored = assert_same_for_every_max_span(content)
-    found = [(step, detail) for step, name, detail in events(stored) if name == "visits"]
-    assert ["sweep", "bedroom_0"] == [detail for _, detail in found]
-    assert 600 < found[0][0] < 620
-    assert 1800 < found[1][0] < 1830
+    rows = [(step, detail) for step, name, detail in events(stored) if name == "visits"]
+    assert ["sweep", "bedroom_0"] == [detail for _, detail in rows]
+    assert 600 < rows[0][0] < 620
+    assert 1800 < rows[1][0] < 1830
     assert ["living_room_0", "kitchen_0", "living_room_0", "bedroom_0", "living_room_0"] == rooms(
         stored
     )
@@ -41,9 +41,9 @@ def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late() -> None:
     patient = {"type": "scheduled", "visits": VISITS[:2], "preempts": False, "late": "12 min"}
     busy = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "20 min", "look_around": False}
     stored = run(home_with([patient, busy]))
-    found = [(step // 60, detail) for step, name, detail in events(stored) if name == "visits"]
+    rows = [(step // 60, detail) for step, name, detail in events(stored) if name == "visits"]
     # The first is made when the robot is free, 10 min late; the second would be 16 min late.
-    assert [(20, "sweep")] == found
+    assert [(20, "sweep")] == rows
 
 
 GATE = {"gate": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
@@ -59,12 +59,12 @@ def test_a_visit_behind_a_shut_door_is_made_once_it_is_open_or_left_out(
         objects={"gate": {**GATE["gate"], "schedule": agenda}},
     )
     stored = assert_same_for_every_max_span(content, 61)
-    found = [(step, name) for step, name, _ in events(stored)]
+    rows = [(step, name) for step, name, _ in events(stored)]
     blocked = [(600, "way_blocked")]
-    assert blocked == found[:1]
-    assert ["way_blocked", *["visits"] * visited] == [name for _, name in found]
+    assert blocked == rows[:1]
+    assert ["way_blocked", *["visits"] * visited] == [name for _, name in rows]
     if visited:
-        assert 1500 < found[1][0] < 1540
+        assert 1500 < rows[1][0] < 1540
 
 
 @pytest.mark.parametrize(

@@ -97,8 +97,8 @@ def test_groups_are_drawn_by_their_shares() -> None:
 
 def test_people_of_the_survey_live_in_the_home() -> None:
     stored = run(scenario("3 d", users=users(3, group="at_home")))
-    told = set(table(stored, "events", event="activity")["detail"])
-    assert {"sleep", "cook", "tv", "toilet", "wash_hands", "drink"} <= told
+    details = set(table(stored, "events", event="activity")["detail"])
+    assert {"sleep", "cook", "tv", "toilet", "wash_hands", "drink"} <= details
     assert timedelta(days=3).total_seconds() == stored.manifest["steps"]
 
 

@@ -124,8 +124,8 @@ def family(**manners: Any) -> dict[str, Any]:
 def test_every_table_is_the_same_for_every_max_span() -> None:
     lively = family(turns=1, steps_aside=1, leaves=1, comes=1, stops=0.5, patience="5 s")
     stored = run(lively)
-    told = table(stored, "events", event="reacts")["detail"]
-    assert {"turns", "comes", "leaves", "steps"} == {detail.split()[0] for detail in told}
+    details = table(stored, "events", event="reacts")["detail"]
+    assert {"turns", "comes", "leaves", "steps"} == {detail.split()[0] for detail in details}
     for span in (1, 7) if THOROUGH else (7,):
         assert digests(stored) == digests(run(lively, max_span=span))
 
@@ -167,20 +167,20 @@ def test_who_gives_up_what_it_did_rests() -> None:
     content["users"]["ana"]["behaviors"].append({"type": "routine", "persona": activity})
     content["users"]["ana"]["start"] = "living_room"
     content["simulation"]["start"] = "2026-01-05T09:00"
-    told = table(run(content), "events", entity="ana", event="activity")["detail"].tolist()
-    assert ["read", "rest"] == told
+    details = table(run(content), "events", entity="ana", event="activity")["detail"].tolist()
+    assert ["read", "rest"] == details
 
 
 def test_manners_are_the_personas_unless_given() -> None:
-    def kept(*behaviors: Any) -> Any:
+    def manners_of(*behaviors: Any) -> Any:
         users = {"ana": {"behaviors": list(behaviors)}}
         return Simulation(scenario(users=users)).actors["ana"].behaviors[0].used_manners
 
     routine = {"type": "routine", "persona": "child"}
-    assert bundled_persona("child").manners == kept("reactions", routine)
-    assert 0.25 == kept({"type": "reactions", "manners": {"turns": 0.25}}, routine).turns
+    assert bundled_persona("child").manners == manners_of("reactions", routine)
+    assert 0.25 == manners_of({"type": "reactions", "manners": {"turns": 0.25}}, routine).turns
     household = {"members": {"ben": "retired", "ana": "child"}}
-    assert bundled_persona("child").manners == kept(
+    assert bundled_persona("child").manners == manners_of(
         "reactions", {"type": "routine", "household": household}
     )
 

@@ -55,7 +55,7 @@ def notes(stored: Run) -> list[str]:
     return [str(detail) for detail in table(stored, "events", event="replay")["detail"]]
 
 
-def told(stored: Run, *names: str) -> list[tuple[int, str, str]]:
+def events_named(stored: Run, *names: str) -> list[tuple[int, str, str]]:
     rows = table(stored, "events", entity="ben")
     columns = (rows[name] for name in ("step", "event", "detail"))
     return [row for row in zip(*columns, strict=True) if row[1] in names]
@@ -135,7 +135,7 @@ def test_intervals_that_abut_are_left_early_and_begin_on_time(tmp_path: Path) ->
     assert [
         (at("07:20:00"), "left_home", ""),
         (at("07:25:00"), "came_home", ""),
-    ] == told(stored, "left_home", "came_home")
+    ] == events_named(stored, "left_home", "came_home")
 
 
 def test_who_begins_last_holds_and_what_outlasts_it_holds_again(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_a_gap_is_unknown_and_not_made_up(tmp_path: Path) -> None:
         (1, "unknown", ""),
         (at("07:12:00"), "known", "kitchen"),
         (at("07:12:01"), "unknown", ""),
-    ] == told(stored, "unknown", "known", "left_home", "came_home")
+    ] == events_named(stored, "unknown", "known", "left_home", "came_home")
     assert ["bedroom", None, None, "kitchen", None] == [
         rooms[k] for k in (0, 1, at("07:11:59"), at("07:12:00"), at("07:12:01"))
     ]
@@ -197,7 +197,7 @@ def test_silence_after_the_front_door_until_it_opens_again_is_being_out(tmp_path
         (at("07:02:06"), "left_home", ""),
         (at("07:20:00"), "came_home", ""),
         (at("07:21:01"), "unknown", ""),
-    ] == told(stored, "unknown", "known", "left_home", "came_home")
+    ] == events_named(stored, "unknown", "known", "left_home", "came_home")
 
 
 @pytest.mark.parametrize(
@@ -287,8 +287,8 @@ def test_after_another_behavior_it_walks_to_where_the_log_has_it(tmp_path: Path)
         rooms[at(clock)] for clock in ("07:06:00", "07:06:01", "07:20:00")
     ]
     poses = path(run(content), "ben")
-    left = at("07:05:20")
-    assert np.hypot(np.diff(poses.x), np.diff(poses.y))[left - 5 : left + 30].max() < 1.01
+    leave = at("07:05:20")
+    assert np.hypot(np.diff(poses.x), np.diff(poses.y))[leave - 5 : leave + 30].max() < 1.01
 
 
 def test_asked_anew_in_the_middle_it_goes_on_as_the_log_says(tmp_path: Path) -> None:
@@ -440,7 +440,9 @@ def test_fixes_in_walls_are_moved_off_and_those_outside_the_home_left_out(tmp_pa
 def test_a_gap_between_fixes_is_unknown_held_or_walked(tmp_path: Path) -> None:
     log = fixes(tmp_path, [(0, 1, 1), (5, 1, 1), (600, 4, 1)])
     stored = run(replay(log, "11 min"))
-    assert [(6, "unknown"), (600, "known")] == [row[:2] for row in told(stored, "unknown", "known")]
+    assert [(6, "unknown"), (600, "known")] == [
+        row[:2] for row in events_named(stored, "unknown", "known")
+    ]
     gone = path(stored, "ben").away
     assert not gone[:6].any()
     assert gone[6:600].all()

@@ -29,8 +29,8 @@ def sampled(duration: str, **fields: Any) -> Run:
 def shares(stored: Run) -> dict[str, float]:
     """The share of steps in each room, by kind."""
     rooms = path(stored, "ana").room
-    found = {room.type: float((rooms == room.index).mean()) for room in stored.plan.rooms}
-    return {**found, "away": float((rooms < 0).mean())}
+    shares_of_time = {room.type: float((rooms == room.index).mean()) for room in stored.plan.rooms}
+    return {**shares_of_time, "away": float((rooms < 0).mean())}
 
 
 @pytest.mark.parametrize(
@@ -48,8 +48,8 @@ def test_time_in_each_room_tends_to_its_share_ways_included(
 
 def test_the_error_shrinks_with_time() -> None:
     def error(duration: str) -> float:
-        found = stay("5 min", duration)
-        return max(abs(found[room] - share) for room, share in SHARES.items())
+        measured = stay("5 min", duration)
+        return max(abs(measured[room] - share) for room, share in SHARES.items())
 
     assert error("20 d") < error("12 h") / 2
 

@@ -66,8 +66,8 @@ def family(duration: str = "2 d", **household: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("name", bundled_names())
 def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name: str) -> None:
     stored = run(lives(name, "7 d"))
-    told = set(table(stored, "events", event="activity")["detail"])
-    assert {"sleep"} < told
+    details = set(table(stored, "events", event="activity")["detail"])
+    assert {"sleep"} < details
 
 
 @pytest.mark.parametrize("span", [7, 1])
@@ -112,12 +112,12 @@ def test_a_run_can_branch_in_the_middle_of_an_activity() -> None:
 def test_it_does_what_its_day_says_when_it_says_so() -> None:
     stored = run(lives(SHORT, "3 h", simulation={"start": "2026-01-05T06:30"}))
     events = table(stored, "events", entity="ana")
-    told = [d for d, e in zip(events["detail"], events["event"], strict=True) if e == "activity"]
-    assert ["sleep", "breakfast"] == told[:2]
+    details = [d for d, e in zip(events["detail"], events["event"], strict=True) if e == "activity"]
+    assert ["sleep", "breakfast"] == details[:2]
     poses = path(stored, "ana")
     gone = np.flatnonzero(poses.away)
-    left, back = 90 * 60, 150 * 60  # 08:00 to 09:00, and the way to the door
-    assert left < gone[0] < left + 30
+    leave, back = 90 * 60, 150 * 60  # 08:00 to 09:00, and the way to the door
+    assert leave < gone[0] < leave + 30
     assert back - 1 == gone[-1]
 
 
@@ -147,8 +147,8 @@ def test_small_moves_can_be_switched_off() -> None:
         return int((np.diff(heading) != 0).sum())
 
     assert stirs(still) < stirs(restless)
-    told = [list(table(s, "events", event="activity")["detail"]) for s in (still, restless)]
-    assert told[0] == told[1]
+    details = [list(table(s, "events", event="activity")["detail"]) for s in (still, restless)]
+    assert details[0] == details[1]
 
 
 def test_an_activity_is_done_at_its_furniture_in_its_posture() -> None:
@@ -232,8 +232,8 @@ def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
     content = scenario(
         "20 min", users={"ana": {"start": "bathroom", "behaviors": [detour, routine]}}
     )
-    told = table(run(content), "events", entity="ana", event="activity")["detail"]
-    assert "breakfast" in told
+    details = table(run(content), "events", entity="ana", event="activity")["detail"]
+    assert "breakfast" in details
 
 
 @pytest.mark.parametrize(
@@ -304,9 +304,9 @@ def test_nobody_comes_into_the_bathroom_while_another_is_there() -> None:
 
 def test_a_plan_goes_on_over_midnight_without_telling_it_twice() -> None:
     stored = run(lives(duration="4 d"))
-    told = table(stored, "events", entity="ana", event="activity")
-    assert all(a != b for a, b in itertools.pairwise(told["detail"].tolist()))
-    assert not (told["step"] % 86400 == 17 * 3600).any()  # it begins at 07:00: that is midnight
+    details = table(stored, "events", entity="ana", event="activity")
+    assert all(a != b for a, b in itertools.pairwise(details["detail"].tolist()))
+    assert not (details["step"] % 86400 == 17 * 3600).any()  # it begins at 07:00: that is midnight
 
 
 def test_a_member_says_in_its_household_when_it_is_away() -> None:

@@ -70,8 +70,8 @@ def test_it_begins_where_the_item_before_the_run_leaves_it(morning: Run) -> None
 
 
 def test_it_sets_out_exactly_when_an_item_begins_or_is_over(morning: Run) -> None:
-    wanted = ["07:02", "07:06", "07:16", "07:30", "07:45:30"]
-    assert [step_of(text) for text in wanted] == departures(morning)
+    expected = ["07:02", "07:06", "07:16", "07:30", "07:45:30"]
+    assert [step_of(text) for text in expected] == departures(morning)
 
 
 def test_after_a_dwell_with_nothing_due_it_rests(morning: Run) -> None:
@@ -83,10 +83,10 @@ def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning: Run) -> None:
     at = step_of("07:45:30")
     leg = slice(at, at + 60)
     length = np.sqrt(np.diff(poses.x[leg]) ** 2 + np.diff(poses.y[leg]) ** 2).sum()
-    arrived = next(k for k in range(at, at + 60) if (poses.x[k], poses.y[k]) == (1.0, 3.0))
-    assert arrived - at < length / 1.0 + 2 * 360 / 180 + 2  # m at 1 m/s, and two turns
+    arrive = next(k for k in range(at, at + 60) if (poses.x[k], poses.y[k]) == (1.0, 3.0))
+    assert arrive - at < length / 1.0 + 2 * 360 / 180 + 2  # m at 1 m/s, and two turns
     assert {(1.0, 3.0)} == set(
-        zip(poses.x[arrived:].tolist(), poses.y[arrived:].tolist(), strict=True)
+        zip(poses.x[arrive:].tolist(), poses.y[arrive:].tolist(), strict=True)
     )
 
 
@@ -106,7 +106,7 @@ def test_away_and_back_is_at_one_and_the_same_place(morning: Run) -> None:
 
 def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: Run) -> None:
     events = table(morning, "events", entity="ana")
-    told = {
+    step_of_event = {
         (event, detail): step
         for event, detail, step in zip(
             events["event"], events["detail"], events["step"], strict=True
@@ -114,18 +114,22 @@ def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: 
     }
     poses = path(morning, "ana")
     gone = np.flatnonzero(poses.away)
-    assert gone[0] == told["left_home", ""]
-    assert gone[-1] + 1 == told["came_home", ""]
-    assert gone[0] == told["activity", "errand"]
+    assert gone[0] == step_of_event["left_home", ""]
+    assert gone[-1] + 1 == step_of_event["came_home", ""]
+    assert gone[0] == step_of_event["activity", "errand"]
     still = [step_of("07:02"), step_of("07:06"), step_of("07:16")]
-    arrivals = [told["activity", "wash"], told["activity", "breakfast"], told["activity", "rest"]]
-    for left, arrived in zip(still, arrivals, strict=True):
-        assert left < arrived < left + 30
-        assert (poses.x[arrived], poses.y[arrived]) == (
-            poses.x[arrived + 60],
-            poses.y[arrived + 60],
+    arrivals = [
+        step_of_event["activity", "wash"],
+        step_of_event["activity", "breakfast"],
+        step_of_event["activity", "rest"],
+    ]
+    for leave, arrive in zip(still, arrivals, strict=True):
+        assert leave < arrive < leave + 30
+        assert (poses.x[arrive], poses.y[arrive]) == (
+            poses.x[arrive + 60],
+            poses.y[arrive + 60],
         )
-        assert (poses.x[arrived - 1], poses.y[arrived - 1]) != (poses.x[arrived], poses.y[arrived])
+        assert (poses.x[arrive - 1], poses.y[arrive - 1]) != (poses.x[arrive], poses.y[arrive])
 
 
 def test_a_step_that_does_not_divide_the_times_takes_effect_at_the_next_step() -> None:
