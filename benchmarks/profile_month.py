@@ -25,7 +25,7 @@ from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
-from fleet2d.engine.seen import SeenArea
+from fleet2d.engine.seen_area import SeenArea
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.decisions import DecidingActor

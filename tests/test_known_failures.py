@@ -317,7 +317,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         "trajectories": "1 min", "key_frames": False, "observations": False, "events": False,
         "outputs": False,
     },
-    (SightSettings, "sight"): {"method": {"type": f"{TESTS.as_posix()}/engine/test_verdicts:XRay"}},
+    (SightSettings, "sight"): {"method": {"type": f"{TESTS.as_posix()}/engine/test_points_in_view:XRay"}},
 }  # fmt: skip
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {

@@ -36,8 +36,8 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from fleet2d.component_class import ComponentClass
 from fleet2d.errors import ScenarioError
-from fleet2d.outside import BrokenModule, class_path, import_class
 from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, shown, unknown_key
+from fleet2d.user_modules import BrokenModule, class_path, import_class
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -149,8 +149,8 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
         >>> code_of({"algorithms": {"share": {"type": "/home/ana/mine:Share"}}})
         {PosixPath('/home/ana/mine.py'): ['algorithms.share.type']}
     """
-    from fleet2d.outside import files_of
     from fleet2d.paths import folder_of
+    from fleet2d.user_modules import files_of
 
     code: dict[Path, list[str]] = {}
     for key, name in _class_paths(scenario, ()):

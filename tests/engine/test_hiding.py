@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from tests.engine.test_verdicts import HERE, METHODS, with_odd_cameras
+from tests.engine.test_points_in_view import HERE, METHODS, with_odd_cameras
 from tests.reference.look import hides
 from tests.scenes import digests, each_step, run, scenario
 

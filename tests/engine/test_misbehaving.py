@@ -16,8 +16,8 @@ from fleet2d import Algorithm, Behavior, Metric
 from fleet2d.blame import blame
 from fleet2d.cli.watchdog import watched
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
-from fleet2d.outside import import_class
 from fleet2d.runs.run import open_run
+from fleet2d.user_modules import import_class
 
 
 class Text(Exception):

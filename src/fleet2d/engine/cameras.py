@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.activities import ActivitySense
 from fleet2d.blame import blame
 from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.engine.disturbing import (
+from fleet2d.engine.disturbances import (
     carry_over,
     dark_cameras,
     forced_of,
@@ -17,7 +17,7 @@ from fleet2d.engine.disturbing import (
     present_errors,
     worsen,
 )
-from fleet2d.engine.verdicts import points_seen
+from fleet2d.engine.points_in_view import points_seen
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.localization import Drift, Localization

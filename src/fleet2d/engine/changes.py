@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from fleet2d.clock import Clock, midnight_of
-from fleet2d.engine.passing import crossings, way_ahead
+from fleet2d.engine.door_crossings import crossings, way_ahead
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.motion import Track
 from fleet2d.entities.objects.door import Door, how_to_hang_a_door

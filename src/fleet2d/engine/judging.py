@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from fleet2d.artifacts.manifest import Status
-from fleet2d.engine.expecting import expect
-from fleet2d.engine.steering import Steering
+from fleet2d.engine.control import Steering
+from fleet2d.engine.expectations import expect
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.parse import parse_expectation

@@ -17,7 +17,7 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.component import Component
 from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.seen import SeenArea
+from fleet2d.engine.seen_area import SeenArea
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ComponentError

@@ -7,7 +7,7 @@ from fleet2d.engine.interventions import OUTSIDE, SCRIPT, PendingIntervention
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.errors import ScenarioError
-from fleet2d.interventions.happenings import check_trigger
+from fleet2d.interventions.possible_events import check_trigger
 from fleet2d.interventions.script import Entry
 from fleet2d.interventions.when import ClockTime
 from fleet2d.units import format_duration, micros

@@ -16,7 +16,7 @@ from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.garbage import rare_collections
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.judging import Judging
-from fleet2d.engine.keeping import (
+from fleet2d.engine.lifecycle import (
     deferred_interrupt,
     describe_end,
     describe_start,

@@ -25,9 +25,9 @@ from fleet2d.floorplan.home.costmap import CostedSpace
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.outside import is_scenario_module, public_name
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
+from fleet2d.user_modules import is_scenario_module, public_name
 from fleet2d.version import __version__
 
 _HASH = type(hashlib.sha256())
@@ -85,7 +85,7 @@ _NO_STATE = (
     "fleet2d.engine.snapshot",
     "fleet2d.fit",
     "fleet2d.leaves",
-    "fleet2d.outside",
+    "fleet2d.user_modules",
     "fleet2d.paper",
     "fleet2d.published",
     "fleet2d.scenario",

@@ -32,7 +32,7 @@ from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
 
 if TYPE_CHECKING:
-    from fleet2d.engine.expecting import Expecting
+    from fleet2d.engine.expectations import Expecting
 
 # The most steps that watchers take in together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16

@@ -13,7 +13,7 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
 from fleet2d.engine.gauges import Block, Gauge, ValueGauge
-from fleet2d.engine.measuring import BatteryGauge, gauge_of
+from fleet2d.engine.signal_gauges import BatteryGauge, gauge_of
 from fleet2d.engine.state import State
 from fleet2d.engine.tables import STEP, TIME
 from fleet2d.entities.actor import Actor
