@@ -242,9 +242,9 @@ def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:
 
 def compiled_lines() -> Callable[..., int]:
     """Return what counts the pairs in sight: it locates each eye, then follows the line."""
-    from fleet2d.kernels.chambers import see_each
+    from fleet2d.kernels.chambers import pairs_in_sight
 
-    return lambda mesh, eyes, points: int(see_each(mesh, eyes, points).sum())
+    return lambda mesh, eyes, points: int(pairs_in_sight(mesh, eyes, points).sum())
 
 
 # --- Peers -------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from fleet2d.floorplan.geometry.gates import Gates
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.chambers import see_each
+from fleet2d.kernels.chambers import pairs_in_sight
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import region_contains_points, visible_region
@@ -139,7 +139,7 @@ def compare(mesh: Mesh, walls: I64, doors: I64, eye: I64, points: I64) -> tuple[
     is_cell &= (column < columns) & (row < rows)
     wrong = [
         (points_in_sight(mesh, x, y, points) != expected).sum(),
-        (see_each(mesh, points, np.broadcast_to(eye, points.shape).copy()) != expected).sum(),
+        (pairs_in_sight(mesh, points, np.broadcast_to(eye, points.shape).copy()) != expected).sum(),
         (in_region != expected).sum(),
         (mask[row[is_cell], column[is_cell]] != expected[is_cell]).sum(),
     ]

@@ -1,4 +1,4 @@
-// Arrays as kernels see them: a view of memory that somebody else owns, and an array that owns it.
+// Arrays: a view of memory that it doesn't own, and an array that owns its memory.
 #pragma once
 
 #include <algorithm>
@@ -112,24 +112,24 @@ public:
 
     // An array whose elements are not set yet.
     static Array empty(std::array<i64, N> shape) {
-        Array made;
-        made.shape_ = shape;
-        made.data_ = std::make_unique_for_overwrite<T[]>(static_cast<std::size_t>(made.count()));
-        return made;
+        Array result;
+        result.shape_ = shape;
+        result.data_ = std::make_unique_for_overwrite<T[]>(static_cast<std::size_t>(result.count()));
+        return result;
     }
 
     static Array filled(std::array<i64, N> shape, T value) {
-        Array made = empty(shape);
-        std::fill_n(made.data_.get(), made.count(), value);
-        return made;
+        Array result = empty(shape);
+        std::fill_n(result.data_.get(), result.count(), value);
+        return result;
     }
 
     static Array zeros(std::array<i64, N> shape) { return filled(shape, T{}); }
 
     static Array copy_of(View<const T, N> view) {
-        Array made = empty(view.shape);
-        copy_into(view, made.view());
-        return made;
+        Array result = empty(view.shape);
+        copy_into(view, result.view());
+        return result;
     }
 
     View<T, N> view() { return {data_.get(), shape_}; }
@@ -163,7 +163,7 @@ public:
         *this = std::move(larger);
     }
 
-    // Give the memory away, to an owner that deletes it with delete[].
+    // Release the memory to an owner that deletes it with delete[].
     T* release() { return data_.release(); }
 
 private:

@@ -21,7 +21,7 @@ i16 label_beside(View<const i16, 2> labels, GridCell cell) {
 
 }  // namespace
 
-Array<bool> see_each(const Mesh& mesh, View<const i64, 2> eyes, View<const i64, 2> places) {
+Array<bool> pairs_in_sight(const Mesh& mesh, View<const i64, 2> eyes, View<const i64, 2> places) {
     auto seen = Array<bool>::empty({eyes.size()});
     i64 triangle = OUTSIDE;
     for (i64 i = 0; i < eyes.size(); ++i) {
@@ -34,8 +34,8 @@ Array<bool> see_each(const Mesh& mesh, View<const i64, 2> eyes, View<const i64, 
 
 Array<i64, 2> label_frames(View<const i32, 2> labels, i64 count) {
     const auto [rows, columns] = labels.shape;
-    auto made = Array<i64, 2>::zeros({count, 4});
-    const View<i64, 2> frames = made;
+    auto result = Array<i64, 2>::zeros({count, 4});
+    const View<i64, 2> frames = result;
     for (i64 label = 0; label < count; ++label) {
         frames(label, 0) = frames(label, 1) = std::max(rows, columns);
     }
@@ -49,25 +49,25 @@ Array<i64, 2> label_frames(View<const i32, 2> labels, i64 count) {
             frame[3] = std::max(frame[3], column + 1);
         }
     }
-    return made;
+    return result;
 }
 
-Array<i16, 2> fill_beside(View<const i16, 2> labels) {
-    auto made = Array<i16, 2>::copy_of(labels);
-    const View<i16, 2> filled = made;
+Array<i16, 2> fill_from_neighbors(View<const i16, 2> labels) {
+    auto result = Array<i16, 2>::copy_of(labels);
+    const View<i16, 2> filled = result;
     for (i64 row = 0; row < labels.shape[0]; ++row) {
         for (i64 column = 0; column < labels.shape[1]; ++column) {
             if (labels(row, column) == NO_LABEL) filled(row, column) = label_beside(labels, {row, column});
         }
     }
-    return made;
+    return result;
 }
 
 Array<i32, 2> spread_labels(View<const i32, 2> labels, View<const bool, 2> mask) {
-    auto made = Array<i32, 2>::filled(labels.shape, NO_LABEL);
-    const View<i32, 2> spread = made;
-    auto steps_made = Array<i32, 2>::zeros(labels.shape);
-    const View<i32, 2> steps = steps_made;
+    auto result = Array<i32, 2>::filled(labels.shape, NO_LABEL);
+    const View<i32, 2> spread = result;
+    auto step_counts = Array<i32, 2>::zeros(labels.shape);
+    const View<i32, 2> steps = step_counts;
     std::queue<GridCell> waiting;
     for (i64 row = 0; row < labels.shape[0]; ++row) {
         for (i64 column = 0; column < labels.shape[1]; ++column) {
@@ -93,7 +93,7 @@ Array<i32, 2> spread_labels(View<const i32, 2> labels, View<const bool, 2> mask)
             }
         }
     }
-    return made;
+    return result;
 }
 
 }  // namespace fleet2d

@@ -1,4 +1,4 @@
-// Evidence in bins of time: how much of each room and of each patch was in view; and what presence adds up to.
+// Evidence in bins of time: how much of each room and of each patch was in view; and sums of presence by hour.
 #pragma once
 
 #include <tuple>
@@ -8,9 +8,9 @@
 
 namespace fleet2d {
 
-// The patches that rooms are cut into.
+// The patches of rooms.
 struct PatchSizes {
-    View<const i64> room;        // (patches,) the room of each, ascending; every room has one
+    View<const i64> room;        // (patches,) the room of each patch, ascending; every room has at least one
     View<const i64> cells;       // (patches,) cells of each
     View<const i64> room_cells;  // (rooms,) cells of each room, 1 at least
 };
@@ -19,26 +19,26 @@ struct PatchSizes {
 struct Views {
     Array<f64, 2> room_watched;   // (bins, rooms) share of cells in view, averaged over the steps of the bin
     Array<f64, 2> patch_watched;  // (bins, patches) the same by patches
-    Array<f64, 2> shown;          // (bins, patches) share of the patch's cells in view at one step, at most
+    Array<f64, 2> shown;          // (bins, patches) largest share of the patch's cells in view at one step
     Array<u8, 2> shown_parts;     // (bins, patches) `shown` in parts of 255, a half to the even one
 };
 
-// Bring cells in view into shares. `cells` (bins, robots, 2, patches) are summed over the steps of a bin, and at most
-// at one step, and lie in one piece; of several robots, the one that saw most counts.
+// Convert cells in view to shares. `cells` (bins, robots, 2, patches), contiguous, are the sum over the steps of a bin,
+// and the maximum; of several robots, the one that saw most counts.
 Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_steps);
 
-// Where a person was in consecutive stretches of bins.
+// The probabilities of a person's places in consecutive stretches of bins.
 struct Chain {
     View<const f64, 2> places;  // (stretches, places) probability of each place, away last
-    View<const i64> bins;       // (stretches,) how many bins each has, 1 at least
+    View<const i64> bins;       // (stretches,) number of bins, at least 1
 };
 
-// Sum what presence adds up by hour, in the order in which NumPy's add.reduceat sums over the first axis.
+// Sum presence by hour, in the order in which NumPy's add.reduceat sums over the first axis.
 //
-// There is a chain of each user, all of as many bins. `unknown` (bins, places - 1) says in which rooms somebody was
-// who is no user. `first` are the bins at which hours begin, the first of them 0. Of each hour come, for each user and
-// for anyone (a last one, unless there is but one chain and `users` is 0), the sums of the probability p of each place,
-// of p (1 - p), and of 1: (hours, users + 1, 2 places + 1).
+// There is one chain for each user, all with the same number of bins. `unknown` (bins, places - 1) are the rooms with
+// an unknown person. `first` are the bins at which hours begin, the first of them 0. Returns, for each hour, each user
+// and last anyone (without users, the only chain is that of anyone), the sums of the probability p of each place, of p
+// (1 - p), and of 1: (hours, users + 1, 2 places + 1).
 Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users,
                          View<const i64> first);
 

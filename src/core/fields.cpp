@@ -15,8 +15,8 @@ namespace {
 // Each cell's distance to the nearest cell of its column that is not in the mask, `endless` for none.
 Array<i64, 2> column_gaps(View<const bool, 2> mask, i64 endless) {
     const auto [rows, columns] = mask.shape;
-    auto made = Array<i64, 2>::empty(mask.shape);
-    const View<i64, 2> gap = made;
+    auto result = Array<i64, 2>::empty(mask.shape);
+    const View<i64, 2> gap = result;
     for (i64 row = 0; row < rows; ++row) {
         for (i64 column = 0; column < columns; ++column) {
             const i64 below = row > 0 ? gap(row - 1, column) : endless;
@@ -28,7 +28,7 @@ Array<i64, 2> column_gaps(View<const bool, 2> mask, i64 endless) {
             gap(row, column) = std::min(gap(row, column), gap(row + 1, column) + 1);
         }
     }
-    return made;
+    return result;
 }
 
 // The squared distances of the cells of a row, from the gaps of its columns: the lower envelope of
@@ -71,7 +71,7 @@ private:
     Array<i64> start_;  // first column at which each of them is the lowest
 };
 
-// A grid with a wall all round, so that no step leads out, and what is known of walking on it.
+// A grid with a wall around it, so that no step leads out, and the state of the search on it.
 // Cells are numbered row by row.
 class Walk {
 public:
@@ -88,7 +88,7 @@ public:
 
     void start_at(GridCell goal) { reach(number(goal), 0, straight_); }
 
-    // Settle the nearest cell that waits; false if none does.
+    // Settle the nearest cell in the queues; false if they are empty.
     bool settle() {
         drop_settled(straight_);
         drop_settled(across_);
@@ -107,7 +107,7 @@ public:
         return true;
     }
 
-    // As walking_distance has it.
+    // The result as of walking_distance.
     i32 distance(GridCell cell) const {
         const i32 known = distance_[number(cell)];
         return known < FAR ? known : -1;
@@ -131,7 +131,7 @@ private:
         while (!waiting.empty() && state_[waiting.front()] == State::settled) waiting.pop();
     }
 
-    // Whether the nearest cell waits in the first of two queues, of which one may be empty.
+    // Whether the nearest cell is in the first of two queues, of which one may be empty.
     bool is_first(const std::queue<i64>& one, const std::queue<i64>& other) const {
         if (one.empty() || other.empty()) return other.empty();
         return distance_[one.front()] <= distance_[other.front()];
@@ -148,7 +148,7 @@ private:
 constexpr i64 COST_BUCKETS = i64{1} << 14;
 static_assert(7 * (200 + 2 * MOST_COST) < COST_BUCKETS);
 
-// Cells that wait to be settled at some cost: all costs that wait differ by less than COST_BUCKETS.
+// A queue of cells by cost: all costs in it differ by less than COST_BUCKETS.
 class CostQueue {
 public:
     bool empty() const { return waiting_ == 0; }
@@ -158,7 +158,7 @@ public:
         ++waiting_;
     }
 
-    // One of the cells that wait at just this cost, the newest first.
+    // One of the cells with exactly this cost, the newest first.
     std::optional<GridCell> pop(i64 cost) {
         auto& bucket = buckets_[bucket_of(cost)];
         if (bucket.empty()) return std::nullopt;
@@ -205,25 +205,25 @@ Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goal
     }
     while (walk.settle()) {
     }
-    auto made = Array<i32, 2>::empty(mask.shape);
-    const View<i32, 2> distance = made;
+    auto result = Array<i32, 2>::empty(mask.shape);
+    const View<i32, 2> distance = result;
     for (i64 row = 0; row < mask.shape[0]; ++row) {
         for (i64 column = 0; column < mask.shape[1]; ++column) distance(row, column) = walk.distance({row, column});
     }
-    return made;
+    return result;
 }
 
 Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell start) {
-    auto made = Array<i64, 2>::filled(cost.shape, -1);
-    const View<i64, 2> distance = made;
-    if (at(cost, goal) < 0) return made;
+    auto result = Array<i64, 2>::filled(cost.shape, -1);
+    const View<i64, 2> distance = result;
+    if (at(cost, goal) < 0) return result;
     CostQueue waiting;
     at(distance, goal) = 0;
     waiting.push(0, goal);
     for (i64 now = 0; !waiting.empty(); ++now) {
         while (const auto cell = waiting.pop(now)) {
-            if (at(distance, *cell) != now) continue;  // a cheaper way was found since
-            if (cell->row == start.row && cell->column == start.column) return made;
+            if (at(distance, *cell) != now) continue;  // a cheaper path was found since
+            if (cell->row == start.row && cell->column == start.column) return result;
             for (const GridCell step : NEIGHBORS) {
                 const GridCell beside = *cell + step;
                 if (!is_open(cost, *cell, beside)) continue;
@@ -235,7 +235,7 @@ Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell sta
             }
         }
     }
-    return made;
+    return result;
 }
 
 Array<i64, 2> descend(View<const i32, 2> cost, View<const i64, 2> distance, GridCell start) {

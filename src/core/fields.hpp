@@ -11,31 +11,31 @@ inline constexpr i64 MOST_COST = 1000;  // the highest cost of a cell [percent]
 // columns): 0 outside the mask, and (rows + columns)² everywhere in a mask that has no outside.
 //
 // The two-pass algorithm of Meijster, Roerdink and Hesselink, "A general algorithm for computing
-// distance transforms in linear time" (2000), in integers. What lies outside the array counts for
-// nothing: surround the mask by one line of false where the border is a wall.
+// distance transforms in linear time" (2000), in integers. Cells outside the array are ignored:
+// surround the mask by one line of false where the border is a wall.
 Array<i64, 2> squared_distance(View<const bool, 2> mask);
 
-// How far each cell is from the nearest goal, walking from cell to cell, in fifths of a cell's
-// side, (rows, columns); -1 where no goal can be reached.
+// The walking distance from each cell to the nearest goal, in fifths of a cell's side, (rows,
+// columns); -1 where no goal can be reached.
 //
 // A step to a side costs 5 and one across a corner 7, which is open only if both cells beside it
-// are. `mask` holds the cells that can be walked; `goals` are cells (n, 2) as (row, column), of
-// which those outside the mask count for nothing.
+// are. `mask` holds the cells that can be walked; `goals` are cells (n, 2) as (row, column); goals
+// outside the mask are ignored.
 //
-// Cells are settled in order of distance, so cells that steps of one length lead to come in that
-// order, too: one queue for each length does instead of a heap (Dial, Communications of the ACM
-// 12, 1969, has one for each distance).
+// Cells are settled in order of distance, and so are the cells reached by steps of one length: one
+// queue for each length replaces a heap (Dial, Communications of the ACM 12, 1969, has one for each
+// distance).
 Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goals);
 
-// What the cheapest way from each cell to a goal costs, walking from cell to cell, in 1/1000 of a
-// cell's side at no cost, (rows, columns); -1 where no way is known.
+// The cost of the cheapest path from each cell to a goal, in 1/1000 of a cell's side at no extra
+// cost, (rows, columns); -1 where no path is known.
 //
-// `cost` is (rows, columns) in percent of what a way costs besides: 100 counts double; from 0 to
-// MOST_COST, or -1 where no way leads. What is farther away than `start` is not worked out; a start
-// outside the grid has everything worked out (Dial, as above; all in integers).
+// `cost` is the extra cost of cells, (rows, columns), in percent: 100 doubles it; from 0 to
+// MOST_COST, or -1 for blocked cells. Cells farther away than `start` are not computed; with a start
+// outside the grid all are (Dial, as above; all in integers).
 Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell start);
 
-// What a step between two neighboring cells costs, [1/1000 of a cell's side].
+// The cost of a step between two neighboring cells [1/1000 of a cell's side].
 //
 // A step to a side is 5 long and one across a corner 7; half of it counts by the cost of the cell
 // that it leaves, half by that of the one it enters.
@@ -44,8 +44,8 @@ constexpr i64 step_cost(View<const i32, 2> cost, GridCell from, GridCell to) {
     return length * (i64{200} + at(cost, from) + at(cost, to));
 }
 
-// The cells (n, 2) of a cheapest way from `start` to the goal, by the distances that cost_distance
-// returned for the same costs; of equally cheap neighbors the first, row by row. No cell if no way
+// The cells (n, 2) of a cheapest path from `start` to the goal, by the distances that cost_distance
+// returned for the same costs; of equally cheap neighbors the first, row by row. Empty if no path
 // from the start is known.
 Array<i64, 2> descend(View<const i32, 2> cost, View<const i64, 2> distance, GridCell start);
 

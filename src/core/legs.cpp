@@ -26,10 +26,10 @@ Moment Legs::walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate
 }
 
 Array<i64, 2> Legs::rows() const {
-    auto made = Array<i64, 2>::empty({size(), 5});
-    i64* row = made.data();
+    auto result = Array<i64, 2>::empty({size(), 5});
+    i64* row = result.data();
     for (const auto& numbers : rows_) row = std::copy(numbers.begin(), numbers.end(), row);
-    return made;
+    return result;
 }
 
 }  // namespace fleet2d

@@ -1,4 +1,4 @@
-// The breakpoints of a plan, gathered while it is built leg by leg.
+// The breakpoints of a plan, which is built leg by leg.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace fleet2d {
 
-// Where a plan has got to.
+// The end of a plan so far.
 struct Moment {
     i64 time;     // us
     i64 x, y;     // lattice units
@@ -34,9 +34,9 @@ public:
     // One column of them.
     template <class T>
     Array<T> column(std::size_t number) const {
-        auto made = Array<T>::empty({size()});
-        for (i64 i = 0; i < size(); ++i) made[i] = static_cast<T>(rows_[static_cast<std::size_t>(i)][number]);
-        return made;
+        auto result = Array<T>::empty({size()});
+        for (i64 i = 0; i < size(); ++i) result[i] = static_cast<T>(rows_[static_cast<std::size_t>(i)][number]);
+        return result;
     }
 
 private:

@@ -1,4 +1,4 @@
-// The cameras of a robot: where they are, where they look, and what lies in their view.
+// The cameras of a robot: their poses, and what is in their view.
 #pragma once
 
 #include "headings.hpp"

@@ -12,12 +12,12 @@ namespace {
 constexpr i64 MINUTE_US = 60'000'000;
 constexpr i64 UNKNOWN = -1;
 
-// Steps in which a camera has a user in view, and neither changes its pose.
+// Steps at which a camera has a user in view, while neither changes its pose.
 struct Interval {
     i64 begin, end;  // steps; the last one is end - 1
     i64 camera, user;
-    Pose eye;    // of the camera
-    i64 dx, dy;  // the user, from there [lattice units]
+    Pose eye;    // pose of the camera
+    i64 dx, dy;  // position of the user relative to the camera [lattice units]
     i64 faces;   // 1/4096 turn
     i64 posture;
     i64 shown;             // points of the body in view, above 0
@@ -36,10 +36,10 @@ Sighting read(View<const i64> row) {
 
 void write(View<i64> row, const Sighting& sighting) { std::memcpy(row.data, &sighting, sizeof sighting); }
 
-// Finds the intervals in which somebody is in view.
+// Finds the intervals in which a user is in view.
 class Lookout {
 public:
-    Lookout(const Mesh& walls, const Lenses& lenses, const Rule& rule, const Window& window, Onlooker onlooker,
+    Lookout(const Mesh& walls, const Lenses& lenses, const LookRule& rule, const Window& window, Onlooker onlooker,
             View<const u64, 3> shown, View<const i64> radii)
         : walls_(walls),
           lenses_(lenses),
@@ -62,7 +62,7 @@ public:
     }
 
 private:
-    // Walk along the runs of both bodies at once.
+    // Step through the runs of both bodies in parallel.
     void compare(i64 camera, i64 user) {
         const i64 other = onlooker_.first_other + user;
         i64 run = window_.start[onlooker_.body], other_run = window_.start[other];
@@ -78,7 +78,7 @@ private:
         }
     }
 
-    // Both rest from step `begin` to `end` - 1; only the camera may pan.
+    // Add the intervals of steps `begin` to `end` - 1, in which both bodies rest; only the camera may pan.
     void look(i64 camera, i64 user, i64 run, i64 other_run, i64 begin, i64 end) {
         const i64 period = lenses_.period[camera];
         const Pose body{window_.x[run], window_.y[run], window_.heading[run]};
@@ -155,7 +155,7 @@ private:
 
     const Mesh& walls_;
     const Lenses& lenses_;
-    const Rule& rule_;
+    const LookRule& rule_;
     const Window& window_;
     const Onlooker onlooker_;
     const View<const u64, 3> shown_;
@@ -169,8 +169,8 @@ private:
 // Visits the steps at which something may be noticed, become known, or be lost.
 class Watch {
 public:
-    Watch(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
-          Onlooker onlooker, const Memory& memory, std::vector<Interval> intervals)
+    Watch(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
+          const Window& window, Onlooker onlooker, const SightMemory& memory, std::vector<Interval> intervals)
         : walls_(walls),
           lenses_(lenses),
           errors_(errors),
@@ -184,9 +184,9 @@ public:
         for (const i64 seen : memory.seen) identities_in_view_ += seen;
         for (i64 c = 0; c < cameras_; ++c) {
             is_prompt_ &= lenses.latency[c] == 0 && memory.waiting(c, 1) == 0;
-            is_haunted_ |= errors.haunted[c] != 0;
+            has_ghosts_ |= errors.has_ghosts[c] != 0;
         }
-        is_haunted_ |= errors.injected.size() > 0;
+        has_ghosts_ |= errors.injected.size() > 0;
         run_ = window.start[onlooker.body];
     }
 
@@ -200,8 +200,8 @@ public:
                 for (; i < active_.size() && active_[i].camera == c; ++i) {
                     if (looks) look_at(active_[i]);
                 }
-                if (looks && errors_.haunted[c] != 0) imagine(c);
-                if (looks) inject(c);
+                if (looks && errors_.has_ghosts[c] != 0) add_ghosts(c);
+                if (looks) add_injected(c);
             }
             if (!is_prompt_) deliver();
             if (result_.sightings.size() > before || identities_in_view_ > 0) {
@@ -219,7 +219,7 @@ private:
     // The first step from `step` on at which anything can happen.
     i64 next_step(i64 step) {
         std::erase_if(active_, [step](const Interval& interval) { return interval.end <= step; });
-        if (!active_.empty() || is_haunted_) return step;
+        if (!active_.empty() || has_ghosts_) return step;
         i64 next = next_interval_ < intervals_.size() ? intervals_[next_interval_].begin : window_.end;
         for (i64 c = 0; c < cameras_; ++c) {
             if (memory_.waiting(c, 1) > 0)
@@ -251,7 +251,7 @@ private:
         const i64 forced = at(about, About::FORCED);
         if (forced == FORCED_MISS) return;
         const bool errs = lenses_.errs[camera] != 0;
-        if (errs ? !pays_attention(target) : !is_detected(camera, target.user)) return;
+        if (errs ? !is_noticed(target) : !is_detected(camera, target.user)) return;
         ++at(about, About::NOTICED);
         const i64 x = target.eye.x + target.dx, y = target.eye.y + target.dy;
         Sighting sighting{now_ + lenses_.latency[camera],
@@ -277,7 +277,7 @@ private:
     }
 
     // Whether a camera that errs notices a user in view.
-    bool pays_attention(Interval& target) const {
+    bool is_noticed(Interval& target) const {
         const i64 camera = target.camera;
         const View<const i64> table = errors_.table[camera];
         if (target.steady == UNKNOWN) {
@@ -294,18 +294,20 @@ private:
         const i64 camera = target.camera;
         const View<const i64> table = errors_.table[camera];
         const View<const u64> keys = errors_.keys[camera][target.user];
-        sighting.identity = identify(table, errors_.whom[camera][target.user], keys, memory_.about[camera][target.user],
-                                     target.user, now_, distance_bin(table, target.dx, target.dy), rule_.patience);
-        const Offset offset = blurred(table, keys, now_, target.dx, target.dy);
+        sighting.identity =
+            identify(table, errors_.confusion[camera][target.user], keys, memory_.about[camera][target.user],
+                     target.user, now_, distance_bin(table, target.dx, target.dy), rule_.patience);
+        const Offset offset = perceived_offset(table, keys, now_, target.dx, target.dy);
         sighting.x += offset.dx - target.dx;
         sighting.y += offset.dy - target.dy;
         const i64 turn = random_noise(stream(keys, UserDraw::HEADING), now_, table[HEADING_NOISE]);
         sighting.heading = (target.faces + turn) & (TURN - 1);
-        sighting.posture = seeming(table, target.posture, random_share(stream(keys, UserDraw::POSTURE), now_));
+        sighting.posture =
+            perceived_posture(table, target.posture, random_share(stream(keys, UserDraw::POSTURE), now_));
     }
 
-    // Record the false positives of a look, each at its source if that is in view.
-    void imagine(i64 camera) {
+    // Record the false positives of a look, each at its source if the source is in view.
+    void add_ghosts(i64 camera) {
         while (window_.run_end(onlooker_.body, run_) <= now_) ++run_;
         if (window_.away[run_] != 0) return;
         Pose eye{window_.x[run_], window_.y[run_], window_.heading[run_]};
@@ -338,8 +340,8 @@ private:
         }
     }
 
-    // Record what somebody outside lets a camera perceive.
-    void inject(i64 camera) {
+    // Record the false positives that interventions inject.
+    void add_injected(i64 camera) {
         for (i64 i = 0; i < errors_.injected.size(); ++i) {
             const View<const i64> row = errors_.injected[i];
             const auto value = [&](Injected column) { return row[static_cast<i64>(column)]; };
@@ -363,7 +365,7 @@ private:
         return ghost_at_spot(walls_, sector, spot, key);
     }
 
-    // Put a sighting where it belongs. What is known at once needs no backlog, whose rows come in the same order.
+    // Publish a sighting, or put it in the backlog. Without latency the backlog isn't needed: the order is the same.
     void record(i64 camera, const Sighting& sighting) {
         if (is_prompt_) {
             publish(sighting);
@@ -375,7 +377,7 @@ private:
         ++length;
     }
 
-    // Publish what is known by now of every camera's backlog.
+    // Publish the sightings of every camera's backlog that are known by now.
     void deliver() {
         for (i64 c = 0; c < cameras_; ++c) {
             i64 &begin = memory_.waiting(c, 0), &length = memory_.waiting(c, 1);
@@ -415,16 +417,16 @@ private:
     const Mesh& walls_;
     const Lenses& lenses_;
     const ErrorTables& errors_;
-    const Rule& rule_;
+    const LookRule& rule_;
     const Window& window_;
     const Onlooker onlooker_;
-    const Memory& memory_;
+    const SightMemory& memory_;
     const std::vector<Interval> intervals_;  // in order of their first steps
     std::size_t next_interval_ = 0;          // that is still to come
     std::vector<Interval> active_;           // at the present step, in order of camera and user
     const i64 cameras_, users_;
     bool is_prompt_ = true;  // every sighting becomes known at once
-    bool is_haunted_ = false;
+    bool has_ghosts_ = false;
     i64 identities_in_view_ = 0;
     i64 run_ = 0;  // of the onlooker at the present step
     i64 now_ = 0;
@@ -433,8 +435,8 @@ private:
 
 }  // namespace
 
-LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule,
-                const Window& window, Onlooker onlooker, const Memory& memory, View<const u64, 3> shown,
+LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
+                const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
                 View<const i64> radii) {
     auto intervals = Lookout(walls, lenses, rule, window, onlooker, shown, radii).intervals();
     return Watch(walls, lenses, errors, rule, window, onlooker, memory, std::move(intervals)).look();

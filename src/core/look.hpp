@@ -1,4 +1,4 @@
-// What the cameras of one body see of others over a span of steps, and what they make of it.
+// What the cameras of one body see and perceive of other bodies over a span of steps.
 #pragma once
 
 #include <vector>
@@ -25,12 +25,12 @@ struct Sighting {
 };
 inline constexpr i64 SIGHTING = sizeof(Sighting) / sizeof(i64);  // columns of a row
 
-// What a robot carries from span to span. Identities are users, and last an unknown person.
-struct Memory {
-    View<i64> noticed;     // (identities,) last step at which one was noticed; -1: never
-    View<i64> seen;        // (identities,) 1 while one counts as seen
+// The state of a robot's perception between spans. Identities are users, and last an unknown person.
+struct SightMemory {
+    View<i64> noticed;     // (identities,) last step at which the identity was noticed; -1: never
+    View<i64> seen;        // (identities,) 1 while the identity counts as seen
     View<i64, 3> about;    // (cameras, users, ABOUT) see About
-    View<i64, 3> backlog;  // (cameras, rows, SIGHTING) a ring of what isn't known yet
+    View<i64, 3> backlog;  // (cameras, rows, SIGHTING) a ring buffer of sightings that aren't known yet
     View<i64, 2> waiting;  // (cameras, 2) its first row, and its length
 };
 
@@ -46,8 +46,8 @@ struct IdentityEvent {
     SightEvent kind;
 };
 
-// What holds for all cameras of a robot.
-struct Rule {
+// The settings that all cameras of a robot share.
+struct LookRule {
     i64 patience;    // steps without a sighting after which an identity counts as lost
     i64 step_us;     // length of a step
     i64 start_us;    // time of day at step 0
@@ -56,10 +56,10 @@ struct Rule {
     bool stop_seen;  // whether an event SightEvent::SEEN ends the span
 };
 
-// Who looks at whom: bodies of a window, by number.
+// The body with the cameras, and those that it looks at: bodies of a window, by number.
 struct Onlooker {
-    i64 body;         // that has the cameras
-    i64 first_other;  // of the others, whose number is that of the lenses' users
+    i64 body;         // the body with the cameras
+    i64 first_other;  // the first of the others, as many as the lenses' users
 };
 
 struct LookResult {
@@ -76,8 +76,8 @@ struct LookResult {
 //
 // `shown` holds (cameras, users, steps) the points in view, bit i for number i, where another method decides that;
 // else it is empty. `radii` are those of all bodies of the window, where they hide each other; else it is empty.
-LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule,
-                const Window& window, Onlooker onlooker, const Memory& memory, View<const u64, 3> shown,
+LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
+                const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
                 View<const i64> radii);
 
 }  // namespace fleet2d

@@ -15,12 +15,12 @@ enum Direction : int { EAST, NORTH, WEST, SOUTH };
 
 constexpr u8 bit(int direction) { return static_cast<u8>(1 << direction); }
 
-// The sides between a mask and what is not in it that start at each corner of the pixels, one bit
-// for each direction, (rows + 1, columns + 1). Sides run with the mask on their left.
+// The border sides of a mask that start at each corner of the pixels, one bit for each direction,
+// (rows + 1, columns + 1). Sides run with the mask on their left.
 Array<u8, 2> border_sides(View<const bool, 2> mask) {
     const auto [rows, columns] = mask.shape;
-    auto made = Array<u8, 2>::zeros({rows + 1, columns + 1});
-    const View<u8, 2> sides = made;
+    auto result = Array<u8, 2>::zeros({rows + 1, columns + 1});
+    const View<u8, 2> sides = result;
     for (i64 row = 0; row < rows; ++row) {
         for (i64 column = 0; column < columns; ++column) {
             if (!mask(row, column)) continue;
@@ -30,11 +30,11 @@ Array<u8, 2> border_sides(View<const bool, 2> mask) {
             if (column == 0 || !mask(row, column - 1)) sides(row + 1, column) |= bit(SOUTH);
         }
     }
-    return made;
+    return result;
 }
 
-// Append the corners of the ring that starts with the side to the east of `corner`, and take its
-// sides away; the new number of corners.
+// Append the corners of the ring that starts with the side to the east of `corner`, and remove its
+// sides; returns the new number of corners.
 i64 follow_ring(View<u8, 2> sides, GridCell corner, Array<i32, 2>& corners, i64 count) {
     const i64 first_row = corner.row, first_column = corner.column;
     int direction = EAST, before = SOUTH;  // any but EAST: the ring bends where it starts
@@ -58,8 +58,8 @@ i64 follow_ring(View<u8, 2> sides, GridCell corner, Array<i32, 2>& corners, i64 
 
 Array<i32, 2> label_parts(View<const bool, 2> mask, bool diagonal) {
     const auto [rows, columns] = mask.shape;
-    auto made = Array<i32, 2>::filled(mask.shape, NOWHERE);
-    const View<i32, 2> part = made;
+    auto result = Array<i32, 2>::filled(mask.shape, NOWHERE);
+    const View<i32, 2> part = result;
     std::vector<GridCell> stack;
     i32 parts = 0;
     const auto reach = [&](GridCell pixel) {
@@ -82,13 +82,13 @@ Array<i32, 2> label_parts(View<const bool, 2> mask, bool diagonal) {
             ++parts;
         }
     }
-    return made;
+    return result;
 }
 
 Array<i32, 2> count_steps(View<const bool, 2> start, View<const bool, 2> mask) {
     const auto [rows, columns] = mask.shape;
-    auto made = Array<i32, 2>::filled(mask.shape, NOWHERE);
-    const View<i32, 2> steps = made;
+    auto result = Array<i32, 2>::filled(mask.shape, NOWHERE);
+    const View<i32, 2> steps = result;
     std::queue<GridCell> waiting;
     const auto reach = [&](GridCell pixel, i32 step) {
         if (is_inside(mask.shape, pixel) && at(mask, pixel) && at(steps, pixel) == NOWHERE) {
@@ -106,12 +106,12 @@ Array<i32, 2> count_steps(View<const bool, 2> start, View<const bool, 2> mask) {
         waiting.pop();
         for (const GridCell side : SIDES) reach(pixel + side, at(steps, pixel) + 1);
     }
-    return made;
+    return result;
 }
 
 Rings trace_rings(View<const bool, 2> mask) {
-    auto made = border_sides(mask);
-    const View<u8, 2> sides = made;
+    auto result = border_sides(mask);
+    const View<u8, 2> sides = result;
     Rings rings{Array<i32, 2>::empty({64, 2}), Array<i64>::zeros({64})};
     i64 corners = 0, count = 0;
     for (i64 row = 0; row < sides.shape[0]; ++row) {

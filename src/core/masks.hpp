@@ -1,6 +1,6 @@
-// Masks of pixels: their connected parts, how far one is from another, and the rings round them.
+// Masks of pixels: their connected parts, distances within them, and the rings around them.
 //
-// What lies outside an array counts as not in the mask.
+// Pixels outside an array count as not in the mask.
 #pragma once
 
 #include "array.hpp"
@@ -13,7 +13,7 @@ namespace fleet2d {
 Array<i32, 2> label_parts(View<const bool, 2> mask, bool diagonal);
 
 // Count the steps from pixel to pixel across sides, inside a mask, from the nearest start, (rows,
-// columns): 0 at the start, -1 where no way leads. Pixels of `start` outside the mask don't count.
+// columns): 0 at the start, -1 for unreachable pixels. Pixels of `start` outside the mask are ignored.
 Array<i32, 2> count_steps(View<const bool, 2> start, View<const bool, 2> mask);
 
 // Closed rings along the sides of pixels.
@@ -22,7 +22,7 @@ struct Rings {
     Array<i64> start;       // (rings + 1,) where the corners of each ring begin
 };
 
-// The rings between a mask and what is not in it.
+// The rings between a mask and the pixels that are not in it.
 //
 // Rings have the mask on their left: outer ones run counter-clockwise, holes clockwise. Where two
 // pixels of the mask share only a corner, a ring turns right, so each ring round one part

@@ -118,8 +118,8 @@ Array<Beyond> build_beyond(const Mesh& mesh) {
 }
 
 Array<i32, 2> rasterize_cells(const Mesh& mesh, i64 rows, i64 columns) {
-    auto made = Array<i32, 2>::filled({rows, columns}, static_cast<i32>(OUTSIDE));
-    const View<i32, 2> cells = made;
+    auto result = Array<i32, 2>::filled({rows, columns}, static_cast<i32>(OUTSIDE));
+    const View<i32, 2> cells = result;
     for (i64 triangle = 0; triangle < mesh.triangle_count(); ++triangle) {
         const Box box = box_of(mesh.vertices, mesh.triangles[triangle]);
         const i64 lowest = std::max(i64{0}, -floor_div(CELL_CENTRE - box.bottom, SUB));
@@ -136,13 +136,13 @@ Array<i32, 2> rasterize_cells(const Mesh& mesh, i64 rows, i64 columns) {
             }
         }
     }
-    return made;
+    return result;
 }
 
 Array<i32> label_triangles(View<const i32, 2> neighbors) {
     const i64 count = neighbors.size();
-    auto made = Array<i32>::filled({count}, -1);
-    const View<i32> part = made;
+    auto result = Array<i32>::filled({count}, -1);
+    const View<i32> part = result;
     std::vector<i64> stack;
     i32 parts = 0;
     for (i64 seed = 0; seed < count; ++seed) {
@@ -162,7 +162,7 @@ Array<i32> label_triangles(View<const i32, 2> neighbors) {
         }
         ++parts;
     }
-    return made;
+    return result;
 }
 
 }  // namespace fleet2d

@@ -151,8 +151,8 @@ void trace_track(const Breakpoints& track, i64 begin, i64 step, const PosesToFil
 }
 
 Array<i64, 2> time_route(View<const i64, 2> route, i64 begin, i64 heading, f64 speed, f64 turn_rate) {
-    auto made = Array<i64, 2>::empty({2 * route.size(), 4});
-    const View<i64, 2> rows = made;
+    auto result = Array<i64, 2>::empty({2 * route.size(), 4});
+    const View<i64, 2> rows = result;
     i64 now = begin, count = 0;
     const auto add = [&](i64 i) {
         const i64 row[] = {now, route(i, 0), route(i, 1), heading};
@@ -172,8 +172,8 @@ Array<i64, 2> time_route(View<const i64, 2> route, i64 begin, i64 heading, f64 s
         now = later(now, distance(0, 0, dx, dy) * 1e6 / speed);
         add(i);
     }
-    made.truncate(count);
-    return made;
+    result.truncate(count);
+    return result;
 }
 
 void trace_meander(const Mesh& walls, const Mesh& space, const WalkRule& rule, i64 first, Point start, i64 heading,

@@ -39,8 +39,8 @@ struct PosesToFill {
 // The last index i with time[i] <= moment; 0 if there is none.
 i64 last_breakpoint(View<const i64> time, i64 moment);
 
-// The bounds within which the times of a track [us] and everything else in it must lie, so that no
-// product of the interpolation leaves 64 bits: see `is_traceable`.
+// Bounds of the times [us] and of all other values of a track, so that products in the interpolation
+// fit in 64 bits: see `is_traceable`.
 inline constexpr i64 LATEST = i64{1} << 61;
 inline constexpr i64 FARTHEST = i64{1} << 40;
 

@@ -17,7 +17,7 @@ constexpr i64 scaled(i64 whole, i64 part) { return (whole >> 20) * part + (((who
 
 i64 distance_bin(View<const i64> table, i64 dx, i64 dy) { return std::min(length(dx, dy) >> table[SHIFT], BINS - 1); }
 
-i64 lasting(View<const i64> table, i64 steps) {
+i64 persistence_chance(View<const i64> table, i64 steps) {
     i64 share = ONE;
     for (i64 i = AT_STAY; steps > 0; steps >>= 1, ++i) {
         if (steps & 1) share = product(share, table[i]);
@@ -43,47 +43,48 @@ i64 attention(View<const i64> table, View<const u64> keys, View<i64> about, i64 
     const i64 before = at(about, About::DRAW_STEP);
     at(about, About::DRAW_STEP) = now;
     const bool lasts = before >= 0 && table[AT_STAY] != 0 &&
-                       random_share(stream(keys, UserDraw::ATTEND), now) < lasting(table, now - before);
+                       random_share(stream(keys, UserDraw::ATTEND), now) < persistence_chance(table, now - before);
     if (!lasts) at(about, About::DRAW) = random_chance(stream(keys, UserDraw::DETECT), now);
     return at(about, About::DRAW);
 }
 
-i64 identify(View<const i64> table, View<const i64> whom, View<const u64> keys, View<i64> about, i64 user, i64 now,
+i64 identify(View<const i64> table, View<const i64> confusion, View<const u64> keys, View<i64> about, i64 user, i64 now,
              i64 bin, i64 patience) {
     const i64 before = at(about, About::TRACK_STEP);
     at(about, About::TRACK_STEP) = now;
-    if (table[KEEPS] == 1 && before >= 0 && now - before < patience) return at(about, About::TAKEN_FOR);
+    if (table[KEEPS] == 1 && before >= 0 && now - before < patience) return at(about, About::LAST_IDENTITY);
     const i64 draw = random_share(stream(keys, UserDraw::IDENTIFY), now);
     const i64 right = table[AT_RIGHT + bin];
     i64 identity = NOBODY;
     if (draw < right) {
         identity = user;
     } else if (draw < right + table[AT_MISTAKEN + bin]) {
-        const i64 other = pick(whom, random_share(stream(keys, UserDraw::MISTAKE), now));
-        if (other < whom.size()) identity = other;
+        const i64 other = pick(confusion, random_share(stream(keys, UserDraw::MISTAKE), now));
+        if (other < confusion.size()) identity = other;
     }
-    at(about, About::TAKEN_FOR) = identity;
+    at(about, About::LAST_IDENTITY) = identity;
     return identity;
 }
 
-Offset turn_and_stretch(i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
+Offset turn_and_stretch(i64 dx, i64 dy, i64 turn, i64 distance, i64 target_length) {
     const i64 cosine = half_sine(turn + 2 * QUARTER), sine = half_sine(turn);
     const i64 turned_x = (dx * cosine - dy * sine) >> 20;  // 2**-10 lattice units
     const i64 turned_y = (dx * sine + dy * cosine) >> 20;
     const i64 whole = distance << 10;
-    return {floor_div(2 * turned_x * wanted + whole, 2 * whole), floor_div(2 * turned_y * wanted + whole, 2 * whole)};
+    return {floor_div(2 * turned_x * target_length + whole, 2 * whole),
+            floor_div(2 * turned_y * target_length + whole, 2 * whole)};
 }
 
-Offset blurred(View<const i64> table, View<const u64> keys, i64 now, i64 dx, i64 dy) {
+Offset perceived_offset(View<const i64> table, View<const u64> keys, i64 now, i64 dx, i64 dy) {
     const i64 distance = length(dx, dy), turning = table[BEARING_NOISE];
     const i64 noise = table[RANGE_NOISE] + ((table[RANGE_SHARE] * distance) >> 16);
     if (distance == 0 || (noise == 0 && turning == 0)) return {dx, dy};
-    const i64 wanted = std::max(i64{0}, distance + random_noise(stream(keys, UserDraw::RANGE), now, noise));
+    const i64 target_length = std::max(i64{0}, distance + random_noise(stream(keys, UserDraw::RANGE), now, noise));
     const i64 turn = random_noise(stream(keys, UserDraw::BEARING), now, turning);
-    return turn_and_stretch(dx, dy, turn, distance, wanted);
+    return turn_and_stretch(dx, dy, turn, distance, target_length);
 }
 
-i64 seeming(View<const i64> table, i64 posture, i64 draw) {
+i64 perceived_posture(View<const i64> table, i64 posture, i64 draw) {
     // What is above all but the last sum is the last posture, whatever the last sum is.
     const i64 first = AT_SEEMS + POSTURES * posture;
     return pick(table.slice(first, first + POSTURES - 1), draw);

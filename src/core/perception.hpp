@@ -21,9 +21,9 @@ inline constexpr i64 NOBODY = -1;       // the user behind a false positive; the
 // What each draw about one user decides. Every entry has a random stream of its own.
 enum class UserDraw : i64 {
     DETECT,    // whether a user in view is noticed
-    ATTEND,    // whether the draw before still holds
+    ATTEND,    // whether the last draw still holds
     IDENTIFY,  // whether a user is recognized, mistaken for another one, or unknown
-    MISTAKE,   // for whom a user is mistaken
+    MISTAKE,   // which other user a user is mistaken for
     RANGE,     // error of the distance
     BEARING,   // error of the direction from the camera
     HEADING,   // error of the user's heading
@@ -34,10 +34,10 @@ inline constexpr i64 USER_DRAWS = static_cast<i64>(UserDraw::POSTURE) + 1;
 // What each draw about false positives decides. Every entry has a random stream of its own.
 enum class GhostDraw : i64 {
     COUNT,     // how many there are in a look
-    SOURCE,    // which source one is of
-    PLACE,     // where it is
-    IDENTITY,  // whom it looks like
-    HEADING,   // where it faces
+    SOURCE,    // the source of one
+    PLACE,     // its position
+    IDENTITY,  // which user it looks like
+    HEADING,   // its heading
 };
 inline constexpr i64 GHOST_DRAWS = static_cast<i64>(GhostDraw::HEADING) + 1;
 
@@ -66,8 +66,8 @@ inline constexpr i64 TABLE = SHIFT + 6;
 // "Cumulative" tables hold in entry i the probability of all outcomes up to i.
 struct ErrorTables {
     View<const i64, 2> table;       // (cameras, TABLE)
-    View<const i64, 3> whom;        // (cameras, users, users): for whom one is mistaken, cumulative
-    View<const i64> haunted;        // (cameras,): 1 if there are false positives
+    View<const i64, 3> confusion;   // (cameras, users, users): which user one is mistaken for, cumulative
+    View<const i64> has_ghosts;     // (cameras,): 1 if there are false positives
     View<const i64, 2> ghosts;      // (cameras, MOST_GHOSTS): how many in one look, of all sources, cumulative
     View<const i64, 2> source;      // (cameras, sources): which source one is of, cumulative
     View<const i64, 3> spot;        // (cameras, sources, 3): x, y, noise as RANGE_NOISE; source 0 has none
@@ -77,20 +77,20 @@ struct ErrorTables {
     View<const i64, 2> injected;    // (n, INJECTED): false positives in every look of a camera, wherever it looks
 };
 
-// What a camera carries along about one user from look to look: columns of `Memory::about`.
+// What a camera stores about one user from look to look: columns of `SightMemory::about`.
 enum class About : i64 {
-    DRAW,        // the latest draw of UserDraw::DETECT [2**-53]
-    DRAW_STEP,   // the last step at which the user was in view; -1: never
-    TAKEN_FOR,   // for whom the user was taken last, or NOBODY
-    TRACK_STEP,  // the last step at which the user was noticed; -1: never
-    IN_VIEW,     // looks at which the user was in view
-    NOTICED,     // looks at which the user was noticed
-    FORCED,      // what somebody outside makes of a user in view: 0 nothing, or one of the below
+    DRAW,           // the latest draw of UserDraw::DETECT [2**-53]
+    DRAW_STEP,      // the last step at which the user was in view; -1: never
+    LAST_IDENTITY,  // the identity at the last sighting, or NOBODY
+    TRACK_STEP,     // the last step at which the user was noticed; -1: never
+    IN_VIEW,        // looks at which the user was in view
+    NOTICED,        // looks at which the user was noticed
+    FORCED,         // what an intervention makes of a user in view: 0 for nothing, or one of the constants below
 };
 inline constexpr i64 ABOUT = static_cast<i64>(About::FORCED) + 1;
 
 inline constexpr i64 FORCED_MISS = 1;      // in view, and not noticed
-inline constexpr i64 FORCED_IDENTITY = 3;  // taken for identity 0, and so on; one less: for somebody unknown
+inline constexpr i64 FORCED_IDENTITY = 3;  // recognized as identity 0, and so on; one less: as an unknown person
 
 // The columns of a row of `ErrorTables::injected`.
 enum class Injected : i64 { CAMERA, IDENTITY, X, Y, HEADING };
@@ -125,17 +125,17 @@ inline i64 pick(View<const i64> cumulative, i64 draw) {
     return outcome;
 }
 
-// How long (dx, dy) is [lattice units], rounded down.
+// The length of (dx, dy) [lattice units], rounded down.
 inline i64 length(i64 dx, i64 dy) { return static_cast<i64>(distance(0, 0, dx, dy)); }
 
 // The bin of the parts by distance that (dx, dy) belongs to.
 i64 distance_bin(View<const i64> table, i64 dx, i64 dy);
 
-// The probability that attention outlasts so many steps (below 2**62), from that for 2**i steps.
-i64 lasting(View<const i64> table, i64 steps);
+// The probability that attention outlasts `steps` (below 2**62), from the probabilities for 2**i steps.
+i64 persistence_chance(View<const i64> table, i64 steps);
 
 // The product of all factors but light for a user at (dx, dy) from a camera that looks along `heading`.
-// `faces` is where the user faces, `shown` how many points of the body are in view.
+// `faces` is the heading of the user, `shown` the number of points of the body in view.
 i64 steady_chance(View<const i64> table, i64 heading, i64 dx, i64 dy, i64 faces, i64 posture, i64 shown);
 
 // The probability to notice [2**-53], from steady_chance [2**-31], light [2**-31] and the camera's own [2**-53].
@@ -145,30 +145,30 @@ constexpr i64 notice_chance(i64 steady, i64 light, i64 chance) {
 
 // The draw [2**-53] that decides whether a user in view is noticed.
 //
-// It is the last look's with the probability that attention has lasted since then, else a new one.
-// So misses come in runs, and at a steady chance they are a two-state Markov chain; how often
-// they happen is just as configured, since each draw for itself is uniform.
+// It is that of the last look with the probability that attention has lasted since then, else a new one.
+// So misses come in runs, and with a constant chance they are a two-state Markov chain; their rate is as
+// configured, since each draw by itself is uniform.
 i64 attention(View<const i64> table, View<const u64> keys, View<i64> about, i64 now);
 
-// For whom a noticed user at a distance of that bin is taken; NOBODY for an unknown person. A track
+// The perceived identity of a noticed user at a distance of that bin; NOBODY for an unknown person. A track
 // ends `patience` steps after the last look at which the user was noticed.
-i64 identify(View<const i64> table, View<const i64> whom, View<const u64> keys, View<i64> about, i64 user, i64 now,
+i64 identify(View<const i64> table, View<const i64> confusion, View<const u64> keys, View<i64> about, i64 user, i64 now,
              i64 bin, i64 patience);
 
 struct Offset {
     i64 dx, dy;  // lattice units
 };
 
-// (dx, dy), `distance` > 0 long, turned by `turn`/8192 of a turn and stretched to the length `wanted`.
-Offset turn_and_stretch(i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted);
+// (dx, dy), `distance` > 0 long, turned by `turn`/8192 of a turn and stretched to the length `target_length`.
+Offset turn_and_stretch(i64 dx, i64 dy, i64 turn, i64 distance, i64 target_length);
 
-// Where a user at (dx, dy) from the camera is perceived, from there.
-Offset blurred(View<const i64> table, View<const u64> keys, i64 now, i64 dx, i64 dy);
+// The perceived position of a user at (dx, dy) from the camera, relative to the camera.
+Offset perceived_offset(View<const i64> table, View<const u64> keys, i64 now, i64 dx, i64 dy);
 
-// The posture that a posture is taken for.
-i64 seeming(View<const i64> table, i64 posture, i64 draw);
+// The perceived posture of a user with a posture.
+i64 perceived_posture(View<const i64> table, i64 posture, i64 draw);
 
-// Where a camera is, where it looks, and how far.
+// The pose of a camera, and its angle and range.
 struct Sector {
     i64 x, y;          // lattice units
     i64 triangle;      // that holds (x, y)

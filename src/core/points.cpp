@@ -21,13 +21,13 @@ Array<bool> points_in_reach(Pose eye, i64 near_squared, i64 far_squared, i64 hal
     return reached;
 }
 
-Questions list_questions(const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot,
-                         const Places& bodies, i64 first, i64 step_us) {
+ViewQueries list_view_queries(const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot,
+                              const Places& bodies, i64 first, i64 step_us) {
     const i64 cameras = widest.shape[0], body_count = widest.shape[1], steps = robot.x.size();
-    Questions questions;
-    questions.number = Array<i32, 3>::zeros({cameras, body_count, steps});
-    const View<i32, 3> number = questions.number;
-    std::vector<Question>& asked = questions.asked;
+    ViewQueries view_queries;
+    view_queries.number = Array<i32, 3>::zeros({cameras, body_count, steps});
+    const View<i32, 3> number = view_queries.number;
+    std::vector<ViewQuery>& queries = view_queries.queries;
     for (i64 camera = 0; camera < cameras; ++camera) {
         const i64 period = lenses.period[camera], half_angle = lenses.half_angle[camera];
         for (i64 j = floor_mod(-first, period); j < steps; j += period) {
@@ -39,18 +39,18 @@ Questions list_questions(const Lenses& lenses, View<const i64, 2> widest, i64 sl
                 const i64 dx = x - eye.x, dy = y - eye.y;
                 if (bodies.away(other, j) != 0 || dx * dx + dy * dy > widest(camera, other)) continue;
                 if (!near_wedge(eye.heading, half_angle, dx, dy, lenses.reach(camera, other) + slack)) continue;
-                const Question question = {camera, other, eye.x, eye.y, eye.heading, x, y};
+                const ViewQuery query = {camera, other, eye.x, eye.y, eye.heading, x, y};
                 const i32 before = j >= period ? number(camera, other, j - period) : 0;
-                if (before > 0 && question == asked[static_cast<std::size_t>(before - 1)]) {
+                if (before > 0 && query == queries[static_cast<std::size_t>(before - 1)]) {
                     number(camera, other, j) = before;
                 } else {
-                    asked.push_back(question);
-                    number(camera, other, j) = static_cast<i32>(asked.size());
+                    queries.push_back(query);
+                    number(camera, other, j) = static_cast<i32>(queries.size());
                 }
             }
         }
     }
-    return questions;
+    return view_queries;
 }
 
 }  // namespace fleet2d

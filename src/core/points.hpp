@@ -1,7 +1,7 @@
-// Many points looked at from one place: which are in sight, and which in range and angle.
+// Many points seen from one place: which are in sight, and which are in range and angle.
 //
-// And for methods that are not part of the core: what there is to ask over many steps, nothing twice
-// in a row.
+// For methods of sight that are not part of the core: the queries of a span of steps, without
+// consecutive duplicates.
 #pragma once
 
 #include <vector>
@@ -11,37 +11,37 @@
 
 namespace fleet2d {
 
-// Which of the points, (n, 2), a line of sight leads to from (x, y), (n,).
+// Which of the points, (n, 2), have a line of sight from (x, y), (n,).
 Array<bool> points_in_sight(const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points);
 
-// Which of the points, (n, 2), are in range and within the angle of a camera, walls apart, (n,).
+// Which of the points, (n, 2), are in range and within the angle of a camera, regardless of walls, (n,).
 Array<bool> points_in_reach(Pose eye, i64 near_squared, i64 far_squared, i64 half_angle, View<const i64, 2> points);
 
-// Whether a body is in view of a camera, to be asked: which two, where the camera is, and the body's centre.
-struct Question {
+// The question whether a body is in view of a camera: both, the camera's pose, and the body's centre.
+struct ViewQuery {
     i64 camera, body;
     i64 eye_x, eye_y, eye_heading;  // lattice units, 1/4096 turn
     i64 body_x, body_y;
 
-    bool operator==(const Question&) const = default;
+    bool operator==(const ViewQuery&) const = default;
 };
 
-// Where the bodies are that may be in view, all arrays (bodies, n).
+// The positions of the bodies that may be in view, all arrays (bodies, n).
 struct Places {
     View<const i64, 2> x;    // lattice units
     View<const i64, 2> y;    // lattice units
-    View<const u8, 2> away;  // not 0 while one isn't at home
+    View<const u8, 2> away;  // not 0 while the body is away
 };
 
-struct Questions {
-    std::vector<Question> asked;  // by camera and body
-    Array<i32, 3> number;         // (cameras, bodies, n): which of them each step asks, from 1 on; 0 for none
+struct ViewQueries {
+    std::vector<ViewQuery> queries;  // by camera and body
+    Array<i32, 3> number;            // (cameras, bodies, n): the query of each step, from 1 on; 0 for none
 };
 
-// Who may be in view of which camera when: near enough, and at most `slack` [lattice units] beside the
-// angle. `widest` is (cameras, bodies), the squared distance from which on nobody is in view; `robot` has
-// the cameras, n poses from step `first` on. A question that is the one before is asked once.
-Questions list_questions(const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot,
-                         const Places& bodies, i64 first, i64 step_us);
+// The queries of steps at which a body may be in view of a camera: near enough, and at most `slack`
+// [lattice units] beside the angle. `widest` is (cameras, bodies), the largest squared distance in view;
+// `robot` has the n poses of the cameras' owner from step `first` on. Equal consecutive queries are listed once.
+ViewQueries list_view_queries(const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot,
+                              const Places& bodies, i64 first, i64 step_us);
 
 }  // namespace fleet2d

@@ -42,7 +42,7 @@ constexpr i64 random_bell(u64 key, u64 counter) {
     return static_cast<i64>((lanes * four_lanes) >> 48) - BELL_MEAN;
 }
 
-// The draws of one stream at one step, one after the other.
+// A sequence of draws of one stream at one step.
 struct StepDraws {
     u64 key;
     u64 count = 0;

@@ -41,8 +41,8 @@ inline Point towards_vertex(const Mesh& mesh, i64 vertex, i64 x, i64 y) {
     return {at.x - x, at.y - y};
 }
 
-// Finds the pieces that are seen from a point, and holds them until it is used again. One for each thread, made
-// once for a mesh.
+// Finds the pieces that are seen from a point, and holds them until the next call. Create one for each thread and
+// mesh.
 class Lookout {
 public:
     explicit Lookout(const Mesh& mesh);
@@ -56,7 +56,7 @@ private:
     Scratch scratch_;  // its `wall` holds the walls of the pieces
 };
 
-// All that is visible from a point.
+// The region visible from a point.
 struct Region {
     i64 x, y;       // the eye, lattice units
     Pieces pieces;  // beginning with the one whose right border has the smallest angle in [0, one turn)
@@ -77,7 +77,7 @@ PieceLists visible_region(const Mesh& mesh, i64 x, i64 y);
 // `cells` is (n, 2), row and column of each; `cell_triangles` is (rows, columns), as from rasterize_cells.
 PieceLists regions_of_cells(const Mesh& mesh, View<const i64, 2> cells, View<const i32, 2> cell_triangles);
 
-// Whether p is in a region: the verdict of a line of sight.
+// Whether p is in a region, as by a line of sight.
 bool region_contains(const Mesh& mesh, const Region& region, i64 px, i64 py);
 
 struct Outline {

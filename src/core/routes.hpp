@@ -1,4 +1,4 @@
-// Shortest paths among walls: A* over the corners that a taut string can touch.
+// Shortest paths among walls: A* over the corners at which a shortest path can bend.
 //
 // A shortest path in a polygonal space bends only at its reflex corners (Lozano-Pérez and Wesley,
 // Communications of the ACM 22, 1979). The space is the free space shrunk by a body's radius, so a

@@ -26,7 +26,7 @@ struct HalfPlane {
     i64 least = 0;
 };
 
-// What is left of a direction [1/8192 turn], and on it.
+// The half plane to the left of a direction [1/8192 turn], and on it.
 constexpr HalfPlane left_of(i64 half) { return {-half_sine(half), half_sine(half + 2 * QUARTER)}; }
 
 // Neighbouring cells of one row.
@@ -35,7 +35,7 @@ struct Span {
     i32 first, last;  // columns
 };
 
-// Finds the cells that cameras see, in one grid. One for each thread, made once for a mesh.
+// Finds the cells that cameras see, in one grid. Create one for each thread and mesh.
 class CellFinder {
 public:
     CellFinder(const Mesh& mesh, i64 rows, i64 columns);

@@ -1,7 +1,7 @@
 // Sight lines, by the strict rule: a sight line touches no wall, not even a corner.
 //
 // All of it is integer arithmetic on the mesh of free space, so verdicts are exact and symmetric,
-// and they don't depend on how the free space is cut into triangles.
+// and they don't depend on the triangulation of the free space.
 #pragma once
 
 #include "mesh.hpp"
@@ -12,8 +12,8 @@ namespace fleet2d {
 // on a wall sees nothing and isn't seen. `triangle` holds q (see locate); OUTSIDE is allowed.
 bool line_of_sight(const Mesh& mesh, i64 qx, i64 qy, i64 triangle, i64 px, i64 py);
 
-// The cones of sight that wait to be followed, and scratch space for the walls that pieces end at.
-// One for each thread, made once for a mesh.
+// The stack of cones of sight, and scratch space for the walls that pieces end at. Create one for each
+// thread and mesh.
 struct Scratch {
     Array<i32> wall;      // (vertices + 4,)
     Array<i32, 2> stack;  // (vertices + 4, 3)
@@ -36,14 +36,14 @@ struct Fans {
 
 Fans build_fans(const Mesh& mesh);
 
-// The vertices that a straight way from a point leads to, in no particular order, each once; their
-// number. Between the point and the vertex the way touches no wall and no other vertex. A point on
+// The vertices visible from a point, in no particular order, each once; returns their number. The
+// segment between the point and a vertex touches no wall and no other vertex. A point on
 // a wall also sees the ends of that wall. A point at a vertex sees only that vertex.
 // `seen` has room for vertices + 4.
 i64 vertices_seen_from_point(const Mesh& mesh, i64 x, i64 y, i64 triangle, View<i32> seen, Scratch& scratch);
 
-// The vertices that a straight way from a vertex leads to, in no particular order, each once; their
-// number. Between the two the way touches no wall and no other vertex, or it runs along one wall.
+// The vertices visible from a vertex, in no particular order, each once; returns their number. The
+// segment between the two touches no wall and no other vertex, or it runs along one wall.
 i64 vertices_seen_from_vertex(const Mesh& mesh, const Fans& fans, i64 vertex, View<i32> seen, Scratch& scratch);
 
 }  // namespace fleet2d

@@ -125,9 +125,9 @@ OwnedStretched until(View<const i64> start, View<const f64> hold, View<const f64
         later = std::max(goal[i], std::min(hold[i], later));
         values[static_cast<std::size_t>(i)] = later;
     }
-    OwnedStretched made;
-    for (i64 i = 0; i < count; ++i) made.append(start[i], values[static_cast<std::size_t>(i)]);
-    return made;
+    OwnedStretched result;
+    for (i64 i = 0; i < count; ++i) result.append(start[i], values[static_cast<std::size_t>(i)]);
+    return result;
 }
 
 }  // namespace fleet2d

@@ -17,37 +17,37 @@ void multiply(f64 factor, View<const f64> from, View<f64> to) {
 // Goes through filtered stretches from the last to the first.
 class BackwardPass {
 public:
-    BackwardPass(const Ways& ways, const Stretches& stretches, const Filtered& filtered, const Moments& moments)
-        : ways_(ways),
+    BackwardPass(const StayModel& model, const Stretches& stretches, const Filtered& filtered, const Moments& moments)
+        : model_(model),
           stretches_(stretches),
           filtered_(filtered),
           moments_(moments),
-          rooms_(ways.rooms()),
-          stages_(ways.stages()),
-          ahead_in_view_(Array<f64, 2>::empty({stages_, ways.patches()})),
-          ahead_hidden_(Array<f64, 2>::empty({stages_, ways.patches()})),
-          in_view_(Array<f64, 2>::empty({stages_, ways.patches()})),
-          hidden_(Array<f64, 2>::empty({stages_, ways.patches()})),
-          comes_(Array<f64, 2>::empty({stages_, ways.patches()})),
-          sums_(Array<f64>::empty({ways.nodes()})),
+          rooms_(model.rooms()),
+          stages_(model.stages()),
+          ahead_in_view_(Array<f64, 2>::empty({stages_, model.patches()})),
+          ahead_hidden_(Array<f64, 2>::empty({stages_, model.patches()})),
+          in_view_(Array<f64, 2>::empty({stages_, model.patches()})),
+          hidden_(Array<f64, 2>::empty({stages_, model.patches()})),
+          comes_(Array<f64, 2>::empty({stages_, model.patches()})),
+          sums_(Array<f64>::empty({model.nodes()})),
           arrival_(Array<f64>::empty({rooms_})),
-          go_(Array<f64>::empty({ways.nodes()})),
+          go_(Array<f64>::empty({model.nodes()})),
           comers_(Array<f64>::empty({rooms_})) {}
 
-    // Begin after the last stretch; `end` (stages, patches) is the probability there, `dusk` as for `smooth`.
-    void begin(View<const f64, 2> end, View<const f64, 2> dusk) {
+    // Begin after the last stretch; `end` (stages, patches) is the filtered probability, `future` as for `smooth`.
+    void begin(View<const f64, 2> end, View<const f64, 2> future) {
         f64 total = 0.0;
         for (i64 stage = 0; stage < stages_; ++stage) {
-            for (i64 p = 0; p < ways_.patches(); ++p) total += end(stage, p) * dusk(stage, p);
+            for (i64 p = 0; p < model_.patches(); ++p) total += end(stage, p) * future(stage, p);
         }
         for (i64 stage = 0; stage < stages_; ++stage) {
-            for (i64 p = 0; p < ways_.patches(); ++p) {
-                ahead_in_view_(stage, p) = ahead_hidden_(stage, p) = dusk(stage, p) / total;
+            for (i64 p = 0; p < model_.patches(); ++p) {
+                ahead_in_view_(stage, p) = ahead_hidden_(stage, p) = future(stage, p) / total;
             }
         }
     }
 
-    // Go from after a stretch to before it; `places` (rooms,), zeros, become P(room) in it.
+    // Go back over a stretch; `places` (rooms,), zeros, become P(room) in it.
     void step(i64 t, View<f64> places) {
         locate_person(t, places);
         weigh_states(t);
@@ -59,17 +59,17 @@ public:
         }
     }
 
-    // How likely each hidden state makes all after it, largest 1: (stages, patches).
+    // The likelihood of all later evidence for each hidden state, largest 1: (stages, patches).
     Array<f64, 2> ahead() const {
         f64 largest = ahead_hidden_[0][0];
         for (i64 stage = 0; stage < stages_; ++stage) {
             for (const f64 value : ahead_hidden_[stage]) largest = std::max(largest, value);
         }
-        auto made = Array<f64, 2>::empty({stages_, ways_.patches()});
+        auto result = Array<f64, 2>::empty({stages_, model_.patches()});
         for (i64 stage = 0; stage < stages_; ++stage) {
-            for (i64 p = 0; p < ways_.patches(); ++p) made(stage, p) = ahead_hidden_[stage][p] / largest;
+            for (i64 p = 0; p < model_.patches(); ++p) result(stage, p) = ahead_hidden_[stage][p] / largest;
         }
-        return made;
+        return result;
     }
 
 private:
@@ -80,7 +80,7 @@ private:
             const View<const f64> in_view = filtered_.in_view[t + 1][stage], hidden = filtered_.hidden[t + 1][stage];
             const View<const f64> if_in_view = ahead_in_view_[stage], if_hidden = ahead_hidden_[stage];
             for (i64 room = 0; room < rooms_; ++room) {
-                const Range range = ways_.patches_of(room);
+                const Range range = model_.patches_of(room);
                 f64 sum = 0.0;
                 if (visible[room]) {
                     for (i64 p = range.begin; p < range.end; ++p) {
@@ -93,15 +93,15 @@ private:
             }
         }
         f64 total = 0.0;
-        for (i64 k = 0; k < ways_.nodes(); ++k) {
+        for (i64 k = 0; k < model_.nodes(); ++k) {
             places[k / stages_] += sums_[k];
             total += sums_[k];
         }
         for (f64& share : places) share /= total;
     }
 
-    // How well each state in a stretch explains it and all after it, and so does coming to each patch; scaled so that
-    // products with the probability of a step sum to one.
+    // The likelihood of a stretch and of all later ones for each state, and for coming to each patch; scaled so that
+    // products with the filtered probability sum to one.
     void weigh_states(i64 t) {
         const View<const f64> likely = filtered_.likely[t];
         const f64 scale = filtered_.scale[t];
@@ -119,7 +119,7 @@ private:
             std::copy(hidden.begin(), hidden.end(), comes.begin());
             for (i64 room = 0; room < rooms_; ++room) {
                 if (!visible[room]) continue;
-                const auto [begin, end] = ways_.patches_of(room);
+                const auto [begin, end] = model_.patches_of(room);
                 for (i64 p = begin; p < end; ++p) {
                     const f64 shown = part_in_view(view[p]);
                     comes[p] = shown * in_view[p] + (1.0 - shown) * hidden[p];
@@ -128,14 +128,14 @@ private:
         }
     }
 
-    // Add up what is expected of leaving rooms in a stretch, and of changes of patch. Sets `go_` and `comers_`.
+    // Add the expected moments of leaving rooms and of changes of patch. Sets `go_` and `comers_`.
     void leave(i64 t) {
         const i64 length = filtered_.transitions.length[t];
         const View<const f64> mass = filtered_.mass[t], hop = filtered_.transitions.hop[length];
         const View<const f64, 2> chance = filtered_.transitions.leave[length];
         const f64 bins = static_cast<f64>(stretches_.bins[t]), halfway = until_event(bins);
         for (i64 room = 0; room < rooms_; ++room) {
-            arrival_[room] = dot(ways_.spread, comes_[0], ways_.patches_of(room));
+            arrival_[room] = dot(model_.spread, comes_[0], model_.patches_of(room));
             comers_[room] = 0.0;
         }
         for (i64 room = 0; room < rooms_; ++room) {
@@ -144,7 +144,7 @@ private:
                 const f64 left = leave_node(rooms_, mass[k], chance[k].data, arrival_.data(), comers_.data(),
                                             moments_.exits[k].data);
                 const f64 drawn =
-                    stage == 0 ? arrival_[room] : dot(ways_.spread, comes_[stage], ways_.patches_of(room));
+                    stage == 0 ? arrival_[room] : dot(model_.spread, comes_[stage], model_.patches_of(room));
                 const f64 moved = hop[k] * drawn;
                 go_[k] = left + moved;
                 moments_.time[k] += mass[k] * (halfway * left + bins * moved);
@@ -154,7 +154,7 @@ private:
         }
     }
 
-    // Add up those who leave one node; how likely that makes what follows.
+    // Add the expected exits of one node; returns the likelihood of the later evidence given an exit.
     static f64 leave_node(i64 rooms, f64 mass, const f64* chance, const f64* arrival, f64* __restrict comers,
                           f64* __restrict exits) {
         f64 left = 0.0;
@@ -166,16 +166,16 @@ private:
         return left;
     }
 
-    // Add up what is expected of coming to patches in a stretch.
+    // Add the expected arrivals at patches in a stretch.
     void arrive(i64 t, i64 stage) {
         const View<const f64> mass = filtered_.mass[t];
         const View<const f64> hop = filtered_.transitions.hop[filtered_.transitions.length[t]];
         const View<const f64> comes = comes_[stage];
         for (i64 room = 0; room < rooms_; ++room) {
             const i64 k = node(room, stage);
-            const auto [begin, end] = ways_.patches_of(room);
+            const auto [begin, end] = model_.patches_of(room);
             const f64 came = stage == 0 ? hop[k] * mass[k] + comers_[room] : hop[k] * mass[k];
-            arrive_room(end - begin, came, ways_.spread.data + begin, comes.data + begin,
+            arrive_room(end - begin, came, model_.spread.data + begin, comes.data + begin,
                         moments_.arrivals.data + begin);
         }
     }
@@ -184,8 +184,8 @@ private:
         for (i64 p = 0; p < patches; ++p) arrivals[p] += came * spread[p] * comes[p];
     }
 
-    // How likely each state of a stage before a stretch makes what follows, by staying where it is: in stage `then`,
-    // which is the same, or the next one. Adds up what is expected of that.
+    // Update the likelihoods of a stage for persons who stay in their patch, in stage `then`, which is the same stage
+    // or the next one; and add the expected moments.
     void stay(i64 t, i64 stage, i64 then) {
         const i64 length = filtered_.transitions.length[t];
         const f64 bins = static_cast<f64>(stretches_.bins[t]);
@@ -196,8 +196,8 @@ private:
         const View<const bool> visible = filtered_.visible[t];
         for (i64 room = 0; room < rooms_; ++room) {
             const i64 k = node(room, stage);
-            const auto [begin, end] = ways_.patches_of(room);
-            const f64 chance = then == stage ? rest[k] : leave(k, ways_.next_stage());
+            const auto [begin, end] = model_.patches_of(room);
+            const f64 chance = then == stage ? rest[k] : leave(k, model_.next_stage());
             const f64 total = visible[room] ? stay_visible(t, stage, then, room, chance)
                                             : stay_hidden(end - begin, chance, then == stage, go_[k],
                                                           comes.data + begin, was.data + begin, to.data + begin);
@@ -206,19 +206,19 @@ private:
                 moments_.rests[room] += bins * total;
             } else {
                 moments_.time[k] += until_event(bins) * total;
-                moments_.exits(k, ways_.next_stage()) += total;
+                moments_.exits(k, model_.next_stage()) += total;
             }
         }
     }
 
-    // In a room that was visible; the probability of it.
+    // The same for a room that was visible; returns the probability of staying.
     f64 stay_visible(i64 t, i64 stage, i64 then, i64 room, f64 chance) {
         const View<const f64> was_in_view = filtered_.in_view[t][stage], was_hidden = filtered_.hidden[t][stage];
         const View<f64> to_in_view = ahead_in_view_[stage], to_hidden = ahead_hidden_[stage];
         const View<const f64> in_view = in_view_[then], hidden = hidden_[then], comes = comes_[then];
         const View<const bool> same = filtered_.same[t];
         const f64 go = go_[node(room, stage)];
-        const auto [begin, end] = ways_.patches_of(room);
+        const auto [begin, end] = model_.patches_of(room);
         f64 total = 0.0;
         for (i64 p = begin; p < end; ++p) {
             const f64 if_in_view = chance * (same[p] ? in_view[p] : comes[p]);
@@ -230,7 +230,7 @@ private:
         return total;
     }
 
-    // In a room that wasn't: whatever is in view of it now, a hidden person comes to its patch anew.
+    // The same for a room that wasn't visible, where a hidden person's view is drawn anew.
     static f64 stay_hidden(i64 patches, f64 chance, bool first, f64 go, const f64* comes, const f64* was,
                            f64* __restrict to) {
         f64 total = 0.0;
@@ -242,47 +242,47 @@ private:
         return total;
     }
 
-    // Bins until what happens in a stretch, on average.
+    // Mean number of bins until an event within a stretch.
     static f64 until_event(f64 bins) { return 0.5 * (bins + 1); }
 
     i64 node(i64 room, i64 stage) const { return room * stages_ + stage; }
 
-    const Ways& ways_;
+    const StayModel& model_;
     const Stretches& stretches_;
     const Filtered& filtered_;
     const Moments& moments_;
     const i64 rooms_, stages_;
-    // How likely each state makes all after a stretch, (stages, patches). In view only where visible.
+    // The likelihood of all evidence after a stretch for each state, (stages, patches). In view only where visible.
     Array<f64, 2> ahead_in_view_, ahead_hidden_;
-    // How well each state in a stretch, and coming to each patch, explains it and all after it, (stages, patches).
+    // The likelihood of a stretch and all later ones for each state, and for coming to each patch, (stages, patches).
     Array<f64, 2> in_view_, hidden_, comes_;
     Array<f64> sums_;     // (nodes,)
-    Array<f64> arrival_;  // (rooms,) how well coming to a room in a stretch explains it and all after it
-    Array<f64> go_;       // (nodes,) how likely leaving the room, or a change of patch, makes what follows
-    Array<f64> comers_;   // (rooms,) the probability to come from another room
+    Array<f64> arrival_;  // (rooms,) likelihood of a stretch and all later ones given an arrival in the room
+    Array<f64> go_;       // (nodes,) likelihood of the later evidence given an exit or a change of patch
+    Array<f64> comers_;   // (rooms,) probability of coming from another room
 };
 
 }  // namespace
 
-Smoothed smooth(const Ways& ways, const Stretches& stretches, View<const f64, 2> dawn, View<const f64, 2> dusk,
+Smoothed smooth(const StayModel& model, const Stretches& stretches, View<const f64, 2> prior, View<const f64, 2> future,
                 const Moments& moments) {
-    const i64 count = stretches.size(), stages = ways.stages(), patches = ways.patches();
+    const i64 count = stretches.size(), stages = model.stages(), patches = model.patches();
     auto now = Array<f64, 3>::zeros({2, stages, patches});
     for (i64 stage = 0; stage < stages; ++stage) {
-        std::copy(dawn[stage].begin(), dawn[stage].end(), now[1][stage].begin());
+        std::copy(prior[stage].begin(), prior[stage].end(), now[1][stage].begin());
     }
-    const Filtered filtered = filter_stays(ways, stretches, now, Array<i64>::filled({patches}, -1));
+    const Filtered filtered = filter_stays(model, stretches, now, Array<i64>::filled({patches}, -1));
 
-    Smoothed made{Array<f64, 2>::zeros({count, ways.rooms()}), Array<f64, 2>::empty({stages, patches}), {}};
+    Smoothed result{Array<f64, 2>::zeros({count, model.rooms()}), Array<f64, 2>::empty({stages, patches}), {}};
     for (i64 stage = 0; stage < stages; ++stage) {
         const View<const f64> in_view = filtered.in_view[count][stage], hidden = filtered.hidden[count][stage];
-        for (i64 p = 0; p < patches; ++p) made.end(stage, p) = in_view[p] + hidden[p];
+        for (i64 p = 0; p < patches; ++p) result.end(stage, p) = in_view[p] + hidden[p];
     }
-    BackwardPass pass(ways, stretches, filtered, moments);
-    pass.begin(made.end, dusk);
-    for (i64 t = count - 1; t >= 0; --t) pass.step(t, made.places[t]);
-    made.ahead = pass.ahead();
-    return made;
+    BackwardPass pass(model, stretches, filtered, moments);
+    pass.begin(result.end, future);
+    for (i64 t = count - 1; t >= 0; --t) pass.step(t, result.places[t]);
+    result.ahead = pass.ahead();
+    return result;
 }
 
 }  // namespace fleet2d

@@ -1,37 +1,37 @@
-// Stays of a person given all evidence, earlier and later; and what to learn from them.
+// The stays of a person given all evidence, earlier and later: smoothing, and expected moments for learning.
 #pragma once
 
 #include "stays.hpp"
 
 namespace fleet2d {
 
-// What is expected of a person's stays, given all evidence.
+// Expected moments of a person's stays, given all evidence.
 struct Moments {
-    View<f64> time;      // (nodes,), bins
-    View<f64, 2> exits;  // (nodes, rooms + 1), how often each is followed by what
-    View<f64> arrivals;  // (patches,), how often who came, or changed patch, came there
-    View<f64> moves;     // (rooms,), changes of patch
-    View<f64> rests;     // (rooms,), bins without one
+    View<f64> time;      // (nodes,) bins spent in the node
+    View<f64, 2> exits;  // (nodes, rooms + 1) transitions to each room, and to the next stage
+    View<f64> arrivals;  // (patches,) arrivals at the patch, from another room or patch
+    View<f64> moves;     // (rooms,) changes of patch
+    View<f64> rests;     // (rooms,) bins without a change of patch
 };
 
 struct Smoothed {
-    Array<f64, 2> places;  // (stretches, rooms), P(room) in each stretch
-    Array<f64, 2> end;     // (stages, patches), probability after the last, given what was before
-    Array<f64, 2> ahead;   // (stages, patches), how likely each before the first makes the evidence, largest 1
+    Array<f64, 2> places;  // (stretches, rooms) P(room) in each stretch
+    Array<f64, 2> end;     // (stages, patches) filtered probability after the last stretch
+    Array<f64, 2> ahead;   // (stages, patches) likelihood of all evidence for each state before the first, largest 1
 };
 
-// Where a person was, given all evidence of some stretches; `moments` are added to.
+// The distribution over rooms in each stretch, given all evidence; adds to `moments`.
 //
-// Between two stretches a person may go on once: leave a stage, with the chance to do so within the later one, or
-// change patch within the room. With stretches of one bin that is a hidden Markov chain; with longer ones, what
-// happens within a stretch is taken to happen as it begins. Who comes to a patch of which a part is in view is in
-// that part with the chance of its size, and stays in it or out of it until the person moves or what is in view of
-// it changes. In view one isn't perceived in any of n bins with (1 - detection)^n; out of view never, unless
-// nothing of the patch was in view where somebody was perceived: positions may be noisy.
+// Between two stretches a person may make one transition: leave a stage, with the probability of doing so within
+// the later stretch, or change patch within the room. With stretches of one bin that is a hidden Markov chain; with
+// longer ones, transitions within a stretch count as if they happened at its begin. A person who comes to a patch is
+// in its visible part with the probability of its size, and stays in or out of view until the person moves or the
+// view changes. A person in view is missed in all of n bins with probability (1 - detection)^n; a person out of view
+// is never perceived, unless nothing of the patch is in view: positions may be noisy.
 //
-// `dawn` (stages, patches) is the probability before the first stretch, `dusk` (stages, patches) how likely each
-// makes what comes after the last.
-Smoothed smooth(const Ways& ways, const Stretches& stretches, View<const f64, 2> dawn, View<const f64, 2> dusk,
+// `prior` (stages, patches) is the probability before the first stretch, `future` (stages, patches) the likelihood
+// of the evidence after the last one.
+Smoothed smooth(const StayModel& model, const Stretches& stretches, View<const f64, 2> prior, View<const f64, 2> future,
                 const Moments& moments);
 
 }  // namespace fleet2d

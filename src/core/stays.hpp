@@ -1,7 +1,7 @@
-// Stays of a person, hidden or seen: a semi-Markov chain over patches of rooms, filtered.
+// The stays of a person as a hidden semi-Markov chain over patches of rooms: filtering.
 //
-// No logarithm, no library's product, and one order of sums: what is learned, and where a robot goes
-// because of it, is the same on every machine.
+// It uses no logarithms, no matrix products of libraries, and one order of sums, so that learned models, and
+// the decisions of robots that follow from them, are the same on every machine.
 //
 // Rooms are all places to stay in; the last one is away. A stay passes through stages. A node is one
 // stage of stays in one room, number room * stages + stage. A state is a node, a patch of its room,
@@ -12,35 +12,35 @@
 
 namespace fleet2d {
 
-inline constexpr i64 WHOLE_PATCH = 255;   // what is shown of a patch that is in view as a whole
-inline constexpr f64 FALSE_ALARM = 1e-3;  // weight of the chance that a person perceived in a patch is elsewhere
-inline constexpr f64 NEVER_SURE = 1e-12;  // least chance that a person in view isn't perceived, however long
+inline constexpr i64 WHOLE_PATCH = 255;   // value of `shown` for a patch that is completely in view
+inline constexpr f64 FALSE_ALARM = 1e-3;  // likelihood of a sighting of a person who is elsewhere
+inline constexpr f64 NEVER_SURE = 1e-12;  // least chance that a person in view isn't perceived, for any length
 
-// Evidence of one user; bins that are alike are taken together.
+// Evidence of one user, with equal consecutive bins merged.
 struct Stretches {
-    View<const i64> bins;     // (stretches,) how many bins each has
-    View<const i64> hour;     // (stretches,) of the day
-    View<const u8, 2> shown;  // (stretches, patches) what part of each patch was in view, in 1/255; away never is
+    View<const i64> bins;     // (stretches,) number of bins
+    View<const i64> hour;     // (stretches,) hour of the day
+    View<const u8, 2> shown;  // (stretches, patches) part of each patch in view, in 1/255; 0 for away
     View<const i64> begin;    // (stretches + 1,) where each stretch's sightings begin in `patch` and `share`
     View<const i64> patch;    // (sightings,) where the user was perceived
-    View<const f64> share;    // (sightings,) at what share of the steps with a sighting
+    View<const f64> share;    // (sightings,) share of the steps with a sighting
 
     i64 size() const { return bins.size(); }
 };
 
-// What part of a patch is in view, from 0 to 1.
+// The part of a patch in view, from 0 to 1.
 inline f64 part_in_view(u8 shown) { return shown * (1.0 / WHOLE_PATCH); }
 
 struct Range {
     i64 begin, end;
 };
 
-// How a person goes on: from stage to stage of a stay, and from room to room.
-struct Ways {
-    View<const f64> stay;       // (nodes,) chance to be in the same stage a bin later
-    View<const f64, 2> follow;  // (nodes, rooms + 1) where a person goes after the stage: each room, and the next stage
-    View<const f64> spread;     // (patches,) chance that a person who comes to its room comes to the patch
-    View<const f64> restless;   // (rooms,) chance a bin that a person who stays in a room changes patch
+// The transition probabilities of a person: between stages of a stay, and between rooms.
+struct StayModel {
+    View<const f64> stay;       // (nodes,) probability of the same stage a bin later
+    View<const f64, 2> follow;  // (nodes, rooms + 1) distribution after the stage: each room, and the next stage
+    View<const f64> spread;     // (patches,) probability of the patch given that a person comes to its room
+    View<const f64> restless;   // (rooms,) probability per bin of changing patch during a stay
     View<const i64> first;      // (rooms + 1,) the first patch of each room, and the number of patches
     f64 detection = 0;          // chance that a person in view is perceived in a bin
 
@@ -53,43 +53,44 @@ struct Ways {
     Range patches_of(i64 room) const { return {first[room], first[room + 1]}; }
 };
 
-// What a person does within a stretch, for each length that stretches have.
+// Transition probabilities over a stretch, for each length that stretches have.
 struct Transitions {
-    Array<i64> length;    // (stretches,) the number of each stretch's length
-    Array<f64, 2> over;   // (lengths, nodes) chance that the stage is over
-    Array<f64, 2> rest;   // (lengths, nodes) chance to be in the same stage, without a change of patch
-    Array<f64, 2> hop;    // (lengths, nodes) chance to be in the same stage, after a change of patch
-    Array<f64, 3> leave;  // (lengths, nodes, rooms + 1) chance to go on to each room, and to the next stage
-    Array<f64> missed;    // (lengths,) chance that a person in view isn't perceived
+    Array<i64> length;    // (stretches,) the index of each stretch's length
+    Array<f64, 2> over;   // (lengths, nodes) that the stage ends
+    Array<f64, 2> rest;   // (lengths, nodes) of the same stage, without a change of patch
+    Array<f64, 2> hop;    // (lengths, nodes) of the same stage, with a change of patch
+    Array<f64, 3> leave;  // (lengths, nodes, rooms + 1) of going to each room, and to the next stage
+    Array<f64> missed;    // (lengths,) that a person in view isn't perceived
 };
 
-// What the evidence up to each stretch says of a person; number 0 is before the first stretch.
+// The filtered distributions: given the evidence up to each stretch; index 0 is before the first stretch.
 //
-// Robots look into few rooms at a time. Where `visible` is false nothing of the room is in view, and
-// `in_view` is 0: that half of the states can be left out, and no sum changes.
+// Robots see few rooms at a time. Where `visible` is false, nothing of the room is in view, and `in_view`
+// is 0: that half of the states can be skipped, without changing any sum.
 struct Filtered {
     Transitions transitions;
     Array<f64, 3> in_view;   // (stretches + 1, stages, patches) probability of each state in view
     Array<f64, 3> hidden;    // (stretches + 1, stages, patches) probability of each hidden state
     Array<bool, 2> visible;  // (stretches + 1, rooms) whether the person may be in view in the room
     Array<f64, 2> mass;      // (stretches + 1, nodes) probability of each node
-    Array<f64, 2> likely;    // (stretches, 2) how well states in view, and hidden ones, explain no sighting in them
-    Array<f64> scale;        // (stretches,) factor that made probabilities sum to one
-    Array<bool, 2> same;     // (stretches, patches) whether as much of the patch is in view as before
+    Array<f64, 2> likely;    // (stretches, 2) likelihood of no sighting, for states in view and for hidden ones
+    Array<f64> scale;        // (stretches,) factor that normalized the probabilities
+    Array<bool, 2> same;     // (stretches, patches) whether the part of the patch in view is the same as before
 };
 
-// Filter some stretches; `smooth` says by which rules.
+// Filter stretches; the model is described at `smooth`.
 //
 // `now` (2, stages, patches) is the probability before the first stretch, of states in view and of hidden ones;
-// `shown` (patches,) is what part of each patch was in view before, -1 if that isn't known.
-Filtered filter_stays(const Ways& ways, const Stretches& stretches, View<const f64, 3> now, View<const i64> shown);
+// `shown` (patches,) is the part of each patch that was in view before, -1 if unknown.
+Filtered filter_stays(const StayModel& model, const Stretches& stretches, View<const f64, 3> now,
+                      View<const i64> shown);
 
 // P(room) in each stretch, given the evidence up to it: (stretches, rooms). There must be a stretch.
 // `now` and `shown` are those of `filter_stays`; they become those after the last stretch.
-Array<f64, 2> follow(const Ways& ways, const Stretches& stretches, View<f64, 3> now, View<i64> shown);
+Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f64, 3> now, View<i64> shown);
 
-// Weigh states (stages, patches) by the sightings in a stretch. They speak for states in view, or for hidden ones
-// in a patch of which nothing is in view: positions may be noisy. `likely` (2,) is that of Filtered.
+// Weight states (stages, patches) by the sightings in a stretch. They are evidence for states in view, or for
+// hidden states of a patch of which nothing is in view, as positions may be noisy. `likely` (2,) is that of Filtered.
 void weigh_sightings(const Stretches& stretches, i64 t, View<const f64> likely, View<f64, 2> in_view,
                      View<f64, 2> hidden);
 
@@ -103,17 +104,17 @@ struct OwnedStretches {
     Array<f64> share;
 };
 
-// At how many steps of each bin a user was perceived in each patch, where that isn't 0; by bin and patch, ascending.
+// Numbers of steps at which a user was perceived, by bin and patch, ascending, without zeros.
 struct PatchCounts {
     View<const i64> bin;
     View<const i64> patch;
     View<const i64> steps;
 };
 
-// Take together bins in which the same was in view and the user was perceived alike, at most `longest`.
+// Merge at most `longest` consecutive bins with the same view and the same sightings.
 //
-// Bins in which the user was perceived in several patches stay by themselves, and no stretch goes on into another
-// hour. `minute` (bins,) is that since midnight; `shown` (bins, patches) as in Stretches, without away.
-OwnedStretches take_together(View<const i64> minute, View<const u8, 2> shown, const PatchCounts& seen, i64 longest);
+// Bins in which the user was perceived in several patches aren't merged, and no stretch crosses an hour. `minute`
+// (bins,) is the time since midnight; `shown` (bins, patches) as in Stretches, without away.
+OwnedStretches merge_bins(View<const i64> minute, View<const u8, 2> shown, const PatchCounts& seen, i64 longest);
 
 }  // namespace fleet2d

@@ -1,7 +1,7 @@
-// Timelines: how each body of a run moves, piece after piece, and the runs of equal pose that follow from it.
+// Timelines: the motion of each body of a run, piece after piece, and its runs of equal pose.
 //
-// Most of the time nobody moves. A window of a timeline lists the steps at which a body's pose changes, so that
-// what is made of it costs as much as what happens, not as much as there are steps.
+// Bodies rest most of the time. A window of a timeline lists the steps at which a body's pose changes, so that the
+// cost of what is computed from it depends on the number of changes, not on the number of steps.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace fleet2d {
 
-// How a body stands at a step.
+// The pose of a body at a step.
 struct BodyPose {
     i64 x, y;     // lattice units
     i64 heading;  // 1/4096 turn
@@ -60,7 +60,7 @@ struct TrackPiece {
 
 // A random walk between walls, and the poses that were drawn of it so far.
 struct WalkPiece {
-    Mesh walls;  // the memory of both belongs to whoever keeps the timelines
+    Mesh walls;  // the owner of the timelines owns the memory of both meshes
     Mesh space;
     WalkRule rule;
     i64 drawn_from = 0;  // the step of the first pose that is kept

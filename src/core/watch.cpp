@@ -10,7 +10,7 @@ namespace {
 
 constexpr i64 FAR_AWAY = i64{1} << 40;  // lattice units: nobody who is further out sees a home
 
-// What tells poses apart.
+// The key of a pose in the cache.
 struct Stance {
     i64 x, y, heading;
     i64 panned;  // how far the cameras are panned
@@ -18,7 +18,7 @@ struct Stance {
     bool operator==(const Stance&) const = default;
 };
 
-// One number for how far all cameras are panned.
+// One number for the pan positions of all cameras.
 i64 panned_at(const Lenses& lenses, i64 moment_us) {
     u64 number = 0;
     for (i64 camera = 0; camera < lenses.pan_count.size(); ++camera) {
@@ -31,19 +31,19 @@ i64 panned_at(const Lenses& lenses, i64 moment_us) {
 }
 
 // The slot that holds a pose, or the empty one that it would go to.
-i64 slot_of(const Glances& glances, const Stance& stance) {
+i64 slot_of(const PoseCache& cache, const Stance& stance) {
     u64 hash = static_cast<u64>(stance.x) * 0x9E3779B97F4A7C15;
     hash ^= static_cast<u64>(stance.y) * 0xC2B2AE3D27D4EB4F;
     hash ^= static_cast<u64>(stance.panned) * TURN + static_cast<u64>(stance.heading);
     hash *= 0x165667B19E3779F9;
-    const i64 mask = glances.slots() - 1;
+    const i64 mask = cache.slots() - 1;
     i64 slot = static_cast<i64>(hash >> 33) & mask;
     for (i64 tried = 0; tried <= mask; ++tried, slot = (slot + 1) & mask) {
-        if (glances.last[slot] == NEVER) return slot;
-        const View<i64> pose = glances.pose[slot];
+        if (cache.last[slot] == NEVER) return slot;
+        const View<i64> pose = cache.pose[slot];
         if (Stance{pose[0], pose[1], pose[2], pose[3]} == stance) return slot;
     }
-    throw std::invalid_argument("more slots of glances are used than `used` says");
+    throw std::invalid_argument("more slots of cache are used than `used` says");
 }
 
 // The cells of a span.
@@ -62,44 +62,43 @@ void count_cells(i64 patch, i64 count, View<i32> cells) {
 // Finds the cells that a robot's cameras show.
 class Looker {
 public:
-    explicit Looker(const Watched& watched)
-        : watched_(watched), finder_(watched.walls, watched.patch_of_cell.shape[0], watched.patch_of_cell.shape[1]) {}
+    explicit Looker(const WatchSetup& setup)
+        : setup_(setup), finder_(setup.walls, setup.patch_of_cell.shape[0], setup.patch_of_cell.shape[1]) {}
 
     // The cells that one camera shows from a pose of the robot; valid until the next call.
     const std::vector<Span>& look(i64 camera, View<const i64> pose, i64 step) {
-        const Lenses& lenses = watched_.lenses;
+        const Lenses& lenses = setup_.lenses;
         const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FAR_AWAY, FAR_AWAY); };
         const Pose robot{clamped(pose[0]), clamped(pose[1]), pose[2] & (TURN - 1)};
         return finder_.cells_in_view(
-            camera_pose(lenses, camera, robot, step * watched_.step_us),
+            camera_pose(lenses, camera, robot, step * setup_.step_us),
             {lenses.near_squared[camera], lenses.far_squared[camera], lenses.half_angle[camera]});
     }
 
 private:
-    const Watched& watched_;
+    const WatchSetup& setup_;
     CellFinder finder_;
 };
 
-void settle(const Watched& watched, const Glances& glances, View<i64, 2> seen, Looker& looker) {
-    for (i64 slot = 0; slot < glances.slots(); ++slot) {
-        const i64 step = glances.last[slot];
-        if (step == glances.settled[slot]) continue;
-        if (step < 0 || step > LAST_MOMENT / watched.step_us)
-            throw std::invalid_argument("last must hold steps, or -1");
-        glances.settled[slot] = step;
-        for (i64 camera = 0; camera < watched.cameras(); ++camera) {
-            for (const Span& span : looker.look(camera, glances.pose[slot], step)) {
+void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen, Looker& looker) {
+    for (i64 slot = 0; slot < cache.slots(); ++slot) {
+        const i64 step = cache.last[slot];
+        if (step == cache.settled[slot]) continue;
+        if (step < 0 || step > LAST_MOMENT / setup.step_us) throw std::invalid_argument("last must hold steps, or -1");
+        cache.settled[slot] = step;
+        for (i64 camera = 0; camera < setup.cameras(); ++camera) {
+            for (const Span& span : looker.look(camera, cache.pose[slot], step)) {
                 for (i64& last : cells_of(seen, span)) last = std::max(last, step);
             }
         }
     }
 }
 
-// Takes in runs of equal pose one after the other. It holds the pose that the robot has, until it takes another one.
+// Processes runs of equal pose one after the other. It holds the present pose until the next one.
 class Watcher {
 public:
-    Watcher(const Watched& watched, const Glances& glances, const Record& record)
-        : watched_(watched), glances_(glances), record_(record), looker_(watched) {}
+    Watcher(const WatchSetup& setup, const PoseCache& cache, const SightRecord& record)
+        : setup_(setup), cache_(cache), record_(record), looker_(setup) {}
 
     void watch(const Window& window, i64 body, i64 first, i64 end);
 
@@ -111,12 +110,12 @@ private:
     void look_from(i64 slot, i64 step);
     void mark(const Span& span, i64 step, View<i32> cells);
 
-    // Add what the held pose shows in the looks since it was taken or added; `bin` is a row of Record::binned.
+    // Add the view of the held pose for the looks not added yet; `bin` is a row of SightRecord::binned.
     void add_held(i64 bin);
 
-    const Watched& watched_;
-    const Glances& glances_;
-    const Record& record_;
+    const WatchSetup& setup_;
+    const PoseCache& cache_;
+    const SightRecord& record_;
     Looker looker_;
     Stance held_{};
     i64 slot_ = -1;  // of the held pose; -1 for none
@@ -125,35 +124,35 @@ private:
 };
 
 void Watcher::take(const Stance& stance, i64 step) {
-    if (2 * glances_.used[0] >= glances_.slots()) {
-        if (record_.keeps_last()) settle(watched_, glances_, record_.last, looker_);
-        std::fill(glances_.last.begin(), glances_.last.end(), NEVER);
-        std::fill(glances_.settled.begin(), glances_.settled.end(), NEVER);
-        glances_.used[0] = 0;
+    if (2 * cache_.used[0] >= cache_.slots()) {
+        if (record_.keeps_last()) settle(setup_, cache_, record_.last, looker_);
+        std::fill(cache_.last.begin(), cache_.last.end(), NEVER);
+        std::fill(cache_.settled.begin(), cache_.settled.end(), NEVER);
+        cache_.used[0] = 0;
     }
     held_ = stance;
-    slot_ = slot_of(glances_, stance);
-    if (glances_.last[slot_] != NEVER) return;
-    const View<i64> pose = glances_.pose[slot_];
+    slot_ = slot_of(cache_, stance);
+    if (cache_.last[slot_] != NEVER) return;
+    const View<i64> pose = cache_.pose[slot_];
     pose[0] = stance.x, pose[1] = stance.y, pose[2] = stance.heading, pose[3] = stance.panned;
     look_from(slot_, step);
-    glances_.last[slot_] = glances_.settled[slot_] = step;
-    ++glances_.used[0];
+    cache_.last[slot_] = cache_.settled[slot_] = step;
+    ++cache_.used[0];
 }
 
 void Watcher::look_from(i64 slot, i64 step) {
-    const View<i32> cells = glances_.cells[slot];
+    const View<i32> cells = cache_.cells[slot];
     std::fill(cells.begin(), cells.end(), 0);
-    for (i64 camera = 0; camera < watched_.cameras(); ++camera) {
-        for (const Span& span : looker_.look(camera, glances_.pose[slot], step)) mark(span, step, cells);
+    for (i64 camera = 0; camera < setup_.cameras(); ++camera) {
+        for (const Span& span : looker_.look(camera, cache_.pose[slot], step)) mark(span, step, cells);
     }
 }
 
 void Watcher::mark(const Span& span, i64 step, View<i32> cells) {
     for (i64& first : cells_of(record_.first, span)) first = first == NEVER ? step : first;
     if (record_.keeps_last()) std::ranges::fill(cells_of(record_.last, span), step);
-    const View<const i16> patches = cells_of(watched_.patch_of_cell, span);
-    if (watched_.cameras() == 1) {
+    const View<const i16> patches = cells_of(setup_.patch_of_cell, span);
+    if (setup_.cameras() == 1) {
         for (i64 i = 0, end = 0; i < patches.size(); i = end) {  // neighbours mostly belong to one patch
             while (end < patches.size() && patches[end] == patches[i]) ++end;
             count_cells(patches[i], end - i, cells);
@@ -170,9 +169,9 @@ void Watcher::mark(const Span& span, i64 step, View<i32> cells) {
 
 void Watcher::add_held(i64 bin) {
     if (slot_ < 0) return;
-    glances_.last[slot_] = last_look_;
-    const i64 steps = looks_ * watched_.every;
-    const View<i32> cells = glances_.cells[slot_];
+    cache_.last[slot_] = last_look_;
+    const i64 steps = looks_ * setup_.every;
+    const View<i32> cells = cache_.cells[slot_];
     for (i64 patch = 0; patch < record_.patches(); ++patch) record_.exposure[patch] += steps * cells[patch];
     if (!record_.keeps_bins() || steps == 0) return;
     const View<i64> binned = record_.binned[bin], most = record_.most[bin];
@@ -183,9 +182,9 @@ void Watcher::add_held(i64 bin) {
 }
 
 void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
-    const i64 every = watched_.every, bin_steps = watched_.bin_steps;
+    const i64 every = setup_.every, bin_steps = setup_.bin_steps;
     const bool bins = record_.keeps_bins();
-    const bool pans = std::any_of(watched_.lenses.pan_count.begin(), watched_.lenses.pan_count.end(),
+    const bool pans = std::any_of(setup_.lenses.pan_count.begin(), setup_.lenses.pan_count.end(),
                                   [](i64 headings) { return headings > 0; });
     const i64 first_bin = floor_div(first, bin_steps);
     i64 bin = 0, next_bin = (first_bin + 1) * bin_steps;
@@ -210,7 +209,7 @@ void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
                 bin = floor_div(step, bin_steps) - first_bin;
                 next_bin = (first_bin + bin + 1) * bin_steps;
             }
-            const i64 panned = pans ? panned_at(watched_.lenses, step * watched_.step_us) : 0;
+            const i64 panned = pans ? panned_at(setup_.lenses, step * setup_.step_us) : 0;
             const Stance stance{window.x[run], window.y[run], window.heading[run], panned};
             if (slot_ < 0 || stance != held_) {
                 add_held(bin);
@@ -229,14 +228,14 @@ void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
 
 }  // namespace
 
-void watch(const Watched& watched, const Window& window, i64 body, i64 first, i64 end, const Glances& glances,
-           const Record& record) {
-    Watcher(watched, glances, record).watch(window, body, first, end);
+void watch(const WatchSetup& setup, const Window& window, i64 body, i64 first, i64 end, const PoseCache& cache,
+           const SightRecord& record) {
+    Watcher(setup, cache, record).watch(window, body, first, end);
 }
 
-void settle(const Watched& watched, const Glances& glances, View<i64, 2> seen) {
-    Looker looker(watched);
-    settle(watched, glances, seen, looker);
+void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen) {
+    Looker looker(setup);
+    settle(setup, cache, seen, looker);
 }
 
 }  // namespace fleet2d

@@ -1,8 +1,8 @@
-// What a robot has seen over time: when it saw each cell, and how much of each room for how long.
+// What a robot has seen over time: the steps at which it saw each cell, and how much of each room for how long.
 //
-// Most of the time a robot stands, and on its rounds it comes by the same poses again, so what a pose shows is
-// kept: how many cells of each room, and the last step at which the pose was taken. The cells themselves are
-// found again when somebody asks which were seen last.
+// A robot stands most of the time, and it returns to the same poses on its rounds, so the view of a pose is cached:
+// the number of cells of each room, and the last step at which the robot had the pose. The cells themselves are
+// computed again when the last steps are needed.
 #pragma once
 
 #include "lens.hpp"
@@ -13,19 +13,19 @@ namespace fleet2d {
 inline constexpr i64 NEVER = -1;
 inline constexpr i64 LAST_MOMENT = i64{1} << 62;  // us: no step begins later
 
-// The poses kept, in an open hash table; a power of two long, and at most half full.
-struct Glances {
+// The cached poses, in an open hash table whose length is a power of two, at most half full.
+struct PoseCache {
     View<i64, 2> pose;   // (slots, 4) x, y [lattice units], heading, and how far the cameras are panned
-    View<i64> last;      // (slots,) the last step at which it was taken; NEVER for an empty slot
-    View<i64> settled;   // (slots,) the last such step that Record::last knows of
-    View<i32, 2> cells;  // (slots, patches) cells of each patch that it shows
-    View<i64> used;      // (1,) how many slots are used
+    View<i64> last;      // (slots,) the last step with the pose; NEVER for an empty slot
+    View<i64> settled;   // (slots,) the last such step that is in SightRecord::last
+    View<i32, 2> cells;  // (slots, patches) cells of each patch in view
+    View<i64> used;      // (1,) number of used slots
 
     i64 slots() const { return last.size(); }
 };
 
-// What a robot has seen since the start. A patch is a room, or part of one.
-struct Record {
+// What a robot has seen since the start. A patch is a room, or a part of one.
+struct SightRecord {
     View<i64, 2> first;    // (rows, columns) the first step at which each cell was in view, or NEVER
     View<i64, 2> last;     // (rows, columns) the last such step as far as `settle` was called; empty: not kept
     View<i64> exposure;    // (patches,) cells of each patch in view, summed over the steps
@@ -39,24 +39,24 @@ struct Record {
     bool keeps_bins() const { return binned.size() > 0; }
 };
 
-// What doesn't change while a robot watches.
-struct Watched {
+// The constants of a robot's watching.
+struct WatchSetup {
     Mesh walls;
     Lenses lenses;                     // the robot's cameras
     View<const i16, 2> patch_of_cell;  // (rows, columns) -1 for a cell of no patch
     i64 step_us;                       // length of a step
-    i64 every;                         // it looks at the steps that this divides; each look stands for so many
-    i64 bin_steps;                     // steps of a bin of Record::binned; bins begin at step 0
+    i64 every;                         // it looks at multiples of this step; each look counts for this many steps
+    i64 bin_steps;                     // steps of a bin of SightRecord::binned; bins begin at step 0
 
     i64 cameras() const { return lenses.near_squared.size(); }
 };
 
-// Take in what the robot that is a body of a window sees in the steps first to end - 1. `glances` are emptied when
-// the table is half full. `record.last` lags behind where a pose comes again: see `settle`.
-void watch(const Watched& watched, const Window& window, i64 body, i64 first, i64 end, const Glances& glances,
-           const Record& record);
+// Record what a robot, which is a body of a window, sees in the steps first to end - 1. The cache is emptied when it
+// is half full. `record.last` isn't updated for poses in the cache: see `settle`.
+void watch(const WatchSetup& setup, const Window& window, i64 body, i64 first, i64 end, const PoseCache& cache,
+           const SightRecord& record);
 
-// Bring `seen`, the last step of each cell, up to date with poses that were taken again.
-void settle(const Watched& watched, const Glances& glances, View<i64, 2> seen);
+// Update `seen`, the last step of each cell, for the poses in the cache.
+void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen);
 
 }  // namespace fleet2d

@@ -228,11 +228,11 @@ def line_of_sight(mesh: Mesh, qx: int, qy: int, triangle: int, px: int, py: int)
 
     Args:
         mesh: Free space.
-        qx: Where the eye is, lattice units.
-        qy: Where the eye is, lattice units.
+        qx: Position of the eye [lattice units].
+        qy: Position of the eye [lattice units].
         triangle: A triangle that holds q, from `locate`; -1 is allowed.
-        px: Where the looked-for point is, lattice units.
-        py: Where the looked-for point is, lattice units.
+        px: Position of the point [lattice units].
+        py: Position of the point [lattice units].
     """
 
 @overload
@@ -250,9 +250,9 @@ def build_fans(mesh: Mesh) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typ
 
 def vertices_seen_from_point(mesh: Mesh, x: int, y: int) -> numpy.typing.NDArray[numpy.int32]:
     """
-    Return the vertices that a straight way from a point leads to.
+    Return the vertices visible from a point.
 
-    Between the point and the vertex the way touches no wall and no other vertex. A point on a wall
+    The segment between the point and the vertex touches no wall and no other vertex. A point on a wall
     also sees the ends of that wall. A point at a vertex sees only that vertex.
 
     Args:
@@ -266,9 +266,9 @@ def vertices_seen_from_point(mesh: Mesh, x: int, y: int) -> numpy.typing.NDArray
 
 def vertices_seen_from_vertex(mesh: Mesh, vertex: int) -> numpy.typing.NDArray[numpy.int32]:
     """
-    Return the vertices that a straight way from a vertex leads to.
+    Return the vertices visible from a vertex.
 
-    Between the two the way touches no wall and no other vertex, or it runs along one wall.
+    The segment between the two touches no wall and no other vertex, or it runs along one wall.
 
     Args:
         mesh: Free space.
@@ -278,9 +278,9 @@ def vertices_seen_from_vertex(mesh: Mesh, vertex: int) -> numpy.typing.NDArray[n
         int32 (n,), in no particular order, each once.
     """
 
-def see_each(mesh: Mesh, eyes: numpy.typing.NDArray[numpy.int64], places: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
+def pairs_in_sight(mesh: Mesh, eyes: numpy.typing.NDArray[numpy.int64], places: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
     """
-    Return for each pair whether the two see each other: what is on a wall sees nothing.
+    Return for each pair whether the two see each other; places on a wall see nothing.
 
     Fastest if pairs of the same eye follow each other.
 
@@ -299,16 +299,16 @@ def label_frames(labels: numpy.typing.NDArray[numpy.int32], count: int) -> numpy
 
     Args:
         labels: int32 (rows, columns), below `count`, -1 for none.
-        count: How many labels there are.
+        count: Number of labels.
 
     Returns:
         First row, first column, last row and last column, plus one, int64 (count, 4); of a label
         without cells first ones beyond the last.
     """
 
-def fill_beside(labels: numpy.typing.NDArray[numpy.int16]) -> numpy.typing.NDArray[numpy.int16]:
+def fill_from_neighbors(labels: numpy.typing.NDArray[numpy.int16]) -> numpy.typing.NDArray[numpy.int16]:
     """
-    Give cells without a label that of a cell that touches them.
+    Label cells without a label like a cell that touches them.
 
     First of one across a side, then of one across a corner; west before east, south before north.
 
@@ -321,16 +321,16 @@ def fill_beside(labels: numpy.typing.NDArray[numpy.int16]) -> numpy.typing.NDArr
 
 def spread_labels(labels: numpy.typing.NDArray[numpy.int32], mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int32]:
     """
-    Give every cell of a mask that has no label the nearest one, in steps across sides.
+    Label every cell of a mask that has no label like the nearest labelled cell, in steps across sides.
 
-    Of labels that are equally near the lowest is taken.
+    Of equally near labels, the lowest counts.
 
     Args:
-        labels: int32 (rows, columns), -1 for none; those outside the mask count for nothing.
+        labels: int32 (rows, columns), -1 for none; labels outside the mask are ignored.
         mask: Where labels may spread, bool (rows, columns).
 
     Returns:
-        Labels, int32 (rows, columns); -1 outside the mask and where no way leads from a label.
+        Labels, int32 (rows, columns); -1 outside the mask and for cells that can't be reached from a label.
     """
 
 def label_parts(mask: numpy.typing.NDArray[numpy.bool_], diagonal: bool) -> numpy.typing.NDArray[numpy.int32]:
@@ -354,12 +354,12 @@ def count_steps(start: numpy.typing.NDArray[numpy.bool_], mask: numpy.typing.NDA
         mask: Where steps may lead, bool (rows, columns).
 
     Returns:
-        Steps, int32 (rows, columns); 0 at the start, -1 where no way leads.
+        Steps, int32 (rows, columns); 0 at the start, -1 for unreachable pixels.
     """
 
 def trace_rings(mask: numpy.typing.NDArray[numpy.bool_]) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int64]]:
     """
-    Return the rings between a mask and what is not in it, along the sides of the pixels.
+    Return the border rings of a mask, along the sides of the pixels.
 
     Rings have the mask on their left: outer ones run counter-clockwise, holes clockwise (x is the
     column, y is the row). Where two pixels of the mask share only a corner, a ring turns right, so
@@ -379,7 +379,7 @@ def squared_distance(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.ND
     """
     Return each cell's exact squared distance to the nearest cell that is not in `mask`.
 
-    What lies outside the array counts for nothing: surround the mask by one line of False where the
+    Cells outside the array are ignored: surround the mask by one line of False where the
     border is a wall.
 
     Args:
@@ -392,14 +392,14 @@ def squared_distance(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.ND
 
 def walking_distance(mask: numpy.typing.NDArray[numpy.bool_], goals: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int32]:
     """
-    Return how far each cell is from the nearest goal, walking from cell to cell.
+    Return the walking distance from each cell to the nearest goal.
 
     A step to a side costs 5 and one across a corner 7, which is open only if both cells beside it
     are.
 
     Args:
         mask: Cells that can be walked, bool (rows, columns).
-        goals: Goal cells, int64 (n, 2) as (row, column); those outside the mask count for nothing.
+        goals: Goal cells, int64 (n, 2) as (row, column); goals outside the mask are ignored.
 
     Returns:
         int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.
@@ -407,7 +407,7 @@ def walking_distance(mask: numpy.typing.NDArray[numpy.bool_], goals: numpy.typin
 
 def cost_distance(cost: numpy.typing.NDArray[numpy.int32], goal: tuple[int, int], start: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
     """
-    Return what the cheapest way from each cell to a goal costs, walking from cell to cell.
+    Return the cost of the cheapest path from each cell to a goal.
 
     A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
     are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
@@ -425,12 +425,12 @@ def cost_distance(cost: numpy.typing.NDArray[numpy.int32], goal: tuple[int, int]
 
 def step_cost(cost: numpy.typing.NDArray[numpy.int32], row: int, column: int, r: int, c: int) -> int:
     """
-    Return what a step between two neighboring cells costs, [1/1000 of a cell's side].
+    Return the cost of a step between two neighboring cells [1/1000 of a cell's side].
     """
 
 def descend(cost: numpy.typing.NDArray[numpy.int32], distance: numpy.typing.NDArray[numpy.int64], start: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
     """
-    Return the cells of a cheapest way from a cell to the goal; ties: the first neighbor.
+    Return the cells of a cheapest path from a cell to the goal; of equal neighbors the first.
 
     Args:
         cost: int32 (rows, columns), as for `cost_distance`.
@@ -438,47 +438,47 @@ def descend(cost: numpy.typing.NDArray[numpy.int32], distance: numpy.typing.NDAr
         start: The cell to start from (row, column).
 
     Returns:
-        int64 (n, 2) as (row, column); no cell if no way from the start is known.
+        int64 (n, 2) as (row, column); empty if no path from the start is known.
     """
 
 def leg_cost(cost: numpy.typing.NDArray[numpy.int32], ax: int, ay: int, bx: int, by: int) -> float:
     """
-    Return what a straight leg costs, [percent times lattice units]; infinite where none leads.
+    Return the cost of a straight leg [percent times lattice units]; infinite if it is blocked.
 
-    Each part of it counts by the cell that it runs through.
+    Each part of it has the cost of the cell that it crosses.
 
     Args:
         cost: int32 (rows, columns), -1 where no way leads.
-        ax: Where it begins, lattice units.
-        ay: Where it begins, lattice units.
-        bx: Where it ends, lattice units.
-        by: Where it ends, lattice units.
+        ax: Position of its begin [lattice units].
+        ay: Position of its begin [lattice units].
+        bx: Position of its end [lattice units].
+        by: Position of its end [lattice units].
     """
 
 def pull_taut(mesh: Mesh, cost: numpy.typing.NDArray[numpy.int32], way: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
     """
-    Return a way with fewer corners: legs are joined while the joint one is clear and no dearer.
+    Return a path with fewer corners: legs are joined while the result is free and not more expensive.
 
     Args:
-        mesh: The space that the way must stay in.
+        mesh: The space that the path must stay in.
         cost: int32 (rows, columns), -1 where no way leads.
         way: int64 (n, 2), lattice points; each leg lies in the space.
 
     Returns:
-        int64 (m, 2), some of the points, the first and the last among them.
+        int64 (m, 2), a subset of the points, with the first and the last.
     """
 
 def visible_region(mesh: Mesh, x: int, y: int) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int32]]:
     """
-    Find everything that is visible from a point.
+    Compute the region visible from a point.
 
     The pieces come counter-clockwise, the first is the one whose right border has the smallest angle in
     [0, one turn) from the x axis.
 
     Args:
         mesh: Free space.
-        x: Where the eye is, lattice units.
-        y: Where the eye is, lattice units.
+        x: Position of the eye [lattice units].
+        y: Position of the eye [lattice units].
 
     Returns:
         `right` int32 (n,), the vertex on each piece's right border, and `wall` int32 (n,), the wall
@@ -487,12 +487,12 @@ def visible_region(mesh: Mesh, x: int, y: int) -> tuple[numpy.typing.NDArray[num
 
 def region_contains(mesh: Mesh, x: int, y: int, right: numpy.typing.NDArray[numpy.int32], wall: numpy.typing.NDArray[numpy.int32], px: int, py: int) -> bool:
     """
-    Return whether p is in the region of (x, y): the verdict of a line of sight.
+    Return whether p is in the region of (x, y), as by a line of sight.
 
     Args:
         mesh: Free space.
-        x: Where the eye is, lattice units.
-        y: Where the eye is, lattice units.
+        x: Position of the eye [lattice units].
+        y: Position of the eye [lattice units].
         right: int32 (n,), the vertex on the right border of each of the region's pieces.
         wall: int32 (n,), the wall edge of each piece.
         px: The point, lattice units.
@@ -505,8 +505,8 @@ def region_contains_points(mesh: Mesh, x: int, y: int, right: numpy.typing.NDArr
 
     Args:
         mesh: Free space.
-        x: Where the eye is, lattice units.
-        y: Where the eye is, lattice units.
+        x: Position of the eye [lattice units].
+        y: Position of the eye [lattice units].
         right: int32 (pieces,), as from `visible_region`.
         wall: int32 (pieces,).
         points: int64 (n, 2), lattice units.
@@ -532,8 +532,8 @@ def region_outline(mesh: Mesh, x: int, y: int, right: numpy.typing.NDArray[numpy
 
     Args:
         mesh: Free space.
-        x: Where the eye is, lattice units.
-        y: Where the eye is, lattice units.
+        x: Position of the eye [lattice units].
+        y: Position of the eye [lattice units].
         right: int32 (n,), as from `visible_region`.
         wall: int32 (n,).
 
@@ -548,10 +548,10 @@ def cells_in_view(mesh: Mesh, x: int, y: int, heading: int, reach: tuple[Any, ..
 
     Args:
         mesh: Free space.
-        x: Where the camera is, lattice units.
-        y: Where the camera is, lattice units.
-        heading: Where it looks, 1/4096 turn.
-        reach: How far and wide it sees, a `Reach`.
+        x: Position of the camera [lattice units].
+        y: Position of the camera [lattice units].
+        heading: Its heading [1/4096 turn].
+        reach: Its range and angle, a `Reach`.
         rows: Height of the grid of cells.
         columns: Width of the grid.
 
@@ -571,27 +571,27 @@ def mark_spans(spans: numpy.typing.NDArray[numpy.int32], mask: numpy.typing.NDAr
 
 NEVER: int = -1
 
-def watch(watched: tuple[Any, ...], window: Window, body: int, first: int, end: int, glances: tuple[Any, ...], record: tuple[Any, ...]) -> None:
+def watch(setup: tuple[Any, ...], window: Window, body: int, first: int, end: int, cache: tuple[Any, ...], record: tuple[Any, ...]) -> None:
     """
-    Take in what a robot sees in the steps from `first` to `end` - 1.
+    Record what a robot sees in the steps from `first` to `end` - 1.
 
     Args:
-        watched: What it sees it with, and where, a `Watched`.
-        window: How bodies move.
-        body: Number of the robot among them.
+        setup: Its cameras and the home, a `WatchSetup`.
+        window: The motion of the bodies.
+        body: Number of the robot among the bodies.
         first: The first step.
         end: One past the last step.
-        glances: The poses kept so far, `Glances`; emptied when the table is half full.
-        record: What it has seen, a `Record`; `last` lags behind where a pose comes again: see `settle`.
+        cache: The cached poses; emptied when the table is half full.
+        record: What it has seen; `last` isn't updated for poses in the cache: see `settle`.
     """
 
-def settle(watched: tuple[Any, ...], glances: tuple[Any, ...], seen: numpy.typing.NDArray[numpy.int64]) -> None:
+def settle(setup: tuple[Any, ...], cache: tuple[Any, ...], seen: numpy.typing.NDArray[numpy.int64]) -> None:
     """
-    Bring the last step of each cell up to date with poses that were taken again.
+    Update the last step of each cell for the poses in the cache.
 
     Args:
-        watched: What the robot sees with, and where, a `Watched`.
-        glances: The poses kept so far, `Glances`.
+        setup: Its cameras and the home, a `WatchSetup`.
+        cache: The cached poses.
         seen: Out: int64 (rows, columns), the last step at which each cell was in view, -1 for never.
     """
 
@@ -663,7 +663,7 @@ def count_together(begin: numpy.typing.NDArray[numpy.int64], room: numpy.typing.
         room: int16 (n,), the room of each visit, below 0 for none.
         other_begin: int64 (m,), the same of the other body.
         other_room: int16 (m,), the same of the other body.
-        steps: How many steps there are.
+        steps: Number of steps.
     """
 
 def sum_moves(poses: tuple[Any, ...]) -> float:
@@ -678,37 +678,37 @@ def points_in_sight(mesh: Mesh, x: int, y: int, points: numpy.typing.NDArray[num
 
 def points_in_reach(x: int, y: int, heading: int, reach: tuple[int, int, int], points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
     """
-    Return which points are in range and within the angle, walls apart.
+    Return which points are in range and within the angle, regardless of walls.
 
     Args:
-        x: Where the camera is [lattice units].
-        y: Where the camera is [lattice units].
-        heading: Where it looks [1/4096 turn].
-        reach: Reach, how far and wide it sees.
+        x: Position of the camera [lattice units].
+        y: Position of the camera [lattice units].
+        heading: Its heading [1/4096 turn].
+        reach: Its range and angle, a `Reach`.
         points: int64 (n, 2).
 
     Returns:
         bool (n,).
     """
 
-def questions(lenses: tuple[Any, ...], widest: numpy.typing.NDArray[numpy.int64], slack: int, robot: tuple[Any, ...], x: numpy.typing.NDArray[numpy.int64], y: numpy.typing.NDArray[numpy.int64], away: numpy.typing.NDArray[numpy.uint8], first: int, step_us: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32]]:
+def view_queries(lenses: tuple[Any, ...], widest: numpy.typing.NDArray[numpy.int64], slack: int, robot: tuple[Any, ...], x: numpy.typing.NDArray[numpy.int64], y: numpy.typing.NDArray[numpy.int64], away: numpy.typing.NDArray[numpy.uint8], first: int, step_us: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32]]:
     """
-    List who may be in view of which camera when: near enough, and not far beside the angle.
+    List the steps at which a body may be in view of a camera: near enough, and not far beside the angle.
 
     Args:
         lenses: Lenses.
-        widest: int64 (cameras, bodies), the squared distance from which on nobody is in view.
-        slack: How far beside the angle somebody may be [lattice units].
-        robot: Poses of whoever has the cameras, n of them.
-        x: int64 (bodies, n), where the others are.
+        widest: int64 (cameras, bodies), the largest squared distance in view.
+        slack: Largest distance beside the angle [lattice units].
+        robot: The n poses of the body with the cameras.
+        x: int64 (bodies, n), positions of the others.
         y: int64 (bodies, n).
-        away: uint8 (bodies, n), not 0 while one isn't at home.
+        away: uint8 (bodies, n), not 0 while the body is away.
         first: The step of the first pose.
         step_us: Length of a step.
 
     Returns:
-        int64 (m, 7) by camera and body, and int32 (cameras, bodies, n): the number of the question that
-        each step asks, from 1 on; 0 for none. A question that is the one before is asked once.
+        int64 (m, 7) by camera and body, and int32 (cameras, bodies, n): the number of the query that
+        each step, from 1 on; 0 for none. Equal consecutive queries are listed once.
     """
 
 ONE: int = 2147483648
@@ -768,13 +768,13 @@ class UserDraw(enum.IntEnum):
     """Whether a user in view is noticed."""
 
     ATTEND = 1
-    """Whether the draw before still holds."""
+    """Whether the last draw still holds."""
 
     IDENTIFY = 2
     """Whether a user is recognized, mistaken for another one, or unknown."""
 
     MISTAKE = 3
-    """For whom a user is mistaken."""
+    """Which other user a user is mistaken for."""
 
     RANGE = 4
     """Error of the distance."""
@@ -794,23 +794,23 @@ class GhostDraw(enum.IntEnum):
     """
 
     COUNT = 0
-    """How many there are in a look."""
+    """Their number in a look."""
 
     SOURCE = 1
-    """Which source one is of."""
+    """The source of one."""
 
     PLACE = 2
-    """Where it is."""
+    """Its position."""
 
     IDENTITY = 3
-    """Whom it looks like."""
+    """Which user it looks like."""
 
     HEADING = 4
-    """Where it faces."""
+    """Its heading."""
 
 class About(enum.IntEnum):
     """
-    What a camera carries along about one user: the last axis of `Memory.about`.
+    What a camera stores about one user: the last axis of `SightMemory.about`.
     """
 
     DRAW = 0
@@ -819,8 +819,8 @@ class About(enum.IntEnum):
     DRAW_STEP = 1
     """The last step at which the user was in view; -1: never."""
 
-    TAKEN_FOR = 2
-    """For whom the user was taken last, or NOBODY."""
+    LAST_IDENTITY = 2
+    """The identity at the last sighting, or NOBODY."""
 
     TRACK_STEP = 3
     """The last step at which the user was noticed; -1: never."""
@@ -833,7 +833,7 @@ class About(enum.IntEnum):
 
     FORCED = 6
     """
-    What somebody outside makes of a user in view: 0 nothing, FORCED_MISS, or FORCED_IDENTITY + identity.
+    What an intervention makes of a user in view: 0 nothing, FORCED_MISS, or FORCED_IDENTITY + identity.
     """
 
 FORCED_MISS: int = 1
@@ -856,15 +856,13 @@ def pick(cumulative: numpy.typing.NDArray[numpy.int64], draw: int) -> int:
     """
 
 def length(dx: int, dy: int) -> int:
-    """Return how long (dx, dy) is [lattice units], rounded down."""
+    """Return the length of (dx, dy) [lattice units], rounded down."""
 
 def distance_bin(table: numpy.typing.NDArray[numpy.int64], camera: int, dx: int, dy: int) -> int:
-    """Return the bin of the parts by distance that (dx, dy) belongs to."""
+    """Return the bin of (dx, dy) in the tables by distance."""
 
-def lasting(table: numpy.typing.NDArray[numpy.int64], camera: int, steps: int) -> int:
-    """
-    Return the probability that attention outlasts so many steps, from that for 2**i steps.
-    """
+def persistence_chance(table: numpy.typing.NDArray[numpy.int64], camera: int, steps: int) -> int:
+    """Return the probability that attention outlasts `steps`."""
 
 def steady_chance(table: numpy.typing.NDArray[numpy.int64], camera: int, heading: int, dx: int, dy: int, faces: int, posture: int, shown: int) -> int:
     """
@@ -873,12 +871,12 @@ def steady_chance(table: numpy.typing.NDArray[numpy.int64], camera: int, heading
     Args:
         table: The cameras' tables, int64 (cameras, TABLE).
         camera: Which camera.
-        heading: Where it looks [1/4096 turn].
-        dx: Where the user is, from the camera [lattice units].
+        heading: Its heading [1/4096 turn].
+        dx: Position of the user relative to the camera [lattice units].
         dy: The same.
-        faces: Where the user faces [1/4096 turn].
+        faces: Heading of the user [1/4096 turn].
         posture: 0 stands, 1 sits, 2 lies.
-        shown: How many points of the body are in view.
+        shown: Number of points of the body in view.
     """
 
 def notice_chance(steady: int, light: int, chance: int) -> int:
@@ -886,18 +884,18 @@ def notice_chance(steady: int, light: int, chance: int) -> int:
     Return the probability to notice [2**-53], from [2**-31], [2**-31] and the camera's own [2**-53].
     """
 
-def turn_and_stretch(dx: int, dy: int, turn: int, distance: int, wanted: int) -> tuple[int, int]:
+def turn_and_stretch(dx: int, dy: int, turn: int, distance: int, target_length: int) -> tuple[int, int]:
     """
-    Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length `wanted`.
-    """
-
-def blurred(table: numpy.typing.NDArray[numpy.int64], keys: numpy.typing.NDArray[numpy.uint64], camera: int, user: int, now: int, dx: int, dy: int) -> tuple[int, int]:
-    """
-    Return where a user at (dx, dy) from the camera is perceived, from there.
+    Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length `target_length`.
     """
 
-def seeming(table: numpy.typing.NDArray[numpy.int64], camera: int, posture: int, draw: int) -> int:
-    """Return the posture that a posture is taken for."""
+def perceived_offset(table: numpy.typing.NDArray[numpy.int64], keys: numpy.typing.NDArray[numpy.uint64], camera: int, user: int, now: int, dx: int, dy: int) -> tuple[int, int]:
+    """
+    Return the perceived position of a user at (dx, dy), relative to the camera.
+    """
+
+def perceived_posture(table: numpy.typing.NDArray[numpy.int64], camera: int, posture: int, draw: int) -> int:
+    """Return the perceived posture for a true one, by a random draw."""
 
 class SightingColumn(enum.IntEnum):
     """
@@ -946,19 +944,19 @@ def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tu
     Args:
         walls: The free space.
         lenses: The cameras of a body.
-        errors: How they err.
-        rule: What holds for all of them.
-        window: How all bodies move.
-        body: Number of the body that has the cameras.
+        errors: Their errors.
+        rule: The settings that they share.
+        window: The motion of all bodies.
+        body: Number of the body with the cameras.
         first_other: Number of the first of the others, who are as many as the lenses' users.
-        memory: What the body carries from span to span; updated.
+        memory: The state of its perception between spans; updated.
         shown: uint64 (cameras, users, steps), which points of each are in view, bit i for number i,
             where another method decides that; None: lines of sight do.
         radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
 
     Returns:
-        The steps done (the stopping one included); what was perceived, int64 (n, SIGHTING), see
-        `SightingColumn`; and who came into view or was lost, in order of (step, identity): step, identity
+        The steps done (the stopping one included); the sightings, int64 (n, SIGHTING), see
+        `SightingColumn`; and the identities that came into view or were lost, in order of (step, identity): step, identity
         and kind (USER_SEEN or USER_LOST), int64 (m,) each.
 
     Raises:
@@ -1010,10 +1008,10 @@ def distance(ax: int, ay: int, bx: int, by: int) -> float:
 
 def advance(probability: numpy.typing.NDArray[numpy.float64], transition: numpy.typing.NDArray[numpy.float64], bins: int) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Return a chain's state probabilities some bins later, without evidence.
+    Return the state probabilities of a chain `bins` bins later, without evidence.
 
     Args:
-        probability: float64 (states,), now.
+        probability: float64 (states,), the present probabilities.
         transition: float64 (states, states), from row to column within a bin.
         bins: How many bins.
 
@@ -1023,7 +1021,7 @@ def advance(probability: numpy.typing.NDArray[numpy.float64], transition: numpy.
 
 def count_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, seen: numpy.typing.NDArray[numpy.int64]) -> None:
     """
-    Count the steps at which each user was perceived in each room, once however often.
+    Count the steps at which each user was perceived in each room, each step once.
 
     Args:
         step: int64 (n,), in order of time, from the beginning of the first bin.
@@ -1065,13 +1063,13 @@ def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64]
 
 def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], patch_cells: numpy.typing.NDArray[numpy.int64], room_cells: numpy.typing.NDArray[numpy.int64], bin_steps: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
     """
-    Return how much was in view, bin by bin; of several robots, that of the one that saw most.
+    Return how much was in view in each bin; of several robots, the one that saw most counts.
 
     Args:
-        cells: int64 (bins, robots, 2, patches), cells in view, summed over the steps of a bin, and at most at one.
+        cells: int64 (bins, robots, 2, patches), cells in view: the sum over the steps of a bin, and the maximum.
         room: int64 (patches,), the room of each patch, ascending, none left out.
-        patch_cells: int64 (patches,), how many cells each has.
-        room_cells: int64 (rooms,), how many cells each room has, 1 at least.
+        patch_cells: int64 (patches,), number of cells of each.
+        room_cells: int64 (rooms,), number of cells of each room, at least 1.
         bin_steps: Steps of a bin.
 
     Returns:
@@ -1081,13 +1079,13 @@ def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.ND
 
 def sum_places(chains: Sequence[tuple[Any, ...]], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Sum what presence adds up, by hour, in the order of NumPy's add.reduceat over the first axis.
+    Sum presence by hour, in the order of NumPy's add.reduceat over the first axis.
 
     Args:
         chains: Of each user, consecutive stretches of bins: float64 (stretches, places), probability of each place,
-            away last; and int64 (stretches,), how many bins each has.
-        unknown: bool (bins, places - 1), where somebody was perceived who is no user.
-        users: How many users there are; 0: `chains` holds one person, who is anyone.
+            away last; and int64 (stretches,), number of bins of each.
+        unknown: bool (bins, places - 1), the rooms with an unknown person.
+        users: Number of users; 0: `chains` holds one person, who is anyone.
         first: int64 (hours,), the bins at which hours begin, the first 0.
 
     Returns:
@@ -1096,7 +1094,7 @@ def sum_places(chains: Sequence[tuple[Any, ...]], unknown: numpy.typing.NDArray[
     """
 
 class Legs:
-    """The breakpoints of a plan, gathered while it is built leg by leg."""
+    """The breakpoints of a plan, which is built leg by leg."""
 
     def __init__(self) -> None: ...
 
@@ -1115,7 +1113,7 @@ class Legs:
         Turn on the spot by a number of headings, counter-clockwise if positive.
 
         Returns:
-            time, x, y, heading, away when that is done.
+            time, x, y, heading and away at the end.
         """
 
     def walk(self, time: int, heading: int, route: numpy.typing.NDArray[numpy.int64], speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:
@@ -1123,7 +1121,7 @@ class Legs:
         Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
 
         Returns:
-            time, x, y, heading, away when that is done.
+            time, x, y, heading and away at the end.
         """
 
     def rows(self) -> numpy.typing.NDArray[numpy.int64]:
@@ -1140,16 +1138,16 @@ class Legs:
 
 WHOLE_PATCH: int = 255
 
-def take_together(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], bin: numpy.typing.NDArray[numpy.int64], patch: numpy.typing.NDArray[numpy.int64], steps: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
-    """Take together bins that are alike; see `fleet2d.kernels.stays`."""
+def merge_bins(minute: numpy.typing.NDArray[numpy.int64], shown: numpy.typing.NDArray[numpy.uint8], bin: numpy.typing.NDArray[numpy.int64], patch: numpy.typing.NDArray[numpy.int64], steps: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+    """Merge bins with equal evidence; see `fleet2d.kernels.stays`."""
 
-def follow(ways: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
+def follow(model: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Return where a person was, given the evidence up to each stretch; see `smooth`.
+    Return the distribution over rooms, given the evidence up to each stretch; see `smooth`.
 
     Args:
-        ways: How the person goes on.
-        stretches: The evidence, of one stretch at least.
+        model: The transition probabilities of the person.
+        stretches: The evidence, at least one stretch.
         now: float64 (2, stages, patches), probability before the first stretch, of states in view and
             of hidden ones; becomes that after the last.
         shown: int64 (patches,), what part of each patch was in view before, in 1/255, -1 if that isn't
@@ -1162,23 +1160,23 @@ def follow(ways: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.
         ValueError: Arrays aren't of one person, or hold numbers of patches or sightings that aren't.
     """
 
-def smooth(ways: tuple[Any, ...], stretches: tuple[Any, ...], dawn: numpy.typing.NDArray[numpy.float64], dusk: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+def smooth(model: tuple[Any, ...], stretches: tuple[Any, ...], prior: numpy.typing.NDArray[numpy.float64], future: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
-    Return where a person was, given all evidence of some stretches.
+    Return the distribution over rooms in each stretch, given all evidence.
 
-    Between two stretches a person may go on once: leave a stage, with the chance to do so within the
-    later one, or change patch within the room. With stretches of one bin that is a hidden Markov chain;
-    with longer ones, what happens within a stretch is taken to happen as it begins. A person who comes
-    to a patch of which a part is in view is in that part with the chance of its size, and stays in it
-    or out of it until the person moves or what is in view of it changes. In view the person isn't
-    perceived in any of n bins with (1 - detection)^n; out of view never, unless nothing of the patch
-    was in view where somebody was perceived: positions may be noisy.
+    Between two stretches a person may make one transition: leave a stage, with the probability of doing
+    so within the later stretch, or change patch within the room. With stretches of one bin that is a
+    hidden Markov chain; with longer ones, transitions within a stretch count as if they happened at its
+    begin. A person who comes to a patch is in its visible part with the probability of its size, and
+    stays in or out of view until the person moves or the view changes. A person in view is missed in
+    all of n bins with probability (1 - detection)^n; a person out of view is never perceived, unless
+    nothing of the patch is in view: positions may be noisy.
 
     Args:
-        ways: How the person goes on.
+        model: The transition probabilities of the person.
         stretches: The evidence.
-        dawn: float64 (stages, patches), probability before the first stretch.
-        dusk: float64 (stages, patches), how likely each makes what comes after the last.
+        prior: float64 (stages, patches), probability before the first stretch.
+        future: float64 (stages, patches), likelihood of the evidence after the last one.
         moments: To add to.
 
     Returns:
@@ -1258,12 +1256,12 @@ class Window:
 
 class Timelines:
     """
-    How each body of a run moves, piece after piece.
+    The motion of each body of a run, piece after piece.
 
     A piece begins at a step and holds until the next one of its body begins.
 
     Args:
-        bodies: How many bodies there are.
+        bodies: Number of bodies.
         step_us: Length of a step.
     """
 
@@ -1312,7 +1310,7 @@ def distances_between(window: Window, body: int, other: int) -> tuple[numpy.typi
     Return how far the centres of two bodies are apart.
 
     Args:
-        window: How bodies move.
+        window: The motion of the bodies.
         body: Number of one of them.
         other: Number of the other.
 
@@ -1326,7 +1324,7 @@ def distances_to_shape(window: Window, body: int, edges: numpy.typing.NDArray[nu
     Return how far the centre of a body is from a shape, 0 inside it.
 
     Args:
-        window: How bodies move.
+        window: The motion of the bodies.
         body: Number of the body.
         edges: int64 (n, 4), edges from (x, y) to (x, y) [lattice units]; closed rings enclose an inside.
 
@@ -1340,7 +1338,7 @@ def speeds(window: Window, body: int, before: numpy.typing.NDArray[numpy.int64])
     Return how far a body comes in each step: at a step, the way from the step before.
 
     Args:
-        window: How bodies move.
+        window: The motion of the bodies.
         body: Number of the body.
         before: int64 (3,), x, y and away at the step before the window; (0,) if there was none.
 

@@ -13,7 +13,7 @@ from fleet2d.engine.points_in_view import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.lens import Lenses, camera_pose
-from fleet2d.kernels.look import Crowd
+from fleet2d.kernels.look import UserPoses
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.camera import Camera
@@ -166,7 +166,7 @@ def test_own_method_that_fails_is_blamed(method: str, why: str) -> None:
 
 
 def seen_one_by_one(
-    method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: Crowd, first: int
+    method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: UserPoses, first: int
 ) -> NDArray[np.uint64]:
     """Return what `points_seen` does, asking about every body in every step."""
     cameras, bodies = lenses.widest.shape
@@ -216,7 +216,7 @@ def test_points_seen_are_those_of_asking_about_everybody_each_time(
     rng = np.random.default_rng(first)
     poses = wandering(rng, home, 4, 40)
     robot = Poses(*(np.ascontiguousarray(column[0]) for column in poses))
-    crowd = Crowd(*(column[1:] for column in poses), np.zeros((3, 40), np.int8))
+    crowd = UserPoses(*(column[1:] for column in poses), np.zeros((3, 40), np.int8))
 
     expected = seen_one_by_one(method, home, stacked, robot, crowd, first)
 

@@ -6,7 +6,12 @@ from numpy.typing import NDArray
 from tests.reference.chambers import nearest_labels
 
 from fleet2d.floorplan.geometry.mesh import build_mesh
-from fleet2d.kernels.chambers import fill_beside, label_frames, see_each, spread_labels
+from fleet2d.kernels.chambers import (
+    fill_from_neighbors,
+    label_frames,
+    pairs_in_sight,
+    spread_labels,
+)
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
 
@@ -38,7 +43,7 @@ def test_pairs_see_each_other_as_one_by_one() -> None:
         for eye, place in zip(eyes.tolist(), places.tolist(), strict=True)
     ]
 
-    assert expected == see_each(mesh, eyes, places).tolist()
+    assert expected == pairs_in_sight(mesh, eyes, places).tolist()
 
 
 @given(labelled())
@@ -70,4 +75,4 @@ def test_cells_without_a_label_take_the_first_that_touches_them(
         expected[row, column] = next((label for label in near if label >= 0), -1)
     expected[[0, -1]] = expected[:, [0, -1]] = -1
 
-    assert np.array_equal(expected[1:-1, 1:-1], fill_beside(labels)[1:-1, 1:-1])
+    assert np.array_equal(expected[1:-1, 1:-1], fill_from_neighbors(labels)[1:-1, 1:-1])

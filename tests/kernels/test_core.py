@@ -20,13 +20,13 @@ import fleet2d
 from fleet2d import _core
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import Rule, new_memory
+from fleet2d.kernels.look import LookRule, new_memory
 from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
 from fleet2d.kernels.perception import ErrorTables
 from fleet2d.kernels.routes import Corners
 from fleet2d.kernels.seen import Reach
-from fleet2d.kernels.stays import Moments, Stretches, Ways
-from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances
+from fleet2d.kernels.stays import Moments, StayModel, Stretches
+from fleet2d.kernels.watch import NEVER, SightRecord, WatchSetup, empty_pose_cache
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
@@ -197,25 +197,25 @@ def track() -> Breakpoints:
     return Breakpoints(row, row // 20_000, row // 30_000, row % 4096, np.zeros(5, np.uint8))
 
 
-def watched() -> Watched:
+def setup() -> WatchSetup:
     patches = np.full((HOME.rows, HOME.columns), -1, np.int16)
     patches[:6], patches[6:12] = 0, 1
-    return Watched(MESH, lenses(), patches, SECOND, 1, 4)
+    return WatchSetup(MESH, lenses(), patches, SECOND, 1, 4)
 
 
-def record() -> Record:
+def record() -> SightRecord:
     def never() -> Any:
         return np.full((HOME.rows, HOME.columns), NEVER, np.int64)
 
     bins = (np.zeros((3, 2), np.int64) for _ in range(2))
-    return Record(never(), never(), np.zeros(2, np.int64), never(), *bins)
+    return SightRecord(never(), never(), np.zeros(2, np.int64), never(), *bins)
 
 
-def ways() -> Ways:
+def model() -> StayModel:
     follow = np.array([[0, 0.6, 0.3, 0.1], [0.5, 0, 0.4, 0.1], [0.7, 0.3, 0, 0]])
     spread = np.array([0.4, 0.6, 1.0, 1.0])
     first = np.array([0, 2, 3, 4])
-    return Ways(np.full(3, 0.9), follow, spread, np.array([0.1, 0.0, 0.0]), first, 0.8)
+    return StayModel(np.full(3, 0.9), follow, spread, np.array([0.1, 0.0, 0.0]), first, 0.8)
 
 
 def stretches() -> Stretches:
@@ -276,9 +276,9 @@ CALLS: dict[str, Args] = {
     "build_fans": lambda: (MESH,),
     "vertices_seen_from_point": lambda: (MESH, 100, 100),
     "vertices_seen_from_vertex": lambda: (MESH, 3),
-    "see_each": lambda: (MESH, POINTS.copy(), POINTS[::-1].copy()),
+    "pairs_in_sight": lambda: (MESH, POINTS.copy(), POINTS[::-1].copy()),
     "label_frames": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int32), 3),
-    "fill_beside": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int16),),
+    "fill_from_neighbors": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int16),),
     "spread_labels": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.copy()),
     "label_parts": lambda: (MASK.copy(), True),
     "count_steps": lambda: (MASK.copy(), MASK.copy()),
@@ -305,8 +305,8 @@ CALLS: dict[str, Args] = {
     "region_outline": lambda: (MESH, 200, 200, *region()),
     "cells_in_view": lambda: (MESH, 200, 200, 5, Reach(0, 90_000, 800), HOME.rows, HOME.columns),
     "mark_spans": lambda: (np.array([[0, 1, 3], [2, 0, 0]], np.int32), MASK.copy()),
-    "watch": lambda: (watched(), window(), 0, 0, STEPS, no_glances(8, 2), record()),
-    "settle": lambda: (watched(), no_glances(8, 2), record().last),
+    "watch": lambda: (setup(), window(), 0, 0, STEPS, empty_pose_cache(8, 2), record()),
+    "settle": lambda: (setup(), empty_pose_cache(8, 2), record().last),
     "trace_track": lambda: (track(), 0, SECOND, poses()),
     "time_route": lambda: (POINTS[:2].copy(), 5, 7, 1000.0, 500.0),
     "trace_meander": lambda: (
@@ -337,7 +337,7 @@ CALLS: dict[str, Args] = {
     "until": lambda: (*signal(), np.array([0.5, 2.0, -1.0]), 0.0),
     "points_in_sight": lambda: (MESH, 100, 100, POINTS.copy()),
     "points_in_reach": lambda: (100, 100, 5, Reach(0, 90_000, 800), POINTS.copy()),
-    "questions": lambda: (
+    "view_queries": lambda: (
         lenses(),
         lenses().widest,
         20,
@@ -352,17 +352,17 @@ CALLS: dict[str, Args] = {
     "pick": lambda: (np.array([5, 9, 2**31]), 7),
     "length": lambda: (300, 40),
     "distance_bin": lambda: (errors().table, 0, 300, 40),
-    "lasting": lambda: (errors().table, 0, 7),
+    "persistence_chance": lambda: (errors().table, 0, 7),
     "steady_chance": lambda: (errors().table, 0, 5, 300, 40, 70, 1, 3),
     "notice_chance": lambda: (2**30, 2**30, 2**52),
     "turn_and_stretch": lambda: (300, 40, 50, 302, 400),
-    "blurred": lambda: (errors().table, errors().keys, 0, 1, 5, 300, 40),
-    "seeming": lambda: (errors().table, 0, 1, 2**30),
+    "perceived_offset": lambda: (errors().table, errors().keys, 0, 1, 5, 300, 40),
+    "perceived_posture": lambda: (errors().table, 0, 1, 2**30),
     "look": lambda: (
         MESH,
         lenses(),
         errors(),
-        Rule(5, SECOND, 0, 60, False, True),
+        LookRule(5, SECOND, 0, 60, False, True),
         window(),
         0,
         1,
@@ -404,7 +404,7 @@ CALLS: dict[str, Args] = {
         2,
         np.array([0, 4]),
     ),
-    "take_together": lambda: (
+    "merge_bins": lambda: (
         np.arange(5),
         np.zeros((5, 3), np.uint8),
         np.arange(3),
@@ -412,8 +412,8 @@ CALLS: dict[str, Args] = {
         np.ones(3, np.int64),
         4,
     ),
-    "follow": lambda: (ways(), stretches(), np.full((2, 1, 4), 0.125), np.full(4, -1)),
-    "smooth": lambda: (ways(), stretches(), np.full((1, 4), 0.25), np.ones((1, 4)), moments()),
+    "follow": lambda: (model(), stretches(), np.full((2, 1, 4), 0.125), np.full(4, -1)),
+    "smooth": lambda: (model(), stretches(), np.full((1, 4), 0.25), np.ones((1, 4)), moments()),
     "Window": lambda: (
         0,
         *(np.arange(6).reshape(2, 3) for _ in range(3)),

@@ -18,7 +18,7 @@ from tests.strategies import homes, quick, seeds
 
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.lens import Lenses, in_wedge
-from fleet2d.kernels.look import USER_LOST, USER_SEEN, Memory, Rule, look, new_memory
+from fleet2d.kernels.look import USER_LOST, USER_SEEN, LookRule, SightMemory, look, new_memory
 from fleet2d.kernels.perception import MOST_GHOSTS, About, ErrorTables, UserDraw
 from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera import Camera, Lens
@@ -115,7 +115,7 @@ class Scene:
 class Carried:
     """What a robot carries from span to span: in the kernel, and in the twin."""
 
-    memory: Memory
+    memory: SightMemory
     known: list[slow.Known]
     errors: list[slow.Errors | None] = field(default_factory=list)
 
@@ -164,7 +164,7 @@ def tables_of(eyes: Sequence[slow.Eye], scene: Scene) -> ErrorTables:
     return errors
 
 
-def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTables, Rule]:
+def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTables, LookRule]:
     """Return cameras as the kernel wants them."""
     lenses = [Lens(**eye._asdict()) for eye in eyes]
     count = len(scene.users)
@@ -172,15 +172,15 @@ def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTa
     errs = [p is not None for p in scene.perceptions] or [False] * len(eyes)
     patience = max(eye.patience for eye in eyes)
     errors = tables_of(eyes, scene)
-    burst = int((count + MOST_GHOSTS * errors.haunted).sum())
-    rule = Rule(patience, STEP_US, START_US, burst, False, False)
+    burst = int((count + MOST_GHOSTS * errors.has_ghosts).sum())
+    rule = LookRule(patience, STEP_US, START_US, burst, False, False)
     return stack_lenses(lenses, errs, about), errors, rule
 
 
 def nothing_known(eye: slow.Eye | Sequence[slow.Eye], scene: Scene) -> Carried:
     """Return what a robot carries that has seen nobody."""
     eyes, count, errors = listed(eye), len(scene.users), tables_of(listed(eye), scene)
-    bursts = count + MOST_GHOSTS * errors.haunted
+    bursts = count + MOST_GHOSTS * errors.has_ghosts
     rows = max(
         int((eye.latency // eye.period + 2) * burst)
         for eye, burst in zip(eyes, bursts, strict=True)

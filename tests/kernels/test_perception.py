@@ -48,7 +48,9 @@ MEMORY = table_of(detection={"memory": "30 s"})
 @quick
 @given(st.integers(0, 10_000))
 def test_lasting_is_the_exponential_of_the_steps(steps: int) -> None:
-    assert math.exp(-steps / 30) == pytest.approx(k.lasting(MEMORY, 0, steps) / k.ONE, abs=1e-7)
+    assert math.exp(-steps / 30) == pytest.approx(
+        k.persistence_chance(MEMORY, 0, steps) / k.ONE, abs=1e-7
+    )
 
 
 @quick
@@ -120,14 +122,14 @@ def test_turn_and_stretch_is_that_of_trigonometry(
 def test_a_user_at_the_camera_and_one_without_noise_stay_where_they_are() -> None:
     keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
     noisy = table_of(attributes={"range_noise": 0.5, "bearing_noise_deg": 20})
-    assert (0, 0) == k.blurred(noisy, keys, 0, 0, 7, 0, 0)
-    assert (300, -40) == k.blurred(table_of(), keys, 0, 0, 7, 300, -40)
+    assert (0, 0) == k.perceived_offset(noisy, keys, 0, 0, 7, 0, 0)
+    assert (300, -40) == k.perceived_offset(table_of(), keys, 0, 0, 7, 300, -40)
 
 
 def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
     keys = np.full((1, 3, len(k.UserDraw)), 5, np.uint64)
     table = table_of(attributes={"range_noise": 3})
-    places = [k.blurred(table, keys, 0, 0, step, 400, 0) for step in range(2000)]
+    places = [k.perceived_offset(table, keys, 0, 0, step, 400, 0) for step in range(2000)]
     assert 0 == min(x for x, _ in places)
     assert {0} == {y for _, y in places}
 
@@ -136,8 +138,8 @@ def test_a_posture_is_taken_for_the_one_that_the_draw_says() -> None:
     table = table_of(attributes={"posture": {"sit": {"stand": 0.25, "lie": 0.25}}})
     quarter = k.ONE // 4
     draws = (0, quarter - 1, quarter, 3 * quarter - 1, 3 * quarter, k.ONE - 1)
-    assert [0, 0, 1, 1, 2, 2] == [k.seeming(table, 0, 1, draw) for draw in draws]
-    assert [2, 2] == [k.seeming(table, 0, 2, draw) for draw in (0, k.ONE - 1)]
+    assert [0, 0, 1, 1, 2, 2] == [k.perceived_posture(table, 0, 1, draw) for draw in draws]
+    assert [2, 2] == [k.perceived_posture(table, 0, 2, draw) for draw in (0, k.ONE - 1)]
 
 
 @pytest.mark.parametrize("far", [2**30 + 1, 2**31, 2**62, -(2**63)])
@@ -149,7 +151,7 @@ def test_places_farther_away_than_any_home_is_wide_are_refused(far: int) -> None
             lambda dx=dx, dy=dy: k.length(dx, dy),
             lambda dx=dx, dy=dy: k.distance_bin(BY_ALL, 0, dx, dy),
             lambda dx=dx, dy=dy: k.steady_chance(BY_ALL, 0, 0, dx, dy, 0, 0, 1),
-            lambda dx=dx, dy=dy: k.blurred(BY_ALL, keys, 0, 0, 7, dx, dy),
+            lambda dx=dx, dy=dy: k.perceived_offset(BY_ALL, keys, 0, 0, 7, dx, dy),
             lambda dx=dx, dy=dy: k.turn_and_stretch(dx, dy, 5, 100, 100),
         ):
             with pytest.raises(ValueError, match=r"within 2\*\*30"):

@@ -22,7 +22,7 @@ from tests.homes import (
 from tests.reference.sight import vertices_seen, visible, visible_exactly
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels.chambers import see_each
+from fleet2d.kernels.chambers import pairs_in_sight
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.sight import (
     build_fans,
@@ -39,12 +39,12 @@ EYES, POINTS = 2, 24
 
 def _sees_each(mesh: Mesh, eye: Int64, points: Int64) -> Bool:
     """Return which points the eye sees."""
-    return see_each(mesh, np.broadcast_to(eye, points.shape), points)
+    return pairs_in_sight(mesh, np.broadcast_to(eye, points.shape), points)
 
 
 def _is_seen_by_each(mesh: Mesh, eye: Int64, points: Int64) -> Bool:
     """Return which points see the eye."""
-    return see_each(mesh, points, np.broadcast_to(eye, points.shape))
+    return pairs_in_sight(mesh, points, np.broadcast_to(eye, points.shape))
 
 
 def sees(home: Home, eye: tuple[int, int], point: tuple[int, int]) -> bool:

@@ -12,7 +12,7 @@ from tests.reference import presence as slow
 from fleet2d.algorithms.presence.chain_model import steps_of
 from fleet2d.kernels.presence import advance
 from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import Moments, Stretches, Ways, follow
+from fleet2d.kernels.stays import Moments, StayModel, Stretches, follow
 
 SIZES = (2, 1, 3, 1)  # three rooms of so many patches, and away
 ROOM = np.array([0, 0, 1, 2, 2, 2, 3])
@@ -22,7 +22,7 @@ PATCHES, PLACES = 7, 4
 class Case(NamedTuple):
     """A person, some evidence, and what was known before."""
 
-    ways: Ways
+    model: StayModel
     stretches: Stretches
     now: Any
     shown: Any
@@ -39,7 +39,7 @@ def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...
     chances /= chances.sum(axis=1, keepdims=True)
     spread = np.concatenate([random.dirichlet(np.ones(n)) for n in sizes])
     first = np.append(0, np.cumsum(sizes))
-    ways = Ways(
+    model = StayModel(
         random.uniform(0.3, 0.99, nodes), chances, spread,
         np.append(random.uniform(0, 0.3, places - 1), 0.0), first, float(random.uniform(0.3, 0.95)),
     )  # fmt: skip
@@ -59,11 +59,11 @@ def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...
     )  # fmt: skip
     now = random.random((2, stages, patches))
     before = random.choice([-1, 0, 60], patches)
-    return Case(ways, stretches, now / now.sum(), before.astype(np.int64), seen)
+    return Case(model, stretches, now / now.sum(), before.astype(np.int64), seen)
 
 
-def no_moments(ways: Ways) -> Moments:
-    (nodes, columns), patches = ways.follow.shape, len(ways.spread)
+def no_moments(model: StayModel) -> Moments:
+    (nodes, columns), patches = model.follow.shape, len(model.spread)
     rooms = np.zeros(columns - 1), np.zeros(columns - 1)
     return Moments(np.zeros(nodes), np.zeros((nodes, columns)), np.zeros(patches), *rooms)
 
@@ -80,9 +80,9 @@ def by_place(states: Any, stages: int) -> Any:
 
 
 def twin(of: Case) -> Any:
-    ways, stretches = of.ways, of.stretches
+    model, stretches = of.model, of.stretches
     return slow.stays(
-        ways, stretches.bins.tolist(), stretches.shown.tolist(), of.seen.tolist(), of.shown
+        model, stretches.bins.tolist(), stretches.shown.tolist(), of.seen.tolist(), of.shown
     )
 
 
@@ -96,8 +96,8 @@ def test_following_is_the_product_of_matrices(
         assert np.abs(step.sum(axis=1) - 1).max() < 1e-9
     filtered, _ = slow.posteriors(steps, weights, by_state(of.now), np.ones(len(steps[0])))
     now, shown = of.now.copy(), of.shown.copy()
-    found = follow(of.ways, of.stretches, now, shown)
-    assert np.abs(by_place(filtered, stages) - found).max() < 1e-9
+    places = follow(of.model, of.stretches, now, shown)
+    assert np.abs(by_place(filtered, stages) - places).max() < 1e-9
     assert np.abs(filtered[-1] - by_state(now)).max() < 1e-9
     assert of.stretches.shown[-1].tolist() == shown.tolist()
 
@@ -106,12 +106,12 @@ def test_following_is_the_product_of_matrices(
 def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int) -> None:
     of = case(seed, stages, count, longest=3)
     of.shown[:] = -1  # nothing is known of the view before
-    dawn = of.now.sum(axis=0)
-    dusk = np.random.default_rng(seed).random((stages, PATCHES))
+    prior = of.now.sum(axis=0)
+    future = np.random.default_rng(seed).random((stages, PATCHES))
     steps, weights = twin(of)
-    start = by_state(np.stack([np.zeros_like(dawn), dawn]))
-    _, smoothed = slow.posteriors(steps, weights, start, by_state(np.stack([dusk, dusk])))
-    places, _, _ = smooth(of.ways, of.stretches, dawn, dusk, no_moments(of.ways))
+    start = by_state(np.stack([np.zeros_like(prior), prior]))
+    _, smoothed = slow.posteriors(steps, weights, start, by_state(np.stack([future, future])))
+    places, _, _ = smooth(of.model, of.stretches, prior, future, no_moments(of.model))
     assert np.abs(by_place(smoothed, stages) - places).max() < 1e-9
 
 
@@ -125,23 +125,23 @@ def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int
 def test_stays_are_the_same_to_the_last_bit_on_every_machine(stages: int, digest: str) -> None:
     """A sum over more than eight rooms once was added up in another order uncompiled."""
     of = portable(case(3, stages, 12, 3, sizes=(2, 1, 3, 1, 4, 2, 1, 5, 2, 3, 1, 2, 1)))
-    dawn, moments = of.now.sum(axis=0), no_moments(of.ways)
-    smoothed = smooth(of.ways, of.stretches, dawn, np.ones_like(dawn), moments)
+    prior, moments = of.now.sum(axis=0), no_moments(of.model)
+    smoothed = smooth(of.model, of.stretches, prior, np.ones_like(prior), moments)
     now = of.now.copy()
-    followed = follow(of.ways, of.stretches, now, of.shown.copy())
-    found = b"".join(part.tobytes() for part in (*smoothed, *moments, followed, now))
-    assert digest == hashlib.sha256(found).hexdigest()
+    followed = follow(of.model, of.stretches, now, of.shown.copy())
+    places = b"".join(part.tobytes() for part in (*smoothed, *moments, followed, now))
+    assert digest == hashlib.sha256(places).hexdigest()
 
 
 def portable(of: Case) -> Case:
     """Round what NumPy draws by logarithms, which differ in the last bit between machines."""
-    ways, stretches, now, shown, seen = of
-    ways = Ways(
-        *(np.round(part, 6) if part is not ways.first else part for part in ways[:-1]),
-        round(ways.detection, 6),
+    model, stretches, now, shown, seen = of
+    model = StayModel(
+        *(np.round(part, 6) if part is not model.first else part for part in model[:-1]),
+        round(model.detection, 6),
     )
     return Case(
-        ways, stretches._replace(share=np.round(stretches.share, 6)), np.round(now, 9), shown, seen
+        model, stretches._replace(share=np.round(stretches.share, 6)), np.round(now, 9), shown, seen
     )
 
 
@@ -149,16 +149,16 @@ def portable(of: Case) -> Case:
 def test_evidence_in_pieces_is_followed_as_at_once(cut: int) -> None:
     of = case(5, 2, 7, 1)
     whole_now, whole_shown = of.now.copy(), of.shown.copy()
-    whole = follow(of.ways, of.stretches, whole_now, whole_shown)
-    now, shown, found = of.now.copy(), of.shown.copy(), []
+    whole = follow(of.model, of.stretches, whole_now, whole_shown)
+    now, shown, places = of.now.copy(), of.shown.copy(), []
     for a, b in ((0, cut), (cut, 7)):
         bins, hour, view, begin, patch, share = of.stretches
         here = slice(begin[a], begin[b])
         part = Stretches(
             bins[a:b], hour[a:b], view[a:b], begin[a : b + 1] - begin[a], patch[here], share[here]
         )
-        found.append(follow(of.ways, part, now, shown))
-    assert np.abs(whole - np.concatenate(found)).max() < 1e-14
+        places.append(follow(of.model, part, now, shown))
+    assert np.abs(whole - np.concatenate(places)).max() < 1e-14
     assert np.abs(whole_now - now).max() < 1e-14
     assert np.array_equal(whole_shown, shown)
 
@@ -169,12 +169,12 @@ def test_without_evidence_stages_follow_each_other_by_their_steps(stages: int) -
     blind = of.stretches._replace(
         shown=np.zeros_like(of.stretches.shown), begin=np.zeros(7, np.int64)
     )
-    steps = steps_of(of.ways)
+    steps = steps_of(of.model)
     assert np.abs(steps.sum(axis=1) - 1).max() < 1e-12
     mass = np.zeros(PLACES * stages)
     for s in range(stages):
         mass[s::stages] += np.bincount(ROOM, of.now.sum(axis=0)[s], PLACES)
-    found = follow(of.ways, blind, of.now.copy(), np.full(PATCHES, -1))
+    places = follow(of.model, blind, of.now.copy(), np.full(PATCHES, -1))
     for t in range(6):
         later = advance(mass, steps, t + 1).reshape(PLACES, stages).sum(axis=1)
-        assert np.abs(later - found[t]).max() < 1e-12
+        assert np.abs(later - places[t]).max() < 1e-12

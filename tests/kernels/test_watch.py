@@ -17,7 +17,7 @@ from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.timelines import Window
-from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
+from fleet2d.kernels.watch import NEVER, SightRecord, WatchSetup, empty_pose_cache, settle, watch
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.tables import TableContext, stack_lenses
 
@@ -122,27 +122,27 @@ def by_kernel(
     """
     shape = (FLAT.rows, FLAT.columns)
     several = len(lenses.near_squared) > 1
-    record = Record(
+    record = SightRecord(
         np.full(shape, NEVER, np.int64), np.full(shape, NEVER, np.int64), np.zeros(ROOMS, np.int64),
         np.full(shape if several else (0, 0), NEVER, np.int64), np.zeros((8, ROOMS), np.int64),
         np.zeros((8, ROOMS), np.int64),
     )  # fmt: skip
-    watched = Watched(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
+    setup = WatchSetup(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
     binned, most = np.zeros((8, ROOMS), np.int64), np.zeros((8, ROOMS), np.int64)
-    glances = no_glances(slots, ROOMS)
+    cache = empty_pose_cache(slots, ROOMS)
     begin = 0
     for end in [*ends, len(poses.x)]:
         if body is None:
             part = Poses(*(column[begin:end] for column in poses))
-            watch(watched, window_of(part, begin), 0, begin, end, glances, record)
+            watch(setup, window_of(part, begin), 0, begin, end, cache, record)
         else:
-            watch(watched, window_of(poses, 0, 3, body), body, begin, end, glances, record)
+            watch(setup, window_of(poses, 0, 3, body), body, begin, end, cache, record)
         reached = slice(begin // BIN, (end - 1) // BIN + 1)
         length = reached.stop - reached.start
         binned[reached] += record.binned[:length]
         most[reached] = np.maximum(most[reached], record.most[:length])
         begin = end
-    settle(watched, glances, record.last)
+    settle(setup, cache, record.last)
     lists = (record.exposure.tolist(), binned.tolist(), most.tolist())
     return Seen(record.first, record.last, *lists)
 
@@ -200,15 +200,15 @@ def test_what_is_seen_in_spans_is_what_brute_force_sees(
 def test_tables_that_do_not_fit_are_refused() -> None:
     shape, rooms = (FLAT.rows, FLAT.columns), rooms_of(FLAT)
     none = np.zeros((0, ROOMS), np.int64)
-    record = Record(
+    record = SightRecord(
         np.full(shape, NEVER), np.zeros((0, 0), np.int64), np.zeros(ROOMS, np.int64),
         np.zeros((0, 0), np.int64), none, none,
     )  # fmt: skip
-    watched = Watched(FLAT.mesh, lenses_of(*ONE), rooms, SECOND, 1, BIN)
+    setup = WatchSetup(FLAT.mesh, lenses_of(*ONE), rooms, SECOND, 1, BIN)
     window = window_of(random_poses(np.random.default_rng(1), 60))
     far = window_of(Poses(*[np.full(3, 2**41)] * 3, np.zeros(3, np.uint8)))
-    glances = no_glances(8, ROOMS)
-    full = no_glances(8, ROOMS)
+    cache = empty_pose_cache(8, ROOMS)
+    full = empty_pose_cache(8, ROOMS)
     full.last[:] = 0
     bins = record._replace(
         binned=np.zeros((2, ROOMS), np.int64), most=np.zeros((2, ROOMS), np.int64)
@@ -216,21 +216,21 @@ def test_tables_that_do_not_fit_are_refused() -> None:
 
     steps = (window, 0, 0, 60)
     for arguments, message in [
-        ((watched, *steps, no_glances(6, ROOMS), record), "a power of two"),
-        ((watched, *steps, no_glances(8, 2), record), "cells must be"),
-        ((watched, *steps, full, record), "more slots of glances"),
-        ((watched._replace(patch_of_cell=rooms + np.int16(9)), *steps, glances, record), "patches"),
-        ((watched._replace(patch_of_cell=rooms[1:]), *steps, glances, record), "patch_of_cell"),
-        ((watched._replace(every=0), *steps, glances, record), "every"),
-        ((watched, window, 1, 0, 60, glances, record), "no such body"),
-        ((watched, window, -1, 0, 60, glances, record), "no such body"),
-        ((watched, window, 0, -1, 60, glances, record), "within the window"),
-        ((watched, window, 0, 0, 61, glances, record), "within the window"),
-        ((watched, window, 0, 9, 8, glances, record), "within the window"),
-        ((watched, far, 0, 0, 3, glances, record), "lattice units"),
-        ((watched, *steps, glances, bins), "a row for every bin"),
+        ((setup, *steps, empty_pose_cache(6, ROOMS), record), "a power of two"),
+        ((setup, *steps, empty_pose_cache(8, 2), record), "cells must be"),
+        ((setup, *steps, full, record), "more slots of cache"),
+        ((setup._replace(patch_of_cell=rooms + np.int16(9)), *steps, cache, record), "patches"),
+        ((setup._replace(patch_of_cell=rooms[1:]), *steps, cache, record), "patch_of_cell"),
+        ((setup._replace(every=0), *steps, cache, record), "every"),
+        ((setup, window, 1, 0, 60, cache, record), "no such body"),
+        ((setup, window, -1, 0, 60, cache, record), "no such body"),
+        ((setup, window, 0, -1, 60, cache, record), "within the window"),
+        ((setup, window, 0, 0, 61, cache, record), "within the window"),
+        ((setup, window, 0, 9, 8, cache, record), "within the window"),
+        ((setup, far, 0, 0, 3, cache, record), "lattice units"),
+        ((setup, *steps, cache, bins), "a row for every bin"),
     ]:
         with pytest.raises(ValueError, match=message):
             watch(*arguments)
     with pytest.raises(ValueError, match="seen must be"):
-        settle(watched, glances, record.last)
+        settle(setup, cache, record.last)

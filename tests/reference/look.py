@@ -154,7 +154,7 @@ class Errors:
         lasts = False
         if last is not None and self.row[k.AT_STAY] != 0:
             share = self._share(u, k.UserDraw.ATTEND, now)
-            lasts = share < k.lasting(self.tables.table, self.camera, now - last[0])
+            lasts = share < k.persistence_chance(self.tables.table, self.camera, now - last[0])
         if last is not None and lasts:
             value = last[1]
         else:
@@ -179,22 +179,24 @@ class Errors:
                 identity = u
             elif draw < right + mistaken:
                 other = self._share(u, k.UserDraw.MISTAKE, now)
-                whom = self.tables.whom[self.camera, u].tolist()
-                identity = next((i for i, end in enumerate(whom) if other < end), -1)
+                confusion = self.tables.confusion[self.camera, u].tolist()
+                identity = next((i for i, end in enumerate(confusion) if other < end), -1)
         self.tracks[u] = now, identity
         return identity
 
     def perceived(self, u: int, now: int, away: tuple[int, int], user: Body) -> tuple[int, ...]:
         """Return x and y beside where the user is, heading and posture, as perceived."""
         k, table, c = perception, self.tables.table, self.camera
-        dx, dy = k.blurred(table, self.tables.keys, c, u, now, *away)
+        dx, dy = k.perceived_offset(table, self.tables.keys, c, u, now, *away)
         turn = self._noise(self.keys[u][k.UserDraw.HEADING], now, self.row[k.HEADING_NOISE])
-        posture = k.seeming(table, c, user.posture, self._share(u, k.UserDraw.POSTURE, now))
+        posture = k.perceived_posture(
+            table, c, user.posture, self._share(u, k.UserDraw.POSTURE, now)
+        )
         return dx - away[0], dy - away[1], (user.heading + turn) % 4096, posture
 
     def ghosts(self, walls: Int64, eye: Eye, at: Body, heading: int, now: int) -> list[Ghost]:
         """Return the false positives of a look."""
-        if not self.tables.haunted[self.camera]:
+        if not self.tables.has_ghosts[self.camera]:
             return []
         of = dict(zip(perception.GhostDraw, self.ghost_keys, strict=True))
         keys = {purpose: random_bits(key, now) for purpose, key in of.items()}

@@ -33,7 +33,7 @@ def exposure_ratio(
 
 
 def stays(
-    ways: Any, bins: Sequence[int], shown: Any, seen: Any, shown_before: Sequence[int]
+    model: Any, bins: Sequence[int], shown: Any, seen: Any, shown_before: Sequence[int]
 ) -> tuple[list[Any], list[Any]]:
     """A person's chain written out: transitions and evidence between all states, for each stretch.
 
@@ -41,15 +41,15 @@ def stays(
     that order: number (stage * patches + patch) * 2 + (1 if out of view).
 
     Args:
-        ways: stay, follow, spread, restless, first, detection.
+        model: stay, follow, spread, restless, first, detection.
         bins: Of each stretch.
         shown: What of each patch is in view, of 255; away last.
         seen: Of each stretch the share of sightings by patch.
         shown_before: As shown, before the first stretch.
     """
-    places, patches = len(ways.first) - 1, len(ways.spread)
-    stages = len(ways.stay) // places
-    room = [max(r for r in range(places) if ways.first[r] <= p) for p in range(patches)]
+    places, patches = len(model.first) - 1, len(model.spread)
+    stages = len(model.stay) // places
+    room = [max(r for r in range(places) if model.first[r] <= p) for p in range(patches)]
     steps, weights = [], []
     for t, n in enumerate(bins):
         step = np.zeros((stages * patches * 2,) * 2)
@@ -61,13 +61,13 @@ def stays(
             for p in range(patches):
                 if room[p] == into:
                     at = (stage * patches + p) * 2
-                    row[at] += chance * ways.spread[p] * views[p]
-                    row[at + 1] += chance * ways.spread[p] * (1 - views[p])
+                    row[at] += chance * model.spread[p] * views[p]
+                    row[at + 1] += chance * model.spread[p] * (1 - views[p])
 
         for s, p, side in product(range(stages), range(patches), range(2)):
             row, k = step[(s * patches + p) * 2 + side], room[p] * stages + s
-            kept, calm = ways.stay[k] ** n, (1 - ways.restless[room[p]]) ** n
-            onward = (1 - kept) * ways.follow[k][places]
+            kept, calm = model.stay[k] ** n, (1 - model.restless[room[p]]) ** n
+            onward = (1 - kept) * model.follow[k][places]
             for stage, chance in ((s, kept * calm), (s + 1, onward)):
                 if chance and shown[t][p] == before[p]:
                     row[(stage * patches + p) * 2 + side] += chance
@@ -76,8 +76,8 @@ def stays(
                     row[(stage * patches + p) * 2 + 1] += chance * (1 - views[p])
             comes(row, s, room[p], kept * (1 - calm))
             for into in range(places):
-                comes(row, 0, into, (1 - kept) * ways.follow[k][into])
-            missed = (1 - ways.detection) ** n if side == 0 else 1.0
+                comes(row, 0, into, (1 - kept) * model.follow[k][into])
+            missed = (1 - model.detection) ** n if side == 0 else 1.0
             hit = seen[t][p] if (side == 0) == (shown[t][p] > 0) else 0.0
             weight[(s * patches + p) * 2 + side] = hit + 1e-3 * missed if sum(seen[t]) else missed
         steps.append(step)

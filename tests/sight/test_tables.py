@@ -71,10 +71,10 @@ def test_shares_of_a_body_are_by_the_number_of_points_in_view() -> None:
 
 def test_confusions_are_cumulative_and_end_at_1() -> None:
     found = tables({"identity": {"mistaken": 0.5, "confusion": {"ana": {"ben": 0.3, "cleo": 0.7}}}})
-    whom = found.whom[0] / k.ONE
-    assert [0, 0.3, 1] == pytest.approx(whom[0].tolist(), abs=1e-9)
-    assert [0.5, 0.5, 1] == pytest.approx(whom[1].tolist(), abs=1e-9)
-    assert k.ONE == found.whom[0, 0, 2] == found.whom[0, 2, 1]  # thirds, too, end at 1
+    confusion = found.confusion[0] / k.ONE
+    assert [0, 0.3, 1] == pytest.approx(confusion[0].tolist(), abs=1e-9)
+    assert [0.5, 0.5, 1] == pytest.approx(confusion[1].tolist(), abs=1e-9)
+    assert k.ONE == found.confusion[0, 0, 2] == found.confusion[0, 2, 1]  # thirds, too, end at 1
 
 
 def test_memory_outlasts_twice_the_steps_with_the_square_of_the_probability() -> None:
@@ -93,17 +93,17 @@ def test_numbers_of_false_positives_are_poissons() -> None:
 
 
 def test_cameras_without_false_positives_are_not_haunted() -> None:
-    assert 0 == tables({"false_positives": {"per_hour": 0, "spots": []}}).haunted[0]
+    assert 0 == tables({"false_positives": {"per_hour": 0, "spots": []}}).has_ghosts[0]
     spot = {"at": [1, 2], "per_hour": 3}
     found = tables({"false_positives": {"spots": [spot]}})
-    assert 1 == found.haunted[0]
+    assert 1 == found.has_ghosts[0]
     assert 0 == found.source[0, 0]  # nothing appears just anywhere
     assert LATTICE.to_lattice((1.0, 2.0)).tolist() == found.spot[0, 1, :2].tolist()
 
 
 def test_a_home_of_one_user_or_of_none_has_nobody_to_be_mistaken_for() -> None:
-    assert [[k.ONE]] != tables({"identity": {"mistaken": 1}}, ("ana",)).whom[0].tolist()
-    assert (1, 0, 0) == tables({"identity": {"mistaken": 1}}, ()).whom.shape
+    assert [[k.ONE]] != tables({"identity": {"mistaken": 1}}, ("ana",)).confusion[0].tolist()
+    assert (1, 0, 0) == tables({"identity": {"mistaken": 1}}, ()).confusion.shape
 
 
 def test_probabilities_that_add_up_to_more_than_1_somewhere_are_refused_with_the_place() -> None:

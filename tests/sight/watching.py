@@ -11,7 +11,7 @@ import shapely
 from tests.homes import home_of
 
 from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.kernels.look import Memory, Rule, look, new_memory
+from fleet2d.kernels.look import LookRule, SightMemory, look, new_memory
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.perception import MOST_GHOSTS
 from fleet2d.kernels.timelines import Window
@@ -62,7 +62,7 @@ class Watch:
     first: int = 0
     walls: Mesh = HALL
     radius: float = 0.2
-    memory: Memory | None = None
+    memory: SightMemory | None = None
 
     def look(self) -> Int64:
         """Return all sightings."""
@@ -81,8 +81,8 @@ class Watch:
                 errors.keys[0, u, i] = stream_key(self.seed, "robots.r", f"{i} {name}")
         for i in range(errors.ghost_keys.shape[1]):
             errors.ghost_keys[0, i] = stream_key(self.seed, "robots.r", f"{i} ghost")
-        burst = count + MOST_GHOSTS * int(errors.haunted[0])
-        rule = Rule(lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False)
+        burst = count + MOST_GHOSTS * int(errors.has_ghosts[0])
+        rule = LookRule(lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False)
         if self.memory is None:
             self.memory = new_memory(1, count, burst * (lens.latency // lens.period + 2))
         robot = (

@@ -9,15 +9,15 @@ namespace fleet2d {
 
 void bind_chambers(nb::module_& m) {
     m.def(
-        "see_each",
+        "pairs_in_sight",
         [](const Mesh& mesh, View<const i64, 2> eyes, View<const i64, 2> places) {
             check_points(eyes);
             check_points(places);
             require(eyes.size() == places.size(), "there must be as many places as eyes");
-            return see_each(mesh, eyes, places);
+            return pairs_in_sight(mesh, eyes, places);
         },
         "mesh"_a, "eyes"_a, "places"_a, Unlocked(),
-        R"(Return for each pair whether the two see each other: what is on a wall sees nothing.
+        R"(Return for each pair whether the two see each other; places on a wall see nothing.
 
 Fastest if pairs of the same eye follow each other.
 
@@ -39,13 +39,13 @@ Returns:
 
 Args:
     labels: int32 (rows, columns), below `count`, -1 for none.
-    count: How many labels there are.
+    count: Number of labels.
 
 Returns:
     First row, first column, last row and last column, plus one, int64 (count, 4); of a label
     without cells first ones beyond the last.)");
-    m.def("fill_beside", &fill_beside, "labels"_a, Unlocked(),
-          R"(Give cells without a label that of a cell that touches them.
+    m.def("fill_from_neighbors", &fill_from_neighbors, "labels"_a, Unlocked(),
+          R"(Label cells without a label like a cell that touches them.
 
 First of one across a side, then of one across a corner; west before east, south before north.
 
@@ -61,16 +61,16 @@ Returns:
             return spread_labels(labels, mask);
         },
         "labels"_a, "mask"_a, Unlocked(),
-        R"(Give every cell of a mask that has no label the nearest one, in steps across sides.
+        R"(Label every cell of a mask that has no label like the nearest labelled cell, in steps across sides.
 
-Of labels that are equally near the lowest is taken.
+Of equally near labels, the lowest counts.
 
 Args:
-    labels: int32 (rows, columns), -1 for none; those outside the mask count for nothing.
+    labels: int32 (rows, columns), -1 for none; labels outside the mask are ignored.
     mask: Where labels may spread, bool (rows, columns).
 
 Returns:
-    Labels, int32 (rows, columns); -1 outside the mask and where no way leads from a label.)");
+    Labels, int32 (rows, columns); -1 outside the mask and for cells that can't be reached from a label.)");
 }
 
 }  // namespace fleet2d

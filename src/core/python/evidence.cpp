@@ -89,13 +89,13 @@ void bind_evidence(nb::module_& m) {
                                    std::move(views.shown), std::move(views.shown_parts));
         },
         "cells"_a, "room"_a, "patch_cells"_a, "room_cells"_a, "bin_steps"_a,
-        R"(Return how much was in view, bin by bin; of several robots, that of the one that saw most.
+        R"(Return how much was in view in each bin; of several robots, the one that saw most counts.
 
 Args:
-    cells: int64 (bins, robots, 2, patches), cells in view, summed over the steps of a bin, and at most at one.
+    cells: int64 (bins, robots, 2, patches), cells in view: the sum over the steps of a bin, and the maximum.
     room: int64 (patches,), the room of each patch, ascending, none left out.
-    patch_cells: int64 (patches,), how many cells each has.
-    room_cells: int64 (rooms,), how many cells each room has, 1 at least.
+    patch_cells: int64 (patches,), number of cells of each.
+    room_cells: int64 (rooms,), number of cells of each room, at least 1.
     bin_steps: Steps of a bin.
 
 Returns:
@@ -114,13 +114,13 @@ Returns:
             return sum_places(chains.all, unknown, users, first);
         },
         "chains"_a, "unknown"_a, "users"_a, "first"_a, Unlocked(),
-        R"(Sum what presence adds up, by hour, in the order of NumPy's add.reduceat over the first axis.
+        R"(Sum presence by hour, in the order of NumPy's add.reduceat over the first axis.
 
 Args:
     chains: Of each user, consecutive stretches of bins: float64 (stretches, places), probability of each place,
-        away last; and int64 (stretches,), how many bins each has.
-    unknown: bool (bins, places - 1), where somebody was perceived who is no user.
-    users: How many users there are; 0: `chains` holds one person, who is anyone.
+        away last; and int64 (stretches,), number of bins of each.
+    unknown: bool (bins, places - 1), the rooms with an unknown person.
+    users: Number of users; 0: `chains` holds one person, who is anyone.
     first: int64 (hours,), the bins at which hours begin, the first 0.
 
 Returns:

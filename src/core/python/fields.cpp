@@ -28,7 +28,7 @@ void bind_fields(nb::module_& m) {
     m.def("squared_distance", &squared_distance, "mask"_a, Unlocked(),
           R"(Return each cell's exact squared distance to the nearest cell that is not in `mask`.
 
-What lies outside the array counts for nothing: surround the mask by one line of False where the
+Cells outside the array are ignored: surround the mask by one line of False where the
 border is a wall.
 
 Args:
@@ -44,14 +44,14 @@ Returns:
             return walking_distance(mask, goals);
         },
         "mask"_a, "goals"_a, Unlocked(),
-        R"(Return how far each cell is from the nearest goal, walking from cell to cell.
+        R"(Return the walking distance from each cell to the nearest goal.
 
 A step to a side costs 5 and one across a corner 7, which is open only if both cells beside it
 are.
 
 Args:
     mask: Cells that can be walked, bool (rows, columns).
-    goals: Goal cells, int64 (n, 2) as (row, column); those outside the mask count for nothing.
+    goals: Goal cells, int64 (n, 2) as (row, column); goals outside the mask are ignored.
 
 Returns:
     int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.)");
@@ -62,7 +62,7 @@ Returns:
             return cost_distance(cost, cell_of(cost, goal), grid_cell(start));
         },
         "cost"_a, "goal"_a, "start"_a, Unlocked(),
-        R"(Return what the cheapest way from each cell to a goal costs, walking from cell to cell.
+        R"(Return the cost of the cheapest path from each cell to a goal.
 
 A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
 are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
@@ -82,7 +82,7 @@ Returns:
             return step_cost(cost, cell_of(cost, {row, column}), cell_of(cost, {r, c}));
         },
         "cost"_a, "row"_a, "column"_a, "r"_a, "c"_a,
-        "Return what a step between two neighboring cells costs, [1/1000 of a cell's side].");
+        "Return the cost of a step between two neighboring cells [1/1000 of a cell's side].");
     m.def(
         "descend",
         [](View<const i32, 2> cost, View<const i64, 2> distance, Cell start) {
@@ -91,7 +91,7 @@ Returns:
             return descend(cost, distance, cell_of(cost, start));
         },
         "cost"_a, "distance"_a, "start"_a, Unlocked(),
-        R"(Return the cells of a cheapest way from a cell to the goal; ties: the first neighbor.
+        R"(Return the cells of a cheapest path from a cell to the goal; of equal neighbors the first.
 
 Args:
     cost: int32 (rows, columns), as for `cost_distance`.
@@ -99,7 +99,7 @@ Args:
     start: The cell to start from (row, column).
 
 Returns:
-    int64 (n, 2) as (row, column); no cell if no way from the start is known.)");
+    int64 (n, 2) as (row, column); empty if no path from the start is known.)");
 }
 
 }  // namespace fleet2d

@@ -31,7 +31,7 @@ Row plain(const Moment& now) { return {now.time, now.x, now.y, now.heading, now.
 }  // namespace
 
 void bind_legs(nb::module_& m) {
-    nb::class_<Legs>(m, "Legs", "The breakpoints of a plan, gathered while it is built leg by leg.")
+    nb::class_<Legs>(m, "Legs", "The breakpoints of a plan, which is built leg by leg.")
         .def(nb::init<>())
         .def("__len__", &Legs::size)
         .def(
@@ -53,7 +53,7 @@ void bind_legs(nb::module_& m) {
             R"(Turn on the spot by a number of headings, counter-clockwise if positive.
 
 Returns:
-    time, x, y, heading, away when that is done.)")
+    time, x, y, heading and away at the end.)")
         .def(
             "walk",
             [](Legs& self, i64 time, i64 heading, View<const i64, 2> route, f64 speed, f64 turn_rate) {
@@ -66,7 +66,7 @@ Returns:
             R"(Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
 
 Returns:
-    time, x, y, heading, away when that is done.)")
+    time, x, y, heading and away at the end.)")
         .def("rows", &Legs::rows, "Return all breakpoints: int64 (n, 5).")
         .def(
             "track",

@@ -17,16 +17,16 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Memory> {
+struct border::Fields<SightMemory> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&Memory::noticed, &Memory::seen, &Memory::about, &Memory::backlog, &Memory::waiting);
+    static constexpr auto members = std::tuple(&SightMemory::noticed, &SightMemory::seen, &SightMemory::about,
+                                               &SightMemory::backlog, &SightMemory::waiting);
 };
 template <>
-struct border::Fields<Rule> {
+struct border::Fields<LookRule> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&Rule::patience, &Rule::step_us, &Rule::start_us, &Rule::burst, &Rule::stop_lost, &Rule::stop_seen);
+    static constexpr auto members = std::tuple(&LookRule::patience, &LookRule::step_us, &LookRule::start_us,
+                                               &LookRule::burst, &LookRule::stop_lost, &LookRule::stop_seen);
 };
 
 namespace {
@@ -45,7 +45,7 @@ void check_window(const Window& window, Onlooker onlooker, i64 users) {
 }
 
 // All moments of a window, and the ends of pans that begin in it, must be numbers above their beginnings.
-void check_moments(const Rule& rule, const Window& window, const Lenses& lenses) {
+void check_moments(const LookRule& rule, const Window& window, const Lenses& lenses) {
     require(rule.step_us > 0, "step_us must be above 0");
     require(window.end < LATEST / rule.step_us, "steps must begin before 2**61 us");
     require(0 <= rule.start_us && rule.start_us < LATEST, "start_us must be in 0 to 2**61 - 1");
@@ -72,7 +72,7 @@ Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
     return rows;
 }
 
-void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
+void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
     require(memory.noticed.size() == users + 1 && memory.seen.size() == users + 1,
             "noticed and seen must have one length, that of the users and one more");
     require(all_in_range<i64>(memory.noticed, -1, LATEST), "noticed must hold steps, or -1");
@@ -83,11 +83,11 @@ void check_memory(const Memory& memory, const Lenses& lenses, const ErrorTables&
     require(memory.waiting.shape == std::array{cameras, i64{2}}, "waiting must be (cameras, 2)");
     const i64 rows = memory.backlog.shape[1];
     for (i64 c = 0; c < cameras; ++c) {
-        const i64 burst = users + (errors.haunted[c] != 0 ? MOST_GHOSTS : 0) + errors.injected.size();
+        const i64 burst = users + (errors.has_ghosts[c] != 0 ? MOST_GHOSTS : 0) + errors.injected.size();
         require((lenses.latency[c] / lenses.period[c] + 1) * burst <= rows,
                 "backlog must have room for all that waits");
         for (i64 u = 0; u < users; ++u) {
-            const i64 identity = at(memory.about[c][u], About::TAKEN_FOR);
+            const i64 identity = at(memory.about[c][u], About::LAST_IDENTITY);
             require(NOBODY <= identity && identity < users, "about must hold numbers of users, or NOBODY");
             const i64 forced = at(memory.about[c][u], About::FORCED);
             require(0 <= forced && forced < users + FORCED_IDENTITY, "FORCED must stand for a user, or for less");
@@ -127,9 +127,9 @@ is. X to POSTURE are as perceived.)")
 
     m.def(
         "look",
-        [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const Rule& rule, const Window& window,
-           i64 body, i64 first_other, const Memory& memory, std::optional<View<const u64, 3>> shown,
-           std::optional<View<const i64>> radii) {
+        [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
+           const Window& window, i64 body, i64 first_other, const SightMemory& memory,
+           std::optional<View<const u64, 3>> shown, std::optional<View<const i64>> radii) {
             check_lenses(lenses);
             const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
             require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
@@ -167,19 +167,19 @@ is. X to POSTURE are as perceived.)")
 Args:
     walls: The free space.
     lenses: The cameras of a body.
-    errors: How they err.
-    rule: What holds for all of them.
-    window: How all bodies move.
-    body: Number of the body that has the cameras.
+    errors: Their errors.
+    rule: The settings that they share.
+    window: The motion of all bodies.
+    body: Number of the body with the cameras.
     first_other: Number of the first of the others, who are as many as the lenses' users.
-    memory: What the body carries from span to span; updated.
+    memory: The state of its perception between spans; updated.
     shown: uint64 (cameras, users, steps), which points of each are in view, bit i for number i,
         where another method decides that; None: lines of sight do.
     radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
 
 Returns:
-    The steps done (the stopping one included); what was perceived, int64 (n, SIGHTING), see
-    `SightingColumn`; and who came into view or was lost, in order of (step, identity): step, identity
+    The steps done (the stopping one included); the sightings, int64 (n, SIGHTING), see
+    `SightingColumn`; and the identities that came into view or were lost, in order of (step, identity): step, identity
     and kind (USER_SEEN or USER_LOST), int64 (m,) each.
 
 Raises:

@@ -29,7 +29,7 @@ Args:
     mask: Where steps may lead, bool (rows, columns).
 
 Returns:
-    Steps, int32 (rows, columns); 0 at the start, -1 where no way leads.)");
+    Steps, int32 (rows, columns); 0 at the start, -1 for unreachable pixels.)");
     m.def(
         "trace_rings",
         [](View<const bool, 2> mask) {
@@ -37,7 +37,7 @@ Returns:
             return std::tuple(std::move(rings.corners), std::move(rings.start));
         },
         "mask"_a, Unlocked(),
-        R"(Return the rings between a mask and what is not in it, along the sides of the pixels.
+        R"(Return the border rings of a mask, along the sides of the pixels.
 
 Rings have the mask on their left: outer ones run counter-clockwise, holes clockwise (x is the
 column, y is the row). Where two pixels of the mask share only a corner, a ring turns right, so

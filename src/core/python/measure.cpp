@@ -50,7 +50,7 @@ Args:
     room: int16 (n,), the room of each visit, below 0 for none.
     other_begin: int64 (m,), the same of the other body.
     other_room: int16 (m,), the same of the other body.
-    steps: How many steps there are.)");
+    steps: Number of steps.)");
     m.def(
         "sum_moves",
         [](const Poses& poses) {

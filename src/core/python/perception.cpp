@@ -49,30 +49,30 @@ void bind_perception(nb::module_& m) {
     nb::enum_<UserDraw>(m, "UserDraw", nb::is_arithmetic(),
                         "What each draw about one user decides: the last axis of `ErrorTables.keys`.")
         .value("DETECT", UserDraw::DETECT, "Whether a user in view is noticed.")
-        .value("ATTEND", UserDraw::ATTEND, "Whether the draw before still holds.")
+        .value("ATTEND", UserDraw::ATTEND, "Whether the last draw still holds.")
         .value("IDENTIFY", UserDraw::IDENTIFY, "Whether a user is recognized, mistaken for another one, or unknown.")
-        .value("MISTAKE", UserDraw::MISTAKE, "For whom a user is mistaken.")
+        .value("MISTAKE", UserDraw::MISTAKE, "Which other user a user is mistaken for.")
         .value("RANGE", UserDraw::RANGE, "Error of the distance.")
         .value("BEARING", UserDraw::BEARING, "Error of the direction from the camera.")
         .value("HEADING", UserDraw::HEADING, "Error of the user's heading.")
         .value("POSTURE", UserDraw::POSTURE, "Which posture is perceived.");
     nb::enum_<GhostDraw>(m, "GhostDraw", nb::is_arithmetic(),
                          "What each draw about false positives decides: the last axis of `ErrorTables.ghost_keys`.")
-        .value("COUNT", GhostDraw::COUNT, "How many there are in a look.")
-        .value("SOURCE", GhostDraw::SOURCE, "Which source one is of.")
-        .value("PLACE", GhostDraw::PLACE, "Where it is.")
-        .value("IDENTITY", GhostDraw::IDENTITY, "Whom it looks like.")
-        .value("HEADING", GhostDraw::HEADING, "Where it faces.");
+        .value("COUNT", GhostDraw::COUNT, "Their number in a look.")
+        .value("SOURCE", GhostDraw::SOURCE, "The source of one.")
+        .value("PLACE", GhostDraw::PLACE, "Its position.")
+        .value("IDENTITY", GhostDraw::IDENTITY, "Which user it looks like.")
+        .value("HEADING", GhostDraw::HEADING, "Its heading.");
     nb::enum_<About>(m, "About", nb::is_arithmetic(),
-                     "What a camera carries along about one user: the last axis of `Memory.about`.")
+                     "What a camera stores about one user: the last axis of `SightMemory.about`.")
         .value("DRAW", About::DRAW, "The latest draw of UserDraw.DETECT [2**-53].")
         .value("DRAW_STEP", About::DRAW_STEP, "The last step at which the user was in view; -1: never.")
-        .value("TAKEN_FOR", About::TAKEN_FOR, "For whom the user was taken last, or NOBODY.")
+        .value("LAST_IDENTITY", About::LAST_IDENTITY, "The identity at the last sighting, or NOBODY.")
         .value("TRACK_STEP", About::TRACK_STEP, "The last step at which the user was noticed; -1: never.")
         .value("IN_VIEW", About::IN_VIEW, "Looks at which the user was in view.")
         .value("NOTICED", About::NOTICED, "Looks at which the user was noticed.")
         .value("FORCED", About::FORCED,
-               "What somebody outside makes of a user in view: 0 nothing, FORCED_MISS, or FORCED_IDENTITY + identity.");
+               "What an intervention makes of a user in view: 0 nothing, FORCED_MISS, or FORCED_IDENTITY + identity.");
     m.attr("FORCED_MISS") = FORCED_MISS;
     m.attr("FORCED_IDENTITY") = FORCED_IDENTITY;
 
@@ -97,22 +97,21 @@ Example:
             check_offset(dx, dy);
             return length(dx, dy);
         },
-        "dx"_a, "dy"_a, "Return how long (dx, dy) is [lattice units], rounded down.");
+        "dx"_a, "dy"_a, "Return the length of (dx, dy) [lattice units], rounded down.");
     m.def(
         "distance_bin",
         [](View<const i64, 2> table, i64 camera, i64 dx, i64 dy) {
             check_offset(dx, dy);
             return distance_bin(table_of(table, camera), dx, dy);
         },
-        "table"_a, "camera"_a, "dx"_a, "dy"_a, "Return the bin of the parts by distance that (dx, dy) belongs to.");
+        "table"_a, "camera"_a, "dx"_a, "dy"_a, "Return the bin of (dx, dy) in the tables by distance.");
     m.def(
-        "lasting",
+        "persistence_chance",
         [](View<const i64, 2> table, i64 camera, i64 steps) {
             require(steps < i64{1} << DOUBLINGS, "steps must be below 2**62");
-            return lasting(table_of(table, camera), steps);
+            return persistence_chance(table_of(table, camera), steps);
         },
-        "table"_a, "camera"_a, "steps"_a,
-        "Return the probability that attention outlasts so many steps, from that for 2**i steps.");
+        "table"_a, "camera"_a, "steps"_a, "Return the probability that attention outlasts `steps`.");
     m.def(
         "steady_chance",
         [](View<const i64, 2> table, i64 camera, i64 heading, i64 dx, i64 dy, i64 faces, i64 posture, i64 shown) {
@@ -127,43 +126,44 @@ Example:
 Args:
     table: The cameras' tables, int64 (cameras, TABLE).
     camera: Which camera.
-    heading: Where it looks [1/4096 turn].
-    dx: Where the user is, from the camera [lattice units].
+    heading: Its heading [1/4096 turn].
+    dx: Position of the user relative to the camera [lattice units].
     dy: The same.
-    faces: Where the user faces [1/4096 turn].
+    faces: Heading of the user [1/4096 turn].
     posture: 0 stands, 1 sits, 2 lies.
-    shown: How many points of the body are in view.)");
+    shown: Number of points of the body in view.)");
     m.def("notice_chance", &notice_chance, "steady"_a, "light"_a, "chance"_a,
           "Return the probability to notice [2**-53], from [2**-31], [2**-31] and the camera's own [2**-53].");
     m.def(
         "turn_and_stretch",
-        [](i64 dx, i64 dy, i64 turn, i64 distance, i64 wanted) {
+        [](i64 dx, i64 dy, i64 turn, i64 distance, i64 target_length) {
             check_offset(dx, dy);
             require(0 < distance && distance < (i64{1} << 40), "distance must be in 1 to 2**40 - 1");
-            require(0 <= wanted && wanted < (i64{1} << 21), "wanted must be in 0 to 2**21 - 1");
-            const Offset offset = turn_and_stretch(dx, dy, turn, distance, wanted);
+            require(0 <= target_length && target_length < (i64{1} << 21), "target_length must be in 0 to 2**21 - 1");
+            const Offset offset = turn_and_stretch(dx, dy, turn, distance, target_length);
             return std::tuple(offset.dx, offset.dy);
         },
-        "dx"_a, "dy"_a, "turn"_a, "distance"_a, "wanted"_a,
-        "Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length `wanted`.");
+        "dx"_a, "dy"_a, "turn"_a, "distance"_a, "target_length"_a,
+        "Return (dx, dy), `distance` long, turned by `turn`/8192 of a turn and stretched to the length "
+        "`target_length`.");
     m.def(
-        "blurred",
+        "perceived_offset",
         [](View<const i64, 2> table, View<const u64, 3> keys, i64 camera, i64 user, i64 now, i64 dx, i64 dy) {
             require(0 <= camera && camera < keys.size(), "there is no such camera");
             require(0 <= user && user < keys.shape[1] && keys.shape[2] == USER_DRAWS, "there is no such user");
             check_offset(dx, dy);
-            const Offset offset = blurred(table_of(table, camera), keys[camera][user], now, dx, dy);
+            const Offset offset = perceived_offset(table_of(table, camera), keys[camera][user], now, dx, dy);
             return std::tuple(offset.dx, offset.dy);
         },
         "table"_a, "keys"_a, "camera"_a, "user"_a, "now"_a, "dx"_a, "dy"_a,
-        "Return where a user at (dx, dy) from the camera is perceived, from there.");
+        "Return the perceived position of a user at (dx, dy), relative to the camera.");
     m.def(
-        "seeming",
+        "perceived_posture",
         [](View<const i64, 2> table, i64 camera, i64 posture, i64 draw) {
             require(0 <= posture && posture < POSTURES, "there is no such posture");
-            return seeming(table_of(table, camera), posture, draw);
+            return perceived_posture(table_of(table, camera), posture, draw);
         },
-        "table"_a, "camera"_a, "posture"_a, "draw"_a, "Return the posture that a posture is taken for.");
+        "table"_a, "camera"_a, "posture"_a, "draw"_a, "Return the perceived posture for a true one, by a random draw.");
 }
 
 }  // namespace fleet2d

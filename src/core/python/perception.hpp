@@ -10,7 +10,7 @@ template <>
 struct border::Fields<ErrorTables> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
     static constexpr auto members =
-        std::tuple(&ErrorTables::table, &ErrorTables::whom, &ErrorTables::haunted, &ErrorTables::ghosts,
+        std::tuple(&ErrorTables::table, &ErrorTables::confusion, &ErrorTables::has_ghosts, &ErrorTables::ghosts,
                    &ErrorTables::source, &ErrorTables::spot, &ErrorTables::looks_like, &ErrorTables::keys,
                    &ErrorTables::ghost_keys, &ErrorTables::injected);
 };
@@ -24,14 +24,14 @@ inline void check_table(View<const i64> table) {
 // All arrays must be of one set of cameras and users. Tables are only read for a camera that errs.
 inline void check_errors(const ErrorTables& errors, View<const i64> errs, i64 users) {
     const i64 cameras = errs.size(), sources = errors.source.shape[1];
-    for (const i64 length :
-         {errors.table.size(), errors.whom.size(), errors.haunted.size(), errors.ghosts.size(), errors.source.size(),
-          errors.spot.size(), errors.looks_like.size(), errors.keys.size(), errors.ghost_keys.size()}) {
+    for (const i64 length : {errors.table.size(), errors.confusion.size(), errors.has_ghosts.size(),
+                             errors.ghosts.size(), errors.source.size(), errors.spot.size(), errors.looks_like.size(),
+                             errors.keys.size(), errors.ghost_keys.size()}) {
         require(length == cameras, "all arrays of error tables must have one length, that of the cameras");
     }
-    require(errors.whom.shape[1] == users && errors.whom.shape[2] == users && errors.keys.shape[1] == users &&
+    require(errors.confusion.shape[1] == users && errors.confusion.shape[2] == users && errors.keys.shape[1] == users &&
                 errors.looks_like.shape[1] == users + 1,
-            "whom must be (cameras, users, users), keys (cameras, users, draws), looks_like (cameras, users + 1)");
+            "confusion must be (cameras, users, users), keys (cameras, users, draws), looks_like (cameras, users + 1)");
     require(errors.keys.shape[2] == USER_DRAWS && errors.ghost_keys.shape[1] == GHOST_DRAWS,
             "keys and ghost_keys must have an entry for each draw");
     require(errors.ghosts.shape[1] == MOST_GHOSTS, "ghosts must be (cameras, MOST_GHOSTS)");

@@ -9,11 +9,11 @@
 namespace fleet2d {
 namespace {
 
-// One question a row, in the order of its members.
-Array<i64, 2> rows_of(const std::vector<Question>& questions) {
-    auto rows = Array<i64, 2>::empty({static_cast<i64>(questions.size()), 7});
+// One query a row, in the order of its members.
+Array<i64, 2> rows_of(const std::vector<ViewQuery>& view_queries) {
+    auto rows = Array<i64, 2>::empty({static_cast<i64>(view_queries.size()), 7});
     i64 count = 0;
-    for (const Question& q : questions) {
+    for (const ViewQuery& q : view_queries) {
         const i64 row[] = {q.camera, q.body, q.eye_x, q.eye_y, q.eye_heading, q.body_x, q.body_y};
         std::copy_n(row, 7, rows[count++].begin());
     }
@@ -41,19 +41,19 @@ void bind_points(nb::module_& m) {
             return points_in_reach({x, y, heading}, near_squared, far_squared, half_angle, points);
         },
         "x"_a, "y"_a, "heading"_a, "reach"_a, "points"_a, Unlocked(),
-        R"(Return which points are in range and within the angle, walls apart.
+        R"(Return which points are in range and within the angle, regardless of walls.
 
 Args:
-    x: Where the camera is [lattice units].
-    y: Where the camera is [lattice units].
-    heading: Where it looks [1/4096 turn].
-    reach: Reach, how far and wide it sees.
+    x: Position of the camera [lattice units].
+    y: Position of the camera [lattice units].
+    heading: Its heading [1/4096 turn].
+    reach: Its range and angle, a `Reach`.
     points: int64 (n, 2).
 
 Returns:
     bool (n,).)");
     m.def(
-        "questions",
+        "view_queries",
         [](const Lenses& lenses, View<const i64, 2> widest, i64 slack, const Poses& robot, View<const i64, 2> x,
            View<const i64, 2> y, View<const u8, 2> away, i64 first, i64 step_us) {
             check_lenses(lenses);
@@ -64,26 +64,26 @@ Returns:
             for (const auto& shape : {x.shape, y.shape, away.shape}) {
                 require(shape[0] == bodies && shape[1] == robot.x.size(), "x, y and away must be (bodies, n)");
             }
-            Questions questions = list_questions(lenses, widest, slack, robot, {x, y, away}, first, step_us);
-            return std::tuple(rows_of(questions.asked), std::move(questions.number));
+            ViewQueries view_queries = list_view_queries(lenses, widest, slack, robot, {x, y, away}, first, step_us);
+            return std::tuple(rows_of(view_queries.queries), std::move(view_queries.number));
         },
         "lenses"_a, "widest"_a, "slack"_a, "robot"_a, "x"_a, "y"_a, "away"_a, "first"_a, "step_us"_a, Unlocked(),
-        R"(List who may be in view of which camera when: near enough, and not far beside the angle.
+        R"(List the steps at which a body may be in view of a camera: near enough, and not far beside the angle.
 
 Args:
     lenses: Lenses.
-    widest: int64 (cameras, bodies), the squared distance from which on nobody is in view.
-    slack: How far beside the angle somebody may be [lattice units].
-    robot: Poses of whoever has the cameras, n of them.
-    x: int64 (bodies, n), where the others are.
+    widest: int64 (cameras, bodies), the largest squared distance in view.
+    slack: Largest distance beside the angle [lattice units].
+    robot: The n poses of the body with the cameras.
+    x: int64 (bodies, n), positions of the others.
     y: int64 (bodies, n).
-    away: uint8 (bodies, n), not 0 while one isn't at home.
+    away: uint8 (bodies, n), not 0 while the body is away.
     first: The step of the first pose.
     step_us: Length of a step.
 
 Returns:
-    int64 (m, 7) by camera and body, and int32 (cameras, bodies, n): the number of the question that
-    each step asks, from 1 on; 0 for none. A question that is the one before is asked once.)");
+    int64 (m, 7) by camera and body, and int32 (cameras, bodies, n): the number of the query that
+    each step, from 1 on; 0 for none. Equal consecutive queries are listed once.)");
 }
 
 }  // namespace fleet2d

@@ -14,10 +14,10 @@ void bind_presence(nb::module_& m) {
             return advance(probability, transition, bins);
         },
         "probability"_a, "transition"_a, "bins"_a, Unlocked(),
-        R"(Return a chain's state probabilities some bins later, without evidence.
+        R"(Return the state probabilities of a chain `bins` bins later, without evidence.
 
 Args:
-    probability: float64 (states,), now.
+    probability: float64 (states,), the present probabilities.
     transition: float64 (states, states), from row to column within a bin.
     bins: How many bins.
 
@@ -35,7 +35,7 @@ Returns:
             count_sightings(step, user, room, bin_steps, seen);
         },
         "step"_a, "user"_a, "room"_a, "bin_steps"_a, "seen"_a, Unlocked(),
-        R"(Count the steps at which each user was perceived in each room, once however often.
+        R"(Count the steps at which each user was perceived in each room, each step once.
 
 Args:
     step: int64 (n,), in order of time, from the beginning of the first bin.

@@ -41,15 +41,15 @@ void bind_region(nb::module_& m) {
             return std::tuple(std::move(found.right), std::move(found.wall));
         },
         "mesh"_a, "x"_a, "y"_a, Unlocked(),
-        R"(Find everything that is visible from a point.
+        R"(Compute the region visible from a point.
 
 The pieces come counter-clockwise, the first is the one whose right border has the smallest angle in
 [0, one turn) from the x axis.
 
 Args:
     mesh: Free space.
-    x: Where the eye is, lattice units.
-    y: Where the eye is, lattice units.
+    x: Position of the eye [lattice units].
+    y: Position of the eye [lattice units].
 
 Returns:
     `right` int32 (n,), the vertex on each piece's right border, and `wall` int32 (n,), the wall
@@ -60,12 +60,12 @@ Returns:
             return region_contains(mesh, checked_region(mesh, x, y, right, wall), px, py);
         },
         "mesh"_a, "x"_a, "y"_a, "right"_a, "wall"_a, "px"_a, "py"_a,
-        R"(Return whether p is in the region of (x, y): the verdict of a line of sight.
+        R"(Return whether p is in the region of (x, y), as by a line of sight.
 
 Args:
     mesh: Free space.
-    x: Where the eye is, lattice units.
-    y: Where the eye is, lattice units.
+    x: Position of the eye [lattice units].
+    y: Position of the eye [lattice units].
     right: int32 (n,), the vertex on the right border of each of the region's pieces.
     wall: int32 (n,), the wall edge of each piece.
     px: The point, lattice units.
@@ -86,8 +86,8 @@ Args:
 
 Args:
     mesh: Free space.
-    x: Where the eye is, lattice units.
-    y: Where the eye is, lattice units.
+    x: Position of the eye [lattice units].
+    y: Position of the eye [lattice units].
     right: int32 (pieces,), as from `visible_region`.
     wall: int32 (pieces,).
     points: int64 (n, 2), lattice units.)");
@@ -120,8 +120,8 @@ Returns:
 
 Args:
     mesh: Free space.
-    x: Where the eye is, lattice units.
-    y: Where the eye is, lattice units.
+    x: Position of the eye [lattice units].
+    y: Position of the eye [lattice units].
     right: int32 (n,), as from `visible_region`.
     wall: int32 (n,).
 

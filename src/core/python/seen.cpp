@@ -7,14 +7,14 @@ namespace fleet2d {
 namespace {
 
 Array<i32, 2> array_of(const std::vector<Span>& spans) {
-    auto made = Array<i32, 2>::empty({static_cast<i64>(spans.size()), 3});
-    i32* next = made.data();
+    auto result = Array<i32, 2>::empty({static_cast<i64>(spans.size()), 3});
+    i32* next = result.data();
     for (const Span& span : spans) {
         *next++ = span.row;
         *next++ = span.first;
         *next++ = span.last;
     }
-    return made;
+    return result;
 }
 
 void mark_spans(View<const i32, 2> spans, View<bool, 2> mask) {
@@ -43,10 +43,10 @@ void bind_seen(nb::module_& m) {
 
 Args:
     mesh: Free space.
-    x: Where the camera is, lattice units.
-    y: Where the camera is, lattice units.
-    heading: Where it looks, 1/4096 turn.
-    reach: How far and wide it sees, a `Reach`.
+    x: Position of the camera [lattice units].
+    y: Position of the camera [lattice units].
+    heading: Its heading [1/4096 turn].
+    reach: Its range and angle, a `Reach`.
     rows: Height of the grid of cells.
     columns: Width of the grid.
 

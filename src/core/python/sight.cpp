@@ -31,11 +31,11 @@ A point outside or on a wall sees nothing and isn't seen.
 
 Args:
     mesh: Free space.
-    qx: Where the eye is, lattice units.
-    qy: Where the eye is, lattice units.
+    qx: Position of the eye [lattice units].
+    qy: Position of the eye [lattice units].
     triangle: A triangle that holds q, from `locate`; -1 is allowed.
-    px: Where the looked-for point is, lattice units.
-    py: Where the looked-for point is, lattice units.)");
+    px: Position of the point [lattice units].
+    py: Position of the point [lattice units].)");
     m.def("line_of_sight", &sees, "mesh"_a, "qx"_a, "qy"_a, "px"_a, "py"_a,
           "Return whether p is visible from q, wherever q is; see the other form.");
     m.def(
@@ -57,9 +57,9 @@ Returns:
             seen.truncate(vertices_seen_from_point(mesh, x, y, locate(mesh, x, y), seen, scratch));
             return seen;
         },
-        "mesh"_a, "x"_a, "y"_a, Unlocked(), R"(Return the vertices that a straight way from a point leads to.
+        "mesh"_a, "x"_a, "y"_a, Unlocked(), R"(Return the vertices visible from a point.
 
-Between the point and the vertex the way touches no wall and no other vertex. A point on a wall
+The segment between the point and the vertex touches no wall and no other vertex. A point on a wall
 also sees the ends of that wall. A point at a vertex sees only that vertex.
 
 Args:
@@ -78,9 +78,9 @@ Returns:
             seen.truncate(vertices_seen_from_vertex(mesh, build_fans(mesh), vertex, seen, scratch));
             return seen;
         },
-        "mesh"_a, "vertex"_a, Unlocked(), R"(Return the vertices that a straight way from a vertex leads to.
+        "mesh"_a, "vertex"_a, Unlocked(), R"(Return the vertices visible from a vertex.
 
-Between the two the way touches no wall and no other vertex, or it runs along one wall.
+The segment between the two touches no wall and no other vertex, or it runs along one wall.
 
 Args:
     mesh: Free space.

@@ -50,7 +50,7 @@ void bind_signals(nb::module_& m) {
         R"(Return how far the centres of two bodies are apart.
 
 Args:
-    window: How bodies move.
+    window: The motion of the bodies.
     body: Number of one of them.
     other: Number of the other.
 
@@ -69,7 +69,7 @@ Returns:
         R"(Return how far the centre of a body is from a shape, 0 inside it.
 
 Args:
-    window: How bodies move.
+    window: The motion of the bodies.
     body: Number of the body.
     edges: int64 (n, 4), edges from (x, y) to (x, y) [lattice units]; closed rings enclose an inside.
 
@@ -89,7 +89,7 @@ Returns:
         R"(Return how far a body comes in each step: at a step, the way from the step before.
 
 Args:
-    window: How bodies move.
+    window: The motion of the bodies.
     body: Number of the body.
     before: int64 (3,), x, y and away at the step before the window; (0,) if there was none.
 

@@ -15,34 +15,34 @@ struct border::Fields<Moments> {
 void bind_smoothing(nb::module_& m) {
     m.def(
         "smooth",
-        [](const Ways& ways, const Stretches& stretches, View<const f64, 2> dawn, View<const f64, 2> dusk,
+        [](const StayModel& model, const Stretches& stretches, View<const f64, 2> prior, View<const f64, 2> future,
            const Moments& moments) {
-            check_stays(ways, stretches);
-            const std::array states{ways.stages(), ways.patches()};
-            require(dawn.shape == states && dusk.shape == states, "dawn and dusk must be (stages, patches)");
-            require(moments.time.size() == ways.nodes() && moments.exits.shape == ways.follow.shape &&
-                        moments.arrivals.size() == ways.patches() && moments.moves.size() == ways.rooms() &&
-                        moments.rests.size() == ways.rooms(),
-                    "moments must be of the rooms, stages and patches of ways");
-            Smoothed made = smooth(ways, stretches, dawn, dusk, moments);
-            return std::tuple(std::move(made.places), std::move(made.end), std::move(made.ahead));
+            check_stays(model, stretches);
+            const std::array states{model.stages(), model.patches()};
+            require(prior.shape == states && future.shape == states, "prior and future must be (stages, patches)");
+            require(moments.time.size() == model.nodes() && moments.exits.shape == model.follow.shape &&
+                        moments.arrivals.size() == model.patches() && moments.moves.size() == model.rooms() &&
+                        moments.rests.size() == model.rooms(),
+                    "moments must be of the rooms, stages and patches of model");
+            Smoothed result = smooth(model, stretches, prior, future, moments);
+            return std::tuple(std::move(result.places), std::move(result.end), std::move(result.ahead));
         },
-        "ways"_a, "stretches"_a, "dawn"_a, "dusk"_a, "moments"_a, Unlocked(),
-        R"(Return where a person was, given all evidence of some stretches.
+        "model"_a, "stretches"_a, "prior"_a, "future"_a, "moments"_a, Unlocked(),
+        R"(Return the distribution over rooms in each stretch, given all evidence.
 
-Between two stretches a person may go on once: leave a stage, with the chance to do so within the
-later one, or change patch within the room. With stretches of one bin that is a hidden Markov chain;
-with longer ones, what happens within a stretch is taken to happen as it begins. A person who comes
-to a patch of which a part is in view is in that part with the chance of its size, and stays in it
-or out of it until the person moves or what is in view of it changes. In view the person isn't
-perceived in any of n bins with (1 - detection)^n; out of view never, unless nothing of the patch
-was in view where somebody was perceived: positions may be noisy.
+Between two stretches a person may make one transition: leave a stage, with the probability of doing
+so within the later stretch, or change patch within the room. With stretches of one bin that is a
+hidden Markov chain; with longer ones, transitions within a stretch count as if they happened at its
+begin. A person who comes to a patch is in its visible part with the probability of its size, and
+stays in or out of view until the person moves or the view changes. A person in view is missed in
+all of n bins with probability (1 - detection)^n; a person out of view is never perceived, unless
+nothing of the patch is in view: positions may be noisy.
 
 Args:
-    ways: How the person goes on.
+    model: The transition probabilities of the person.
     stretches: The evidence.
-    dawn: float64 (stages, patches), probability before the first stretch.
-    dusk: float64 (stages, patches), how likely each makes what comes after the last.
+    prior: float64 (stages, patches), probability before the first stretch.
+    future: float64 (stages, patches), likelihood of the evidence after the last one.
     moments: To add to.
 
 Returns:

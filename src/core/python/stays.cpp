@@ -8,7 +8,7 @@ void bind_stays(nb::module_& m) {
     m.attr("WHOLE_PATCH") = WHOLE_PATCH;
 
     m.def(
-        "take_together",
+        "merge_bins",
         [](View<const i64> minute, View<const u8, 2> shown, View<const i64> bin, View<const i64> patch,
            View<const i64> steps, i64 longest) {
             require(minute.size() == shown.size(), "minute must be (bins,), shown (bins, patches)");
@@ -17,27 +17,27 @@ void bind_stays(nb::module_& m) {
             require(all_in_range(bin, 0, shown.size()) && all_in_range(patch, 0, shown.shape[1]) &&
                         std::is_sorted(bin.begin(), bin.end()),
                     "bin must ascend and hold numbers of bins, patch numbers of patches");
-            OwnedStretches made = take_together(minute, shown, {bin, patch, steps}, longest);
-            return std::tuple(std::move(made.bins), std::move(made.hour), std::move(made.shown), std::move(made.begin),
-                              std::move(made.patch), std::move(made.share));
+            OwnedStretches result = merge_bins(minute, shown, {bin, patch, steps}, longest);
+            return std::tuple(std::move(result.bins), std::move(result.hour), std::move(result.shown),
+                              std::move(result.begin), std::move(result.patch), std::move(result.share));
         },
         "minute"_a, "shown"_a, "bin"_a, "patch"_a, "steps"_a, "longest"_a, Unlocked(),
-        "Take together bins that are alike; see `fleet2d.kernels.stays`.");
+        "Merge bins with equal evidence; see `fleet2d.kernels.stays`.");
     m.def(
         "follow",
-        [](const Ways& ways, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {
-            check_stays(ways, stretches);
+        [](const StayModel& model, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {
+            check_stays(model, stretches);
             require(stretches.size() > 0, "there must be a stretch");
-            require(now.shape == std::array{i64{2}, ways.stages(), ways.patches()} && shown.size() == ways.patches(),
+            require(now.shape == std::array{i64{2}, model.stages(), model.patches()} && shown.size() == model.patches(),
                     "now must be (2, stages, patches), shown (patches,)");
-            return follow(ways, stretches, now, shown);
+            return follow(model, stretches, now, shown);
         },
-        "ways"_a, "stretches"_a, "now"_a, "shown"_a, Unlocked(),
-        R"(Return where a person was, given the evidence up to each stretch; see `smooth`.
+        "model"_a, "stretches"_a, "now"_a, "shown"_a, Unlocked(),
+        R"(Return the distribution over rooms, given the evidence up to each stretch; see `smooth`.
 
 Args:
-    ways: How the person goes on.
-    stretches: The evidence, of one stretch at least.
+    model: The transition probabilities of the person.
+    stretches: The evidence, at least one stretch.
     now: float64 (2, stages, patches), probability before the first stretch, of states in view and
         of hidden ones; becomes that after the last.
     shown: int64 (patches,), what part of each patch was in view before, in 1/255, -1 if that isn't

@@ -14,21 +14,21 @@ struct border::Fields<Stretches> {
 };
 
 template <>
-struct border::Fields<Ways> {
+struct border::Fields<StayModel> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&Ways::stay, &Ways::follow, &Ways::spread, &Ways::restless, &Ways::first, &Ways::detection);
+    static constexpr auto members = std::tuple(&StayModel::stay, &StayModel::follow, &StayModel::spread,
+                                               &StayModel::restless, &StayModel::first, &StayModel::detection);
 };
 
 // All arrays must be of one person, and the stretches evidence of as many patches.
-inline void check_stays(const Ways& ways, const Stretches& stretches) {
-    const i64 rooms = ways.rooms(), patches = ways.patches(), count = stretches.size();
-    require(rooms > 0 && patches > 0 && ways.nodes() > 0 && ways.nodes() % rooms == 0,
+inline void check_stays(const StayModel& model, const Stretches& stretches) {
+    const i64 rooms = model.rooms(), patches = model.patches(), count = stretches.size();
+    require(rooms > 0 && patches > 0 && model.nodes() > 0 && model.nodes() % rooms == 0,
             "stay must be (rooms * stages,), restless (rooms,), spread (patches,), none of them 0");
-    require(ways.follow.size() == ways.nodes() && ways.follow.shape[1] == rooms + 1,
+    require(model.follow.size() == model.nodes() && model.follow.shape[1] == rooms + 1,
             "follow must be (rooms * stages, rooms + 1)");
-    require(ways.first.size() == rooms + 1 && ways.first[0] == 0 && ways.first[rooms] == patches &&
-                std::is_sorted(ways.first.begin(), ways.first.end()),
+    require(model.first.size() == rooms + 1 && model.first[0] == 0 && model.first[rooms] == patches &&
+                std::is_sorted(model.first.begin(), model.first.end()),
             "first must be (rooms + 1,), ascending from 0 to the number of patches");
     require(stretches.hour.size() == count && stretches.shown.size() == count && stretches.shown.shape[1] == patches &&
                 stretches.begin.size() == count + 1 && stretches.patch.size() == stretches.share.size(),

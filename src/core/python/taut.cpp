@@ -16,16 +16,16 @@ void bind_taut(nb::module_& m) {
             return leg_cost(cost, {ax, ay}, {bx, by});
         },
         "cost"_a, "ax"_a, "ay"_a, "bx"_a, "by"_a,
-        R"(Return what a straight leg costs, [percent times lattice units]; infinite where none leads.
+        R"(Return the cost of a straight leg [percent times lattice units]; infinite if it is blocked.
 
-Each part of it counts by the cell that it runs through.
+Each part of it has the cost of the cell that it crosses.
 
 Args:
     cost: int32 (rows, columns), -1 where no way leads.
-    ax: Where it begins, lattice units.
-    ay: Where it begins, lattice units.
-    bx: Where it ends, lattice units.
-    by: Where it ends, lattice units.)");
+    ax: Position of its begin [lattice units].
+    ay: Position of its begin [lattice units].
+    bx: Position of its end [lattice units].
+    by: Position of its end [lattice units].)");
     m.def(
         "pull_taut",
         [](const Mesh& mesh, View<const i32, 2> cost, View<const i64, 2> way) {
@@ -33,15 +33,15 @@ Args:
             return pull_taut(mesh, cost, way);
         },
         "mesh"_a, "cost"_a, "way"_a, Unlocked(),
-        R"(Return a way with fewer corners: legs are joined while the joint one is clear and no dearer.
+        R"(Return a path with fewer corners: legs are joined while the result is free and not more expensive.
 
 Args:
-    mesh: The space that the way must stay in.
+    mesh: The space that the path must stay in.
     cost: int32 (rows, columns), -1 where no way leads.
     way: int64 (n, 2), lattice points; each leg lies in the space.
 
 Returns:
-    int64 (m, 2), some of the points, the first and the last among them.)");
+    int64 (m, 2), a subset of the points, with the first and the last.)");
 }
 
 }  // namespace fleet2d

@@ -368,12 +368,12 @@ Returns:
             [](OwnedWindow& self, const WindowState& state) { new (&self) OwnedWindow(window_of_state(state)); },
             nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
 
-    nb::class_<OwnedTimelines>(m, "Timelines", R"(How each body of a run moves, piece after piece.
+    nb::class_<OwnedTimelines>(m, "Timelines", R"(The motion of each body of a run, piece after piece.
 
 A piece begins at a step and holds until the next one of its body begins.
 
 Args:
-    bodies: How many bodies there are.
+    bodies: Number of bodies.
     step_us: Length of a step.)")
         .def(nb::init<i64, i64>(), "bodies"_a, "step_us"_a)
         .def("follow", &OwnedTimelines::follow, "body"_a, "step"_a, "track"_a, "posture_us"_a, "postures"_a,
@@ -407,9 +407,9 @@ Args:
                 // Checked before so many are made room for.
                 require(nb::isinstance<nb::list>(state[2]) && static_cast<i64>(nb::len(nb::handle(state[2]))) == bodies,
                         NO_STATE);
-                OwnedTimelines made(bodies, Part<i64>{state[1]}.value());
-                made.restore(nb::borrow<nb::list>(state[2]));
-                new (&self) OwnedTimelines(std::move(made));
+                OwnedTimelines result(bodies, Part<i64>{state[1]}.value());
+                result.restore(nb::borrow<nb::list>(state[2]));
+                new (&self) OwnedTimelines(std::move(result));
             },
             nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
 }

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT, Activities, Names
 from fleet2d.floorplan.cache import read_only
-from fleet2d.kernels.chambers import fill_beside
+from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.look import (
     CAMERA,
@@ -168,7 +168,7 @@ class NearestRooms:
                 None: its room.
         """
         self._plan = plan
-        self._rooms = None if of_cell is None else _shared(fill_beside(of_cell))
+        self._rooms = None if of_cell is None else _shared(fill_from_neighbors(of_cell))
 
     def of(self, x: NDArray[np.int64], y: NDArray[np.int64]) -> NDArray[np.int16]:
         """Return the rooms of places [lattice units]; NOWHERE only in a home without rooms."""
@@ -177,7 +177,7 @@ class NearestRooms:
         rooms: NDArray[np.int16] = rooms_at(self._rooms, x, y)
         while len(rooms) and rooms.min() == NOWHERE and self._plan.rooms:
             padded = np.pad(self._rooms, 1, constant_values=NOWHERE)
-            self._rooms = _shared(fill_beside(padded)[1:-1, 1:-1])
+            self._rooms = _shared(fill_from_neighbors(padded)[1:-1, 1:-1])
             rooms = rooms_at(self._rooms, x, y)
         return rooms
 

@@ -32,9 +32,9 @@ from fleet2d.kernels.look import (
     STEP,
     USER_LOST,
     USER_SEEN,
-    Crowd,
-    Memory,
-    Rule,
+    LookRule,
+    SightMemory,
+    UserPoses,
     X,
     Y,
     look,
@@ -144,7 +144,7 @@ class Cameras:
         forced = forced_of(self.disturbances, self.names, people)
         self.memory = carry_over(memory, self.memory, forced)
 
-    def _set_up(self) -> Memory:
+    def _set_up(self) -> SightMemory:
         owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
@@ -174,17 +174,17 @@ class Cameras:
         self.errors = error_tables(lenses, errors, context)
         self._dark = dark_cameras(self.disturbances, self.names)
         worsen(self.lenses, self.disturbances, self.names)
-        self.errors.haunted[self._dark] = 0
+        self.errors.has_ghosts[self._dark] = 0
         injected = injected_by(self.disturbances, self.names, context)
         self.errors = self.errors._replace(injected=injected)
         self._draw_streams()
         if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
         count = len(self.others)
-        bursts = count + MOST_GHOSTS * self.errors.haunted + len(self.errors.injected)
+        bursts = count + MOST_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
         midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
         since_midnight = clock.start - midnight
-        self.rule = Rule(
+        self.rule = LookRule(
             patience=max(lens.patience for lens in lenses),
             step_us=clock.step_us,
             start_us=since_midnight.seconds * 10**6 + since_midnight.microseconds,
@@ -336,7 +336,7 @@ class Cameras:
         if self.method is not None:
             block = bodies.block(self.taken, end)
             others = slice(self._first, self._first + len(self.others))
-            crowd = Crowd._make(column[others] for column in block)
+            crowd = UserPoses._make(column[others] for column in block)
             poses = poses_of(block, self.row)
             step_us = self.owner.clock.step_us
             with blame("sight.method", self.taken):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import SIGHTING, Memory
+from fleet2d.kernels.look import SIGHTING, SightMemory
 from fleet2d.kernels.perception import FORCED_IDENTITY, FORCED_MISS, About
 from fleet2d.sight.disturbance import Disturbance, of_camera
 from fleet2d.sight.perception import Perception
@@ -73,7 +73,7 @@ def injected_by(
     return np.array(rows, np.int64).reshape(-1, 5)
 
 
-def carry_over(memory: Memory, old: Memory, forced: I64) -> Memory:
+def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemory:
     """Return the memory of cameras for other errors, with the content of the old memory.
 
     Args:
@@ -89,4 +89,4 @@ def carry_over(memory: Memory, old: Memory, forced: I64) -> Memory:
     for c, (begin, length) in enumerate(old.waiting.tolist()):
         places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
         backlog[c, :length], waiting[c, 1] = old.backlog[c, places], length
-    return Memory(old.noticed, old.seen, about, backlog, waiting)
+    return SightMemory(old.noticed, old.seen, about, backlog, waiting)

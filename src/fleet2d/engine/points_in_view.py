@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import Crowd
+from fleet2d.kernels.look import UserPoses
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.points import BODY, BODY_X, BODY_Y, EYE_HEADING, questions
+from fleet2d.kernels.points import BODY, BODY_X, BODY_Y, EYE_HEADING, view_queries
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.fov import FieldOfView
 
@@ -24,7 +24,7 @@ def points_seen(
     home: Home,
     lenses: Lenses,
     robot: Poses,
-    crowd: Crowd,
+    crowd: UserPoses,
     first: int,
     step_us: int,
 ) -> NDArray[np.uint64]:
@@ -49,7 +49,7 @@ def points_seen(
         [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
         np.int64,
     ).reshape(lenses.widest.shape)
-    queries, number = questions(
+    queries, number = view_queries(
         lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
     )
     answers = np.zeros(len(queries) + 1, np.uint64)

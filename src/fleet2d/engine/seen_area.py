@@ -12,7 +12,7 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
 from fleet2d.events import Event
 from fleet2d.kernels.mesh import Mesh
-from fleet2d.kernels.watch import NEVER, Record, Watched, no_glances, settle, watch
+from fleet2d.kernels.watch import NEVER, SightRecord, WatchSetup, empty_pose_cache, settle, watch
 from fleet2d.sight.tables import TableContext, stack_lenses
 
 # Slots of the cache of poses, which holds half as many. A round through a large home has a few
@@ -70,7 +70,7 @@ class SeenArea:
         self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
         bins = (LONGEST // bin_steps + 2 if bin_steps else 0, len(patches.room))
-        self._record = Record(
+        self._record = SightRecord(
             first=np.full(grid, NEVER, np.int64),
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
             exposure=np.zeros(len(patches.room), np.int64),
@@ -82,12 +82,12 @@ class SeenArea:
         # Cells in view, summed and at most, from bin _first_bin on.
         self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
         self._first_bin = 0
-        self._glances = no_glances(SLOTS, len(patches.room))
+        self._cache = empty_pose_cache(SLOTS, len(patches.room))
         self._set_walls(robot.home.walls)
 
     def _set_walls(self, walls: Mesh) -> None:
         """Use other walls, and clear the cache of poses."""
-        self._watched = Watched(
+        self._setup = WatchSetup(
             walls,
             self._lenses,
             self._patches.of_cell,
@@ -95,8 +95,8 @@ class SeenArea:
             self.every,
             max(self._bin_steps, 1),
         )
-        self._glances.last[:] = self._glances.settled[:] = NEVER
-        self._glances.used[0] = 0
+        self._cache.last[:] = self._cache.settled[:] = NEVER
+        self._cache.used[0] = 0
 
     def darken(self, cameras: Collection[str]) -> None:
         """Let these cameras see nothing from the present step on, and all others see normally."""
@@ -118,14 +118,14 @@ class SeenArea:
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Look from the robot's poses in the steps from `taken` to `end` - 1."""
         walls = self.robot.home.walls
-        if walls is not self._watched.walls:
+        if walls is not self._setup.walls:
             self._settle()
             self._set_walls(walls)
         while self.taken < end:
             first, until = self.taken, min(end, self.taken + LONGEST)
             self.taken = until
             runs = bodies.runs(self.row, first, until)
-            watch(self._watched, runs, 0, first, until, self._glances, self._record)
+            watch(self._setup, runs, 0, first, until, self._cache, self._record)
             if self._bin_steps:
                 self._collect_bins(first)
         return ()
@@ -151,7 +151,7 @@ class SeenArea:
 
     def _settle(self) -> None:
         if len(self._record.last):
-            settle(self._watched, self._glances, self._record.last)
+            settle(self._setup, self._cache, self._record.last)
 
     @property
     def exposure(self) -> I64:

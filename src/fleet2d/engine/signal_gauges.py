@@ -33,7 +33,7 @@ from fleet2d.expectations.signals import Measurement
 from fleet2d.expectations.trace import Trace, shortest
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
-from fleet2d.kernels.look import Memory
+from fleet2d.kernels.look import SightMemory
 from fleet2d.problems import suggest
 
 I64 = NDArray[np.int64]
@@ -77,7 +77,7 @@ class BatteryGauge(Gauge):
 class PerfectCameras(Cameras):
     """Cameras that look at every step, and notice all bodies in view at once."""
 
-    def _set_up(self) -> Memory:
+    def _set_up(self) -> SightMemory:
         memory = super()._set_up()
         lenses = self.lenses
         self.lenses = lenses._replace(

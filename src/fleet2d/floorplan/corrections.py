@@ -18,7 +18,7 @@ from fleet2d.floorplan.rooms.doorways import DoorLine, name_doorways
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
 from fleet2d.floorplan.rooms.room import Room, make_rooms
 from fleet2d.floorplan.rooms.vocabulary import usual_type
-from fleet2d.kernels.chambers import fill_beside
+from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.problems import problem
 from fleet2d.units import Length
 
@@ -95,7 +95,7 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
         rooms=rooms,
         doorways=name_doorways(
             plan.lattice,
-            fill_beside(room_of_cell),
+            fill_from_neighbors(room_of_cell),
             [room.name for room in rooms],
             [(line, segments[k]) for k, line in enumerate(_door_lines(plan))],
         ),
@@ -133,7 +133,7 @@ def _region_at(
     x, y = correction.at or (0.0, 0.0)
     row, column = plan.lattice.cell_of(*plan.lattice.point_at((x, y)))
     if 0 <= row < plan.lattice.rows and 0 <= column < plan.lattice.columns:
-        index = int(fill_beside(painted.astype(np.int16))[row, column])
+        index = int(fill_from_neighbors(painted.astype(np.int16))[row, column])
         if index >= 0:
             return index
     near_x, near_y = plan.nearest_free(x, y)

@@ -32,7 +32,7 @@ from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway, fit_lines, name_
 from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.room import NO_ROOM, Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
-from fleet2d.kernels.chambers import fill_beside
+from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.leaves import views
 
@@ -158,7 +158,7 @@ class FloorPlan:
             room_of_cell=room_of_cell,
             rooms=rooms,
             entrance=entrance,
-            doorways=name_doorways(lattice, fill_beside(room_of_cell), names, fitted),
+            doorways=name_doorways(lattice, fill_from_neighbors(room_of_cell), names, fitted),
             objects=number_objects(objects),
             no_go=tuple(no_go),
             notes=(*notes, *part_notes(lattice, polygons), *room_notes, *door_notes),
@@ -206,7 +206,7 @@ class FloorPlan:
         Like `room_of_cell`, but a cell that a wall cuts, so that its centre isn't free, has the
         room of a free cell beside it, since part of it may be free.
         """
-        rooms = fill_beside(self.room_of_cell)
+        rooms = fill_from_neighbors(self.room_of_cell)
         rooms.setflags(write=False)
         return rooms
 

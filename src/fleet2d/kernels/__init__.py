@@ -1,5 +1,5 @@
-"""The compiled core as Python sees it: arrays and integers in, arrays and integers out.
+"""The Python interface of the compiled core: arrays and integers in, arrays and integers out.
 
-One module a subject, as in ``src/core``: its named tuples with their shapes and units, its
-constants, and its functions, which :mod:`fleet2d._core` holds.
+There is one module for each subject, as in ``src/core``. It has the named tuples of the subject
+with their shapes and units, its constants, and its functions from :mod:`fleet2d._core`.
 """

@@ -1,5 +1,5 @@
-"""What the search for rooms asks often: which places see each other, which label is nearest."""
+"""Functions for the segmentation of rooms: which places see each other, the nearest label."""
 
-from fleet2d._core import fill_beside, label_frames, see_each, spread_labels
+from fleet2d._core import fill_from_neighbors, label_frames, pairs_in_sight, spread_labels
 
-__all__ = ["fill_beside", "label_frames", "see_each", "spread_labels"]
+__all__ = ["fill_from_neighbors", "label_frames", "pairs_in_sight", "spread_labels"]

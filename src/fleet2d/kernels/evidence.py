@@ -1,4 +1,4 @@
-"""Evidence in bins: how much was in view, and what presence adds up to, in one order of sums."""
+"""Evidence in bins: how much was in view, and sums of presence, in one order of summation."""
 
 from fleet2d._core import gather_views, sum_places
 

@@ -1,7 +1,7 @@
 """Headings as integers: 4096 to a turn, counter-clockwise from +x, with one table of sines.
 
-Angles never meet a sine or an arc tangent at run time: those differ in the last bit between
-machines. The table is rounded to 2**-30, where no libm disagrees (a test pins its digest).
+No sine or arc tangent is computed at run time: they differ in the last bit between machines. The
+table is rounded to 2**-30, where all math libraries agree (a test checks its digest).
 
 Constants:
     TURN, HALF_TURN, QUARTER: Headings in a turn, half of one and a quarter.

@@ -1,4 +1,4 @@
-"""The cameras of a robot: where they are, where they look, and what lies in their view."""
+"""The cameras of a robot: their poses, and what is in their view."""
 
 from typing import NamedTuple
 
@@ -13,19 +13,19 @@ I64 = NDArray[np.int64]
 
 
 class Lenses(NamedTuple):
-    """The constants of a robot's cameras; int64 (cameras,), unless it says otherwise."""
+    """The constants of a robot's cameras; int64 (cameras,) unless noted otherwise."""
 
     near_squared: I64  # lattice units squared
     far_squared: I64
     half_angle: I64  # 1/8192 of a turn; 4096 and more is all round
     chance: I64  # probability of noticing a user in view, times 2**53
     moves: I64  # 0 if it is at the robot's centre and looks straight ahead
-    forward: I64  # where it sits, in the robot's frame [lattice units]
+    forward: I64  # its position in the robot's frame [lattice units]
     left: I64
-    heading: I64  # where it looks, from the robot's heading
+    heading: I64  # its heading relative to the robot's
     pans: I64  # (cameras, headings): added to `heading`, one after the other
     pan_count: I64
-    pan_us: I64  # how long it looks in each
+    pan_us: I64  # time at each of these headings
     period: I64  # steps from look to look
     latency: I64  # steps until a sighting is known
     errs: I64  # 1 where what is perceived can be wrong

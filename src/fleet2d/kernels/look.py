@@ -1,4 +1,4 @@
-"""What the cameras of one robot see of all users over a span of steps, and what it makes of it."""
+"""What the cameras of one body see and perceive of other bodies over a span of steps."""
 
 from typing import NamedTuple
 
@@ -21,10 +21,10 @@ __all__ = [
     "USER",
     "USER_LOST",
     "USER_SEEN",
-    "Crowd",
-    "Memory",
-    "Rule",
+    "LookRule",
     "SightEvents",
+    "SightMemory",
+    "UserPoses",
     "X",
     "Y",
     "look",
@@ -51,8 +51,8 @@ TRUE_POSTURE = SightingColumn.TRUE_POSTURE
 SIGHTING = len(SightingColumn)
 
 
-class Crowd(NamedTuple):
-    """All users over the span: row u is user u, column j is step first + j."""
+class UserPoses(NamedTuple):
+    """The poses of all users over a span: row u is user u, column j is step first + j."""
 
     x: I64
     y: I64
@@ -61,17 +61,17 @@ class Crowd(NamedTuple):
     posture: NDArray[np.int8]
 
 
-class Memory(NamedTuple):
-    """What a robot carries from span to span.
+class SightMemory(NamedTuple):
+    """The state of a robot's perception between spans.
 
     Identities are users, and last a person who wasn't recognized.
     """
 
-    noticed: I64  # (identities,): last step at which one was noticed; -1: never
-    seen: I64  # (identities,): 1 while one counts as seen
+    noticed: I64  # (identities,): last step at which the identity was noticed; -1: never
+    seen: I64  # (identities,): 1 while the identity counts as seen
     about: I64  # (cameras, users, len(About)): see fleet2d.kernels.perception.About
-    backlog: I64  # (cameras, rows, SIGHTING): a ring of what isn't known yet
-    waiting: I64  # (cameras, 2): its first row, and its length
+    backlog: I64  # (cameras, rows, SIGHTING): a ring buffer of sightings that aren't known yet
+    waiting: I64  # (cameras, 2): first row and length of the backlog
 
 
 class SightEvents(NamedTuple):
@@ -82,8 +82,8 @@ class SightEvents(NamedTuple):
     kind: NDArray[np.int32]  # USER_SEEN | USER_LOST
 
 
-class Rule(NamedTuple):
-    """What holds for all cameras of a robot."""
+class LookRule(NamedTuple):
+    """The settings that all cameras of a robot share."""
 
     patience: int  # steps without a sighting after which an identity counts as lost
     step_us: int
@@ -93,12 +93,12 @@ class Rule(NamedTuple):
     stop_seen: bool
 
 
-def new_memory(cameras: int, users: int, backlog: int) -> Memory:
-    """Return the memory of a robot that has seen nobody."""
+def new_memory(cameras: int, users: int, backlog: int) -> SightMemory:
+    """Return the memory of a robot that has not seen anybody."""
     never = -1
     about = np.zeros((cameras, users, len(About)), np.int64)
     about[..., [About.DRAW_STEP.value, About.TRACK_STEP.value]] = never
-    return Memory(
+    return SightMemory(
         noticed=np.full(users + 1, never, np.int64),
         seen=np.zeros(users + 1, np.int64),
         about=about,

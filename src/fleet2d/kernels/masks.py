@@ -1,6 +1,6 @@
-"""Masks of pixels: their connected parts, how far one is from another, and the rings round them.
+"""Masks of pixels: their connected parts, distances within them, and the rings around them.
 
-What lies outside an array counts as not in the mask.
+Pixels outside an array count as not in the mask.
 """
 
 from fleet2d._core import count_steps, label_parts, trace_rings

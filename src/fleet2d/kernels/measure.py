@@ -1,4 +1,4 @@
-"""Poses and places measured: in which room, how long in each, and how far."""
+"""Measurements of poses: rooms, time spent together, and distances covered."""
 
 from fleet2d._core import count_together, rooms_at, sum_moves
 

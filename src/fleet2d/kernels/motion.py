@@ -53,17 +53,17 @@ class WalkRule(NamedTuple):
     stride: int  # 1/256 lattice units forward
     sway: int  # standard deviation of the turn, in 2**-16 headings per unit of random_bell
     turn_limit: int  # headings, half a turn at most
-    stays: int = 0  # 1: where a wall is in the way it only sways, and stays where it is
+    stays: int = 0  # 1: at a wall it keeps its position and its heading only sways
 
 
 def empty_poses(count: int) -> Poses:
-    """Return poses to be filled."""
+    """Return uninitialized poses, to be filled."""
     x, y, heading = (np.empty(count, np.int64) for _ in range(3))
     return Poses(x, y, heading, np.empty(count, np.uint8))
 
 
-def paste_poses(out: Poses, begin: int, part: Poses, chosen: slice) -> None:
-    """Write the chosen poses of `part` to `out`, from `begin` on."""
-    count = len(part.x[chosen])
+def paste_poses(out: Poses, begin: int, part: Poses, rows: slice) -> None:
+    """Copy the rows of `part` to `out`, from `begin` on."""
+    count = len(part.x[rows])
     for name in Poses._fields:
-        getattr(out, name)[begin : begin + count] = getattr(part, name)[chosen]
+        getattr(out, name)[begin : begin + count] = getattr(part, name)[rows]

@@ -39,15 +39,15 @@ from fleet2d._core import (
     About,
     GhostDraw,
     UserDraw,
-    blurred,
     distance_bin,
-    lasting,
     length,
     notice_chance,
+    perceived_offset,
+    perceived_posture,
+    persistence_chance,
     pick,
     random_share,
     random_shares,
-    seeming,
     steady_chance,
     turn_and_stretch,
 )
@@ -83,15 +83,15 @@ __all__ = [
     "ErrorTables",
     "GhostDraw",
     "UserDraw",
-    "blurred",
     "distance_bin",
-    "lasting",
     "length",
     "notice_chance",
+    "perceived_offset",
+    "perceived_posture",
+    "persistence_chance",
     "pick",
     "random_share",
     "random_shares",
-    "seeming",
     "steady_chance",
     "turn_and_stretch",
 ]
@@ -101,17 +101,17 @@ U64 = NDArray[np.uint64]
 
 
 class ErrorTables(NamedTuple):
-    """How the cameras of one robot err. The first axis of every array is the camera.
+    """The errors of the cameras of one robot. The first axis of every array is the camera.
 
     "Cumulative" tables hold in entry i the probability of all outcomes up to i.
     """
 
     table: I64  # (cameras, TABLE): the parts AT_DISTANCE to HEADING_NOISE, one after the other
-    whom: I64  # (cameras, users, users): for whom one is mistaken, cumulative
-    haunted: I64  # (cameras,): 1 if there are false positives
-    ghosts: I64  # (cameras, MOST_GHOSTS): how many in one look, of all sources, cumulative
-    source: I64  # (cameras, sources): which source one is of, cumulative
-    spot: I64  # (cameras, sources, 3): x, y, noise as RANGE_NOISE; of source 0 all is in view
+    confusion: I64  # (cameras, users, users): which user one is mistaken for, cumulative
+    has_ghosts: I64  # (cameras,): 1 if there are false positives
+    ghosts: I64  # (cameras, MOST_GHOSTS): number in one look, of all sources, cumulative
+    source: I64  # (cameras, sources): the source of one, cumulative
+    spot: I64  # (cameras, sources, 3): x, y, noise as RANGE_NOISE; source 0 is the whole view
     looks_like: I64  # (cameras, users + 1): identity of a false positive, nobody last, cumulative
     keys: U64  # (cameras, users, len(UserDraw)): streams
     ghost_keys: U64  # (cameras, len(GhostDraw)): streams

@@ -1,9 +1,10 @@
-"""Many points looked at from one place: which are in sight, and which in range and angle.
+"""Many points seen from one place: which are in sight, and which are in range and angle.
 
-And for methods that are not compiled: what there is to ask over many steps, nothing twice in a row.
+For methods of sight that are not compiled: the queries of many steps, without consecutive
+duplicates.
 """
 
-from fleet2d._core import points_in_reach, points_in_sight, questions
+from fleet2d._core import points_in_reach, points_in_sight, view_queries
 
 __all__ = [
     "BODY",
@@ -15,8 +16,8 @@ __all__ = [
     "EYE_Y",
     "points_in_reach",
     "points_in_sight",
-    "questions",
+    "view_queries",
 ]
 
-# The columns of a question: whose camera and body, where the camera is, and the body's centre.
+# The columns of a query: camera, body, the pose of the camera, and the centre of the body.
 CAMERA, BODY, EYE_X, EYE_Y, EYE_HEADING, BODY_X, BODY_Y = range(7)

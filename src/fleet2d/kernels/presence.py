@@ -1,7 +1,7 @@
-"""Forecasts of presence, sightings and resampled days: no logarithm, and one order of sums.
+"""Forecasts of presence, counts of sightings, and resampled days, in one order of summation.
 
-BLAS and einsum add in an order that depends on the machine. These loops don't, so what is learned,
-and where a robot goes because of it, is the same everywhere.
+BLAS and einsum add in an order that depends on the machine. These loops don't, so learned models,
+and the decisions of robots that follow from them, are the same everywhere.
 """
 
 from fleet2d._core import advance, count_sightings, list_sightings, resampled

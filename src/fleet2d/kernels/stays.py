@@ -1,7 +1,7 @@
-"""Stays of a person, hidden or seen: a semi-Markov chain over patches of rooms, filtered.
+"""The stays of a person as a hidden semi-Markov chain over patches of rooms: filtering.
 
-No logarithm, no library's product, and one order of sums: what is learned, and where a robot goes
-because of it, is the same on every machine.
+It uses no logarithms, no matrix products of libraries, and one order of sums, so that learned
+models, and the decisions of robots that follow from them, are the same on every machine.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fleet2d import _core
 from fleet2d._core import WHOLE_PATCH, follow
 
-__all__ = ["WHOLE_PATCH", "Moments", "Stretches", "Ways", "follow", "take_together"]
+__all__ = ["WHOLE_PATCH", "Moments", "StayModel", "Stretches", "follow", "merge_bins"]
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -20,16 +20,16 @@ U8 = NDArray[np.uint8]
 
 
 class Stretches(NamedTuple):
-    """Evidence of one user, of which bins that are alike are taken together.
+    """Evidence of one user, with equal consecutive bins merged.
 
     Attributes:
-        bins: int64 (stretches,), how many bins each has.
-        hour: int64 (stretches,), of the day.
-        shown: uint8 (stretches, patches), what part of each patch was in view, in 1/255; the last
-            patch is away, which never is.
+        bins: int64 (stretches,), number of bins of each stretch.
+        hour: int64 (stretches,), hour of the day.
+        shown: uint8 (stretches, patches), the part of each patch in view, in 1/255; 0 for away,
+            the last patch.
         begin: int64 (stretches + 1,), where each stretch's sightings begin in the next two.
         patch: int64 (sightings,), where the user was perceived.
-        share: float64 (sightings,), at what share of the steps with a sighting.
+        share: float64 (sightings,), share of the steps with a sighting.
     """
 
     bins: I64
@@ -40,19 +40,20 @@ class Stretches(NamedTuple):
     share: F64
 
 
-class Ways(NamedTuple):
-    """How a person goes on: in stages of a stay, and from room to room.
+class StayModel(NamedTuple):
+    """The transition probabilities of a person: between stages of a stay, and between rooms.
 
-    A stage is that of a room, or of away, the last; number room * stages + stage.
+    Each room, and away, the last, has its own stages: number room * stages + stage.
 
     Attributes:
-        stay: float64 (stages,), chance to be in the same stage a bin later.
-        follow: float64 (stages, rooms + 2), where a person goes after a stage: to each room, away,
-            and the next stage of the same; rows sum to one.
-        spread: float64 (patches,), chance that a person who comes to a room comes to the patch.
-        restless: float64 (rooms + 1,), chance a bin to change patch while staying in a room.
-        first: int64 (rooms + 2,), the first patch of each room, that of away, and their number.
-        detection: Chance that a person in view is perceived in a bin.
+        stay: float64 (stages,), probability of the same stage a bin later.
+        follow: float64 (stages, rooms + 2), distribution after a stage: each room, away, and the
+            next stage of the same room; rows sum to one.
+        spread: float64 (patches,), probability of the patch given that a person comes to its room.
+        restless: float64 (rooms + 1,), probability per bin of changing patch during a stay.
+        first: int64 (rooms + 2,), the first patch of each room, that of away, and the number of
+            patches.
+        detection: Probability that a person in view is perceived in a bin.
     """
 
     stay: F64
@@ -64,14 +65,14 @@ class Ways(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """What is expected of a person's stays, given all evidence.
+    """Expected moments of a person's stays, given all evidence.
 
     Attributes:
-        time: float64 (stages,), bins.
-        exits: float64 (stages, rooms + 2), how often each is followed by what.
-        arrivals: float64 (patches,), how often a person who came, or changed patch, came there.
+        time: float64 (stages,), bins spent in the stage.
+        exits: float64 (stages, rooms + 2), transitions to each room, away, and the next stage.
+        arrivals: float64 (patches,), arrivals at the patch, from another room or patch.
         moves: float64 (rooms + 1,), changes of patch.
-        rests: float64 (rooms + 1,), bins without one.
+        rests: float64 (rooms + 1,), bins without a change of patch.
     """
 
     time: F64
@@ -81,22 +82,23 @@ class Moments(NamedTuple):
     rests: F64
 
 
-def take_together(
+def merge_bins(
     minute: I64, shown: U8, seen_bin: I64, patch: I64, steps: I64, longest: int
 ) -> Stretches:
-    """Take together bins in which the same was in view and the user was perceived alike.
+    """Merge consecutive bins with the same view and the same sightings.
 
-    Bins in which the user was perceived in several patches stay by themselves.
+    Bins in which the user was perceived in several patches aren't merged.
 
     Args:
-        minute: (bins,) since midnight; no stretch goes on into another hour.
-        shown: (bins, patches), as in Stretches, away left out.
-        seen_bin: (sightings,), ascending, the bins in which the user was perceived.
-        patch: (sightings,), where, ascending in each bin.
-        steps: (sightings,), at how many steps.
-        longest: Most bins of a stretch.
+        minute: int64 (bins,), begin of each bin [minutes since midnight]; no stretch crosses an
+            hour.
+        shown: uint8 (bins, patches), as in Stretches, without away.
+        seen_bin: int64 (sightings,), ascending, the bins in which the user was perceived.
+        patch: int64 (sightings,), ascending in each bin, the patches.
+        steps: int64 (sightings,), the numbers of steps.
+        longest: Largest number of bins in a stretch.
 
     Raises:
-        ValueError: The arrays aren't of the same bins and patches.
+        ValueError: The arrays have different numbers of bins or patches.
     """
-    return Stretches(*_core.take_together(minute, shown, seen_bin, patch, steps, longest))
+    return Stretches(*_core.merge_bins(minute, shown, seen_bin, patch, steps, longest))

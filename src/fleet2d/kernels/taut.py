@@ -1,4 +1,4 @@
-"""Straightening a way over cells of different cost, as far as that makes it no dearer."""
+"""Straighten a path over cells of different cost, as far as it doesn't become more expensive."""
 
 from fleet2d._core import leg_cost, pull_taut
 

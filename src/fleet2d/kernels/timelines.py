@@ -1,4 +1,4 @@
-"""How bodies move over time, and the runs of equal pose that follow from it."""
+"""The motion of bodies over time, and the runs of equal pose that follow from it."""
 
 from fleet2d._core import Timelines, Window
 

@@ -1,8 +1,8 @@
 """What a robot has seen over time: when it saw each cell, and how much of each room for how long.
 
-Most of the time a robot stands, and on its rounds it comes by the same poses again, so what a pose
-shows is kept: how many cells of each room, and the last step at which the pose was taken. The cells
-themselves are found again when somebody asks which were seen last.
+A robot stands most of the time, and it returns to the same poses on its rounds, so the view of a
+pose is cached: the number of cells of each room, and the last step at which the robot had the pose.
+The cells themselves are computed again when the last steps are needed.
 """
 
 from typing import NamedTuple
@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 from fleet2d._core import NEVER, Mesh, settle, watch
 from fleet2d.kernels.lens import Lenses
 
-__all__ = ["NEVER", "Glances", "Record", "Watched", "no_glances", "settle", "watch"]
+__all__ = ["NEVER", "PoseCache", "SightRecord", "WatchSetup", "empty_pose_cache", "settle", "watch"]
 
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 
 
-class Glances(NamedTuple):
-    """The poses kept, in an open hash table; a power of two long, and at most half full.
+class PoseCache(NamedTuple):
+    """The cached poses, in an open hash table whose length is a power of two, at most half full.
 
     Attributes:
-        pose: int64 (slots, 4), x, y [lattice], heading, and how far the cameras are panned.
-        last: int64 (slots,), last step at which it was taken, -1 for an empty slot.
-        settled: int64 (slots,), the last such step that `Record.last` knows of.
-        cells: int32 (slots, patches), cells of each patch that it shows.
-        used: int64 (1,), how many slots are used.
+        pose: int64 (slots, 4), x, y [lattice units], heading, and pan position of the cameras.
+        last: int64 (slots,), last step with the pose, -1 for an empty slot.
+        settled: int64 (slots,), the last such step that is in `SightRecord.last`.
+        cells: int32 (slots, patches), number of cells of each patch in view.
+        used: int64 (1,), number of used slots.
     """
 
     pose: Int64
@@ -37,19 +37,20 @@ class Glances(NamedTuple):
     used: Int64
 
 
-class Record(NamedTuple):
+class SightRecord(NamedTuple):
     """What a robot has seen since the start.
 
     Attributes:
         first: int64 (rows, columns), first step at which each cell was in view, -1 for never.
-        last: int64 (rows, columns), the last such step as far as `settle` was called; not kept
-            where it is empty.
+        last: int64 (rows, columns), the last such step, up to the last call of `settle`; empty: not
+            recorded.
         exposure: int64 (patches,), cells of each patch in view, summed over the steps.
         counted: int64 (rows, columns), the last look that counted each cell, which several cameras
             may show; empty for one camera.
-        binned: int64 (bins, patches), as `exposure`, by time: `watch` sets as many anew as its
-            steps reach; empty where nobody asks for it.
-        most: int64 (bins, patches), the most cells of each patch in view at a step, likewise.
+        binned: int64 (bins, patches), as `exposure`, by time: `watch` overwrites the bins of its
+            steps; empty: not recorded.
+        most: int64 (bins, patches), largest number of cells of each patch in view at a step,
+            likewise.
     """
 
     first: Int64
@@ -60,17 +61,17 @@ class Record(NamedTuple):
     most: Int64
 
 
-class Watched(NamedTuple):
-    """What doesn't change while a robot watches.
+class WatchSetup(NamedTuple):
+    """The constants of a robot's watching.
 
     Attributes:
         walls: Free space.
         lenses: The robot's cameras.
-        patch_of_cell: int16 (rows, columns), which of the parts that are told apart each cell
-            belongs to, a room or part of one; -1 for none.
+        patch_of_cell: int16 (rows, columns), the patch of each cell, a room or a part of one; -1
+            for none.
         step_us: Length of a step.
-        every: It looks at the steps that this divides; each look stands for so many steps.
-        bin_steps: Steps of a bin of `Record.binned`; bins begin at step 0.
+        every: It looks at multiples of this step; each look counts for this many steps.
+        bin_steps: Steps of a bin of `SightRecord.binned`; bins begin at step 0.
     """
 
     walls: Mesh
@@ -81,9 +82,9 @@ class Watched(NamedTuple):
     bin_steps: int
 
 
-def no_glances(slots: int, patches: int) -> Glances:
-    """Return an empty table of a power of two slots: 48 bytes and 4 per patch each."""
-    return Glances(
+def empty_pose_cache(slots: int, patches: int) -> PoseCache:
+    """Return an empty cache; `slots` is a power of two, each of 48 bytes and 4 per patch."""
+    return PoseCache(
         pose=np.zeros((slots, 4), np.int64),
         last=np.full(slots, NEVER, np.int64),
         settled=np.full(slots, NEVER, np.int64),

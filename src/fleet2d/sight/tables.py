@@ -133,8 +133,8 @@ def error_tables(
     errs = any(perception is not None for perception in perceptions)
     tables = ErrorTables(
         table=np.zeros((cameras, TABLE if errs else 1), np.int64),
-        whom=np.zeros((cameras, users, users), np.int64),
-        haunted=np.zeros(cameras, np.int64),
+        confusion=np.zeros((cameras, users, users), np.int64),
+        has_ghosts=np.zeros(cameras, np.int64),
         ghosts=np.full((cameras, MOST_GHOSTS), ONE, np.int64),
         source=np.full((cameras, sources), ONE, np.int64),
         spot=np.zeros((cameras, sources, 3), np.int64),
@@ -148,7 +148,7 @@ def error_tables(
             table = tables.table[c]
             table[SHIFT] = max(0, reach.bit_length() - (BINS - 1).bit_length())
             _fill_detection(table, lens, perception.detection, context)
-            _fill_identity(table, tables.whom[c], perception.identity, context)
+            _fill_identity(table, tables.confusion[c], perception.identity, context)
             _fill_attributes(table, perception.attributes, context)
             _fill_false_positives(tables, c, lens, perception.false_positives, context)
     return tables
@@ -184,7 +184,7 @@ def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableCont
         _put(table, AT_STAY, [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)])
 
 
-def _fill_identity(table: I64, whom: I64, model: Identity, context: TableContext) -> None:
+def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableContext) -> None:
     distances = _distances(table, context)
     mistaken = model.mistaken.chances(distances)
     right = ONE - mistaken if model.right is None else model.right.chances(distances)
@@ -205,7 +205,7 @@ def _fill_identity(table: I64, whom: I64, model: Identity, context: TableContext
             rest = [name for name in context.users if name != user]
             others = {name: 1 / len(rest) for name in rest}
         _check_users(others, f"confusion.{user}", context)
-        whom[u] = _whole(cumulative(others, context.users), others, context.users)
+        confusion[u] = _whole(cumulative(others, context.users), others, context.users)
 
 
 def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
@@ -245,7 +245,7 @@ def _fill_false_positives(
     rates = [model.per_hour, *(spot.per_hour for spot in model.spots)]
     if not any(rates):
         return
-    tables.haunted[camera] = 1
+    tables.has_ghosts[camera] = 1
     hours = Decimal(lens.period * context.step_us) / (3600 * 10**6)
     mean = sum(map(Decimal, rates)) * hours
     if mean > 1:

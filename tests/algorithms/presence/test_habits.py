@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from fleet2d.algorithms.presence.chain_model import steps_of
 from fleet2d.algorithms.presence.habits import Habits
-from fleet2d.kernels.stays import Ways
+from fleet2d.kernels.stays import StayModel
 
 PLACES = 4
 
 
-def ways(seed: int, stages: int = 1) -> Ways:
+def model(seed: int, stages: int = 1) -> StayModel:
     """Somebody who goes on reversibly: from i to j with a chance in proportion to sqrt(p_j / p_i)."""
     random = np.random.default_rng(seed)
     p, pull = random.dirichlet(np.full(PLACES, 3.0)), random.random((PLACES, PLACES)) * 0.01
@@ -24,25 +24,25 @@ def ways(seed: int, stages: int = 1) -> Ways:
     follow = np.concatenate([leave / chance[:, None], onward], axis=1)
     first = np.arange(PLACES + 1, dtype=np.uint64)
     spread, restless = np.ones(PLACES), np.zeros(PLACES)
-    return Ways(1 - chance, follow, spread, restless, first, 0.9)
+    return StayModel(1 - chance, follow, spread, restless, first, 0.9)
 
 
 def habits(seed: int, smoothing: float = 0.0) -> Habits:
     """Hours of working days and weekends with shares of their own, of four weeks."""
     random = np.random.default_rng([seed, 1])
-    p = stationary(ways(seed))
+    p = stationary(model(seed))
     hours = random.dirichlet(p * 20, 168) * 240
     week = np.concatenate([hours, np.full((168, 1), 240.0)], axis=1)
     return Habits(week, np.append(p * 240 * 168, 240.0 * 168), smoothing)
 
 
-def stationary(of: Ways) -> np.ndarray:
+def stationary(of: StayModel) -> np.ndarray:
     return np.linalg.matrix_power(steps_of(of), 1 << 24)[0]
 
 
 @given(st.integers(0, 500), st.integers(0, 6), st.integers(0, 23))
 def test_left_alone_it_leads_to_the_shares_of_the_hour(seed: int, weekday: int, hour: int) -> None:
-    of, known = ways(seed), habits(seed)
+    of, known = model(seed), habits(seed)
     now = known.at(of, weekday, hour)
     days = known.week.reshape(7, 24, -1)[:, hour]
     expected = (days[:5] if weekday < 5 else days[5:]).sum(axis=0)
@@ -54,7 +54,7 @@ def test_left_alone_it_leads_to_the_shares_of_the_hour(seed: int, weekday: int, 
 
 
 def test_hours_that_are_alike_change_nothing() -> None:
-    of, known = ways(1), habits(1)
+    of, known = model(1), habits(1)
     same = known._replace(week=np.tile(known.total / 168, (168, 1)))
     now = same.at(of, 2, 12)
     for part, before in zip(now, of, strict=True):
@@ -62,13 +62,13 @@ def test_hours_that_are_alike_change_nothing() -> None:
 
 
 def test_on_the_first_day_nothing_is_known_of_hours() -> None:
-    of, known = ways(2), habits(2)
+    of, known = model(2), habits(2)
     assert of is known._replace(total=known.total / known.total[-1] * 1439).at(of, 0, 0)
 
 
 @pytest.mark.parametrize("smoothing", [60.0, 1e9])
 def test_average_evidence_draws_to_the_average(smoothing: float) -> None:
-    of = ways(3)
+    of = model(3)
     usual, sure, smooth = (
         stationary(k) for k in (of, habits(3).at(of, 1, 8), habits(3, smoothing).at(of, 1, 8))
     )
@@ -78,7 +78,7 @@ def test_average_evidence_draws_to_the_average(smoothing: float) -> None:
 
 
 def test_an_hour_in_which_nobody_was_anywhere_else_is_bounded() -> None:
-    of, known = ways(4), habits(4)
+    of, known = model(4), habits(4)
     week = known.week.copy()
     week[:, :-1] = 0
     week[:, 1] = 240

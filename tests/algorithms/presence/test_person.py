@@ -1,4 +1,4 @@
-"""What is learned of a person: expected counts against those of all paths, and from them the ways."""
+"""What is learned of a person: expected counts against those of all paths, and the model from them."""
 
 from typing import Any
 
@@ -14,11 +14,11 @@ from fleet2d.algorithms.presence.person import (
     Person,
     Prior,
     StateLayout,
+    model_of,
     stretches_of,
-    ways_of,
 )
 from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import Moments, take_together
+from fleet2d.kernels.stays import Moments, merge_bins
 
 PRIOR = Prior(0.9, 0.05)
 
@@ -27,14 +27,14 @@ def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
     """Return a case of bins one by one, what is expected of it, and probabilities of steps."""
     of = case(seed, stages, 6, longest=1)
     of.shown[:] = -1
-    dawn, dusk = of.now.sum(axis=0), np.random.default_rng(seed).random((stages, PATCHES))
+    prior, future = of.now.sum(axis=0), np.random.default_rng(seed).random((stages, PATCHES))
     moments = StateLayout(ROOM, np.ones(PATCHES), PLACES - 1, stages).no_moments()
-    smooth(of.ways, of.stretches, dawn, dusk, moments)
+    smooth(of.model, of.stretches, prior, future, moments)
     steps, weights = twin(of)
-    ahead = [by_state(np.stack([dusk, dusk]))]
+    ahead = [by_state(np.stack([future, future]))]
     for step, weight in zip(steps[::-1], weights[::-1], strict=True):
         ahead.insert(0, step @ (weight * ahead[0]))
-    now, pairs = by_state(np.stack([np.zeros_like(dawn), dawn])), []
+    now, pairs = by_state(np.stack([np.zeros_like(prior), prior])), []
     for step, weight, later in zip(steps, weights, ahead[1:], strict=True):
         both = now[:, None] * step * (weight * later)[None]
         pairs.append(both / both.sum())
@@ -66,11 +66,11 @@ def test_expected_exits_and_time_are_those_of_pairs_of_states(seed: int, stages:
 
 def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
-    ways = ways_of(layout.no_moments(), layout, PRIOR)
-    assert [1 - 1 / STAY] * 4 == pytest.approx(ways.stay.tolist())
-    assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(ways.follow[0].tolist())
-    assert layout.spread.tolist() == pytest.approx(ways.spread.tolist())
-    assert [0.05, 0.05, 0.05, 0] == pytest.approx(ways.restless.tolist())
+    model = model_of(layout.no_moments(), layout, PRIOR)
+    assert [1 - 1 / STAY] * 4 == pytest.approx(model.stay.tolist())
+    assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(model.follow[0].tolist())
+    assert layout.spread.tolist() == pytest.approx(model.spread.tolist())
+    assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless.tolist())
 
 
 def test_ways_are_counts_by_time_with_one_event_beforehand() -> None:
@@ -78,13 +78,13 @@ def test_ways_are_counts_by_time_with_one_event_beforehand() -> None:
     moments = layout.no_moments()
     moments.time[0], moments.exits[0, 1], moments.exits[0, 3] = 880.0, 6.0, 3.0
     moments.arrivals[:2], moments.moves[0], moments.rests[0] = (3.0, 7.0), 9.0, 971.0
-    ways = ways_of(moments, layout, PRIOR)
-    assert 1 - 10 / 1000 == pytest.approx(ways.stay[0])
+    model = model_of(moments, layout, PRIOR)
+    assert 1 - 10 / 1000 == pytest.approx(model.stay[0])
     entered = np.array([0.25, 6.25, 0.25, 3.25])  # to each room overall, and a quarter each
     wanted = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
-    assert wanted.tolist() == pytest.approx(ways.follow[0, :4].tolist())
-    assert [3.5 / 11, 7.5 / 11] == pytest.approx(ways.spread[:2].tolist())
-    assert 10 / 1000 == pytest.approx(ways.restless[0])
+    assert wanted.tolist() == pytest.approx(model.follow[0, :4].tolist())
+    assert [3.5 / 11, 7.5 / 11] == pytest.approx(model.spread[:2].tolist())
+    assert 10 / 1000 == pytest.approx(model.restless[0])
 
 
 def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
@@ -156,7 +156,7 @@ def test_taking_together_leaves_nothing_out() -> None:
         random = np.random.default_rng(seed)
         shown = random.choice([0, 255], (90, 3), p=[0.9, 0.1]).astype(np.uint8)
         seen = random.choice([0, 3], (90, 3), p=[0.95, 0.05]).astype(np.int64)
-        found = take_together(np.arange(90), shown, *np.nonzero(seen), seen[seen > 0], 4)
+        found = merge_bins(np.arange(90), shown, *np.nonzero(seen), seen[seen > 0], 4)
         assert 90 == found.bins.sum()
         assert found.bins.max() <= 4
         at = np.repeat(np.arange(len(found.bins)), found.bins)

@@ -19,7 +19,7 @@ from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.person import Person, stretches_of
 from fleet2d.component import register
 from fleet2d.kernels.presence import advance
-from fleet2d.kernels.stays import Stretches, Ways, follow
+from fleet2d.kernels.stays import StayModel, Stretches, follow
 from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
@@ -32,31 +32,31 @@ class PersonForecast(NamedTuple):
 
     Attributes:
         now: float64 (nodes,), the probability of each stage of each place, away last.
-        ways: The transition probabilities.
+        model: The transition probabilities.
         habits: How the transitions depend on the hour; None: they don't.
     """
 
     now: F64
-    ways: Ways
+    model: StayModel
     habits: Habits | None = None
 
     @property
     def places(self) -> F64:
         """The probability of each place: float64 (1, rooms + 1)."""
-        places: F64 = self.now.reshape(1, len(self.ways.first) - 1, -1).sum(axis=2)
+        places: F64 = self.now.reshape(1, len(self.model.first) - 1, -1).sum(axis=2)
         return places
 
     def after(self, bins: int, time: datetime, bin_us: int) -> "PersonForecast":
         """Return the forecast for `bins` bins later than `time`."""
         if self.habits is None:
-            return self._replace(now=advance(self.now, steps_of(self.ways), bins))
+            return self._replace(now=advance(self.now, steps_of(self.model), bins))
         now = self.now
         while bins > 0:
             past = timedelta(minutes=time.minute, seconds=time.second)
             to_next_hour = -((past - timedelta(hours=1)) // timedelta(microseconds=bin_us))
             part = min(bins, max(to_next_hour, 1))
-            ways = self.habits.at(self.ways, time.weekday(), time.hour)
-            now = advance(now, steps_of(ways), part)
+            model = self.habits.at(self.model, time.weekday(), time.hour)
+            now = advance(now, steps_of(model), part)
             bins, time = bins - part, time + timedelta(microseconds=part * bin_us)
         return self._replace(now=now)
 
@@ -126,28 +126,28 @@ class Follower:
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
 
-    def follow(self, ways: Ways, stretches: Stretches) -> F64:
+    def follow(self, model: StayModel, stretches: Stretches) -> F64:
         """Return P(room | evidence up to each bin): float64 (bins, rooms + 1).
 
         Args:
-            ways: The transition probabilities.
+            model: The transition probabilities.
             stretches: The evidence, in stretches of one bin.
         """
-        return follow(ways, stretches, self.now, self.shown)
+        return follow(model, stretches, self.now, self.shown)
 
     def forecast(self, person: Person, habits: Habits | None) -> PersonForecast:
         """Return the present distribution over rooms, with the transitions of the person."""
         stages = person.layout.stages
         nodes = person.layout.room[:, np.newaxis] * stages + np.arange(stages)
         mass = np.bincount(nodes.ravel(), (self.now[0] + self.now[1]).T.ravel())
-        return PersonForecast(mass.astype(np.float64), person.ways, habits)
+        return PersonForecast(mass.astype(np.float64), person.model, habits)
 
 
-def steps_of(ways: Ways) -> F64:
+def steps_of(model: StayModel) -> F64:
     """Return the transition matrix from bin to bin without evidence: float64 (nodes, nodes)."""
-    nodes, places = len(ways.stay), ways.follow.shape[1] - 1
+    nodes, places = len(model.stay), model.follow.shape[1] - 1
     stages = nodes // places
-    steps, leave = np.diag(ways.stay), (1 - ways.stay)[:, np.newaxis] * ways.follow
+    steps, leave = np.diag(model.stay), (1 - model.stay)[:, np.newaxis] * model.follow
     steps[:, ::stages] += leave[:, :places]
     early = np.arange(nodes)[np.arange(nodes) % stages < stages - 1]
     steps[early, early + 1] += leave[early, places]
@@ -204,7 +204,7 @@ class Filter(Model):
         stretches = stretches_of(bins, user, 1)
         if not self.negative:
             stretches = stretches._replace(shown=np.zeros_like(stretches.shown))
-        return self.followers[user].follow(self.learner.people[user].ways, stretches)
+        return self.followers[user].follow(self.learner.people[user].model, stretches)
 
     def habits(self, user: int) -> Habits | None:
         """Return how a user's transitions depend on the hour; None: they don't."""
@@ -254,12 +254,12 @@ class RoutineModel(SemiMarkov):
     )
 
     def _follow(self, user: int, bins: Bins) -> F64:
-        habits, ways = self.habits(user), self.learner.people[user].ways
+        habits, model = self.habits(user), self.learner.people[user].model
         hours = bins.day * 24 + bins.minute // 60
         ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
         places = []
         for part in (bins.part(a, b) for a, b in pairwise(ends)):
-            at_hour = habits.at(ways, int(part.day[0] - 1) % 7, int(part.minute[0]) // 60)
+            at_hour = habits.at(model, int(part.day[0] - 1) % 7, int(part.minute[0]) // 60)
             places.append(self.followers[user].follow(at_hour, stretches_of(part, user, 1)))
         return np.concatenate(places)
 

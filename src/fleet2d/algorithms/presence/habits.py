@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.algorithms.presence.estimator import F64
-from fleet2d.kernels.stays import Ways
+from fleet2d.kernels.stays import StayModel
 
 WEEKEND = 5  # its first day, Monday being 0
 FEWEST_BINS = 1440  # with fewer bins of evidence, hours aren't distinguished
@@ -27,7 +27,7 @@ class Habits(NamedTuple):
     total: F64
     smoothing: float
 
-    def at(self, ways: Ways, weekday: int, hour: int) -> Ways:
+    def at(self, model: StayModel, weekday: int, hour: int) -> StayModel:
         """Return the transition probabilities at an hour.
 
         Let c be the share of time in each place at that hour of working days, or of weekends,
@@ -37,12 +37,12 @@ class Habits(NamedTuple):
         sqrt(c_j / c_i) = p_i T_ij sqrt(c_i c_j) is symmetric.
 
         Args:
-            ways: The transition probabilities over all hours.
+            model: The transition probabilities over all hours.
             weekday: Day of the week, 0 is Monday.
             hour: Hour of the day.
         """
         if self.total[-1] < FEWEST_BINS:
-            return ways
+            return model
         days = self.week.reshape(7, 24, -1)[:, hour]
         same_days = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
         at_hour = same_days.sum(axis=0) + self.smoothing / self.total[-1] * self.total
@@ -50,11 +50,11 @@ class Habits(NamedTuple):
         ratio = np.maximum(share, LEAST) / np.maximum(mean_share, LEAST)
         pull = np.sqrt(np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO))
         places = len(pull)
-        leave = (1 - ways.stay)[:, np.newaxis] * ways.follow
-        leave[:, :places] *= pull / np.repeat(pull, len(ways.stay) // places)[:, np.newaxis]
+        leave = (1 - model.stay)[:, np.newaxis] * model.follow
+        leave[:, :places] *= pull / np.repeat(pull, len(model.stay) // places)[:, np.newaxis]
         chance = np.zeros(len(leave))
         for column in leave.T:  # summed in the same order on every machine
             chance += column
         follow = leave / np.maximum(chance, LEAST)[:, np.newaxis]
-        most = np.maximum(1 - ways.stay, MAX_LEAVE)
-        return ways._replace(stay=1 - np.minimum(chance, most), follow=follow)
+        most = np.maximum(1 - model.stay, MAX_LEAVE)
+        return model._replace(stay=1 - np.minimum(chance, most), follow=follow)

@@ -23,7 +23,7 @@ from fleet2d.algorithms.presence.person import (
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places
-from fleet2d.kernels.stays import Stretches, take_together
+from fleet2d.kernels.stays import Stretches, merge_bins
 from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
@@ -269,7 +269,7 @@ class DayEvidence(NamedTuple):
         """Return the evidence of one user, with equal bins merged."""
         assert self.watched is not None
         assert self.sightings is not None
-        return take_together(self.minute, self.watched, *self.sightings.of_user(user), longest)
+        return merge_bins(self.minute, self.watched, *self.sightings.of_user(user), longest)
 
 
 def by_day(bins: Bins) -> list[Bins]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import WHOLE_PATCH, Moments, Stretches, Ways, follow, take_together
+from fleet2d.kernels.stays import WHOLE_PATCH, Moments, StayModel, Stretches, follow, merge_bins
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -77,7 +77,7 @@ class Prior(NamedTuple):
     restless: float
 
 
-def ways_of(moments: Moments, layout: StateLayout, prior: Prior) -> Ways:
+def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
     """Return the most probable transitions: expected counts by expected time, with a prior.
 
     The prior of a stage is one end after STAY bins (with several stages, 5 to 240 bins), and one
@@ -102,7 +102,7 @@ def ways_of(moments: Moments, layout: StateLayout, prior: Prior) -> Ways:
     restless = (moments.moves + 1) / np.maximum(trials, 1)
     restless[-1] = 0.0  # away has no patches
     first = np.searchsorted(layout.room, np.arange(places + 1)).astype(np.int64)
-    return Ways(stay, follow, spread, np.minimum(restless, 1), first, prior.detection)
+    return StayModel(stay, follow, spread, np.minimum(restless, 1), first, prior.detection)
 
 
 class StretchPlaces(NamedTuple):
@@ -128,14 +128,14 @@ class PersonDay:
 
     Attributes:
         stretches: The evidence.
-        dawn: float64 (stages, patches), the distribution before the day.
-        dusk: float64 (stages, patches), the likelihood of the later days given each state.
+        start: float64 (stages, patches), the distribution before the day.
+        future: float64 (stages, patches), the likelihood of the later days given each state.
         moments: The expected moments of the day.
     """
 
     stretches: Stretches
-    dawn: F64
-    dusk: F64
+    start: F64
+    future: F64
     moments: Moments
 
 
@@ -143,7 +143,7 @@ class Person:
     """The model of one user.
 
     Attributes:
-        ways: The transition probabilities.
+        model: The transition probabilities.
         total: Sum of the moments of all days, with decayed weights of older ones.
         now: float64 (stages, patches), the distribution after the last bin.
         days: The finished days that are still revisited.
@@ -153,8 +153,8 @@ class Person:
         """Begin with the prior."""
         self.layout, self.prior = layout, prior
         self.total = layout.no_moments()
-        self.ways = ways_of(self.total, layout, prior)
-        self.now = self.dawn = layout.anywhere
+        self.model = model_of(self.total, layout, prior)
+        self.now = self.day_start = layout.anywhere
         self.ones = np.ones_like(self.now)
         self.days: list[PersonDay] = []
 
@@ -170,14 +170,14 @@ class Person:
     def follow(self, stretches: Stretches) -> StretchPlaces:
         """Filter over the next stretches; return P(room | evidence up to the stretch)."""
         now = np.stack([np.zeros_like(self.now), self.now])
-        places = follow(self.ways, stretches, now, self.layout.unknown_view())
+        places = follow(self.model, stretches, now, self.layout.unknown_view())
         self.now = now[0] + now[1]
         return StretchPlaces(places, stretches.bins)
 
     def end_day(self, stretches: Stretches) -> StretchPlaces:
         """Smooth the finished day as a whole, and learn from it."""
         moments = self.layout.no_moments()
-        self.days.append(PersonDay(stretches, self.dawn, self.ones, moments))
+        self.days.append(PersonDay(stretches, self.day_start, self.ones, moments))
         return self.revisit(len(self.days) - 1, 1.0)
 
     def revisit(self, number: int, weight: float) -> StretchPlaces:
@@ -191,13 +191,13 @@ class Person:
             weight: Weight of the day.
         """
         day, moments = self.days[number], self.layout.no_moments()
-        places, end, begin = smooth(self.ways, day.stretches, day.dawn, day.dusk, moments)
+        places, end, begin = smooth(self.model, day.stretches, day.start, day.future, moments)
         if number > 0:
-            self.days[number - 1].dusk = begin
+            self.days[number - 1].future = begin
         if number + 1 < len(self.days):
-            self.days[number + 1].dawn = end
+            self.days[number + 1].start = end
         else:
-            self.now = self.dawn = end
+            self.now = self.day_start = end
         self.total = Moments(
             *(
                 np.maximum(total + weight * (new - old), 0.0)
@@ -205,7 +205,7 @@ class Person:
             )
         )
         day.moments = moments
-        self.ways = ways_of(self.total, self.layout, self.prior)
+        self.model = model_of(self.total, self.layout, self.prior)
         return StretchPlaces(places, day.stretches.bins)
 
     def fade(self, weight: float) -> None:
@@ -227,7 +227,7 @@ class Person:
         if any(arrays[name].shape != part.shape for name, part in self.total._asdict().items()):
             return False
         self.total = Moments(**{name: np.array(part, np.float64) for name, part in arrays.items()})
-        self.ways = ways_of(self.total, self.layout, self.prior)
+        self.model = model_of(self.total, self.layout, self.prior)
         return True
 
 
@@ -258,4 +258,4 @@ def stretches_of(
         watched: `watched_patches` of these bins, the same for all users; None: it is computed.
     """
     watched = watched_patches(bins) if watched is None else watched
-    return take_together(bins.minute, watched, *bins.parts.sightings.of_user(user), longest)
+    return merge_bins(bins.minute, watched, *bins.parts.sightings.of_user(user), longest)

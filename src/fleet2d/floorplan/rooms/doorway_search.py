@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.floorplan.geometry.gates import Segment
-from fleet2d.kernels.chambers import see_each
+from fleet2d.kernels.chambers import pairs_in_sight
 from fleet2d.kernels.mesh import Mesh
 
 I64 = NDArray[np.int64]
@@ -190,8 +190,8 @@ def _all_free(mesh: Mesh, lines: I64) -> NDArray[np.bool_]:
     """Return which lines cross free space alone."""
     middle = (lines[:, :2] + lines[:, 2:]) // 2
     half = np.rint((lines[:, 2:] - lines[:, :2]) * (SHRINK / 2)).astype(np.int64)
-    one, other = see_each(mesh, middle, middle + half), see_each(mesh, middle, middle - half)
-    free: NDArray[np.bool_] = one & other
+    free: NDArray[np.bool_] = pairs_in_sight(mesh, middle, middle + half)
+    free &= pairs_in_sight(mesh, middle, middle - half)
     return free
 
 
@@ -207,7 +207,7 @@ def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.
     undecided = np.arange(len(lines))
     for offset in OFFSETS_M:
         behind = middle + np.rint(away * (offset * units_per_m)).astype(np.int64)
-        undecided = undecided[see_each(mesh, middle[undecided], behind[undecided])]
+        undecided = undecided[pairs_in_sight(mesh, middle[undecided], behind[undecided])]
         targets = [
             along[undecided] * (length[undecided] / 2 + step * units_per_m)[:, None] * direction
             for direction in (1, -1)
@@ -216,7 +216,7 @@ def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.
         # All targets of one line in a row, so that the triangle of its eye is located only once.
         eyes = np.repeat(behind[undecided], len(targets), axis=0)
         goals = eyes + np.rint(np.stack(targets, axis=1).reshape(-1, 2)).astype(np.int64)
-        seen = see_each(mesh, eyes, goals).reshape(-1, 2, len(WIDENINGS_M))
+        seen = pairs_in_sight(mesh, eyes, goals).reshape(-1, 2, len(WIDENINGS_M))
         wider = np.where(seen, WIDENINGS_M, 0.0).max(axis=2).sum(axis=1)
         enough = wider >= needed[undecided] - TINY
         opens[undecided[enough]] = True
@@ -238,7 +238,7 @@ def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> NDA
             outwards * beyond + sideways * aside for sideways in SIDEWAYS for beyond in STUB_M
         ]
         places = (end + np.rint(np.stack(shifts)).astype(np.int64)).reshape(-1, 2)
-        seen = see_each(mesh, places, places)  # in free space a place sees itself
+        seen = pairs_in_sight(mesh, places, places)  # in free space a place sees itself
         walled = ~seen.reshape(len(SIDEWAYS), len(STUB_M), len(lines))
         in_wall |= walled.all(axis=1).any(axis=0)
         both_in_wall &= in_wall
