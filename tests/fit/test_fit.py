@@ -111,7 +111,7 @@ def test_a_known_life_is_found_again_and_kept_to(life: Timeline) -> None:
 
 
 def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_path: Path) -> None:
-    fitted = fit_persona(life, find_days(life))
+    fitted = fit_persona(life, find_days(life), "fitted to: a, b")
     file = tmp_path / "persona.yaml"
     file.write_text(to_yaml(fitted.document), encoding="utf-8")
     assert fitted.persona == Persona.model_validate(read_document(file).data)
@@ -120,9 +120,9 @@ def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_pa
 
 def test_one_seed_samples_the_same_days_and_another_others(life: Timeline) -> None:
     fitted = fit_persona(life, find_days(life))
-    once, again, other = (sample_persona(fitted, life, 5, seed)[1] for seed in (1, 1, 2))
-    assert (once == again).all()
-    assert (once != other).any()
+    first, second, other = (sample_persona(fitted, life, 5, seed)[1] for seed in (1, 1, 2))
+    assert (first == second).all()
+    assert (first != other).any()
 
 
 def test_a_markov_chain_keeps_the_shares_of_time(life: Timeline) -> None:

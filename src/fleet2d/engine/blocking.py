@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fleet2d.engine.bodies import Bodies
 from fleet2d.entities.behavior import SightEvent, Situation
-from fleet2d.entities.blocking import held_up, went_round
+from fleet2d.entities.blocking import plan_after_a_step, plan_around
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.events import Event
@@ -138,10 +138,10 @@ class Blocking:
         if (step - since) * step_us < patience_us:
             first = since == step
             notes = [Note(step * step_us, "gives_way", self._actors[other].name)] if first else []
-            plan: Plan | None = held_up(now, actor.plan, notes)
+            plan: Plan | None = plan_after_a_step(now, actor.plan, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:
-            plan = went_round(now, actor.plan, clear)
+            plan = plan_around(now, actor.plan, clear)
             until = step + micros(PASSES) // step_us + 1
             self._waits[row] = Wait()
             self._passes[row] = Pass(until, other)

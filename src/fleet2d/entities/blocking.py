@@ -1,4 +1,4 @@
-"""Bodies in each other's way: one waits for the other, then goes round it, or squeezes past."""
+"""Blocked bodies: plans to wait for another body, and to go round it."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -22,35 +22,35 @@ if TYPE_CHECKING:
 I64 = NDArray[np.int64]
 
 
-def held_up(now: "Situation", broken: Plan, notes: Sequence[Note] = ()) -> Plan:
-    """Return a plan that stands for a step, and then goes on with the one that is being followed.
+def plan_after_a_step(now: "Situation", broken: Plan, notes: Sequence[Note] = ()) -> Plan:
+    """Return a plan that stands for a step, and then continues the present one.
 
-    A random walk isn't gone on with: the behavior is asked anew.
+    A random walk isn't continued: the behavior is asked again.
 
     Args:
         now: The situation.
-        broken: What is being followed.
-        notes: What happens as it stops.
+        broken: The present plan.
+        notes: Rows for the events table at the stop.
     """
     begin_us, step_us = now.step * broken.step_us, broken.step_us
     plan, motion = now.plan().stay_until(begin_us + step_us), broken.finish()
     plan.notes += notes
     if isinstance(motion, Track):
         first = int(np.searchsorted(motion.breakpoints.time, begin_us, side="right"))
-        _go_on(plan, broken, begin_us, begin_us, _rows(motion.breakpoints)[first:])
+        _continue(plan, broken, begin_us, begin_us, _rows(motion.breakpoints)[first:])
     return plan
 
 
-def went_round(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
-    """Return the rest of the plan that is being followed, by a way round bodies to its next stop.
+def plan_around(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
+    """Return the rest of the present plan, by a way round other bodies to its next stop.
 
-    Where somebody stands at that stop, and it is the last one, it stops beside it in the room. A
-    body on a random walk turns round, and its behavior is asked anew.
+    If a body stands at that stop, and it is the last one, it stops beside it in the room. A body on
+    a random walk turns round, and its behavior is asked again.
 
     Args:
         now: The situation.
-        broken: The plan.
-        bodies: Where other bodies are, and how far to keep from each [lattice], int64 (n, 3).
+        broken: The present plan.
+        bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
 
     Returns:
         The plan; None if there is no way round.
@@ -80,41 +80,42 @@ def went_round(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
     plan.go_to_point(*goal, route=route)
     heading = heading_at(motion.breakpoints, stop, since_us)
     plan.turn_by(turn_between(plan.heading, heading) / TURN)
-    _go_on(plan.stay_until(since_us), broken, begin_us, since_us, rest)
+    _continue(plan.stay_until(since_us), broken, begin_us, since_us, rest)
     return plan
 
 
-def _go_on(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64) -> None:
-    """Let a plan go on as another one would have from a moment on, later.
+def _continue(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64) -> None:
+    """Continue a plan with the part of another one after a moment, delayed.
 
-    The first time that the body would have rested for long enough, it rests so much less, and is in
-    time again.
+    The first rest that is long enough is shortened by the delay, so that the body is on time again
+    after it.
 
     Args:
-        plan: It is where the other one would have been at that moment, and as late as its end says.
+        plan: A plan that ends where the other one is at that moment; the delay is from that moment
+            to its end.
         broken: The other plan.
-        begin_us: Up to when that was followed: what it notes later is still to happen.
+        begin_us: The moment up to which the other plan was followed; its later rows are copied.
         since_us: The moment.
-        rest: Breakpoints after it, int64 (n, 5).
+        rest: The breakpoints of the other plan after the moment, int64 (n, 5).
     """
     later = plan.time_us - since_us
-    here = np.array([[since_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
-    rows = np.concatenate([here, rest])
+    row = np.array([[since_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
+    rows = np.concatenate([row, rest])
     rests = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1) & (np.diff(rows[:, 0]) >= later)
     edge = int(rows[np.argmax(rests), 0]) if rests.any() else int(rows[-1, 0])
 
-    def moved(time_us: int) -> int:
+    def delayed(time_us: int) -> int:
         return time_us + later if time_us <= edge else max(time_us, edge + later)
 
     times, shifted = rest[:, 0], rest.copy()
     shifted[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     plan.notes += [
-        Note(moved(max(note.time_us, since_us)), note.event, note.detail)
+        Note(delayed(max(note.time_us, since_us)), note.event, note.detail)
         for note in broken.notes
         if note.time_us > begin_us
     ]
     plan.postures += [
-        (moved(max(time_us, since_us)), code)
+        (delayed(max(time_us, since_us)), code)
         for time_us, code in broken.postures
         if time_us > begin_us
     ]
@@ -129,7 +130,7 @@ def _rows(track: Breakpoints) -> I64:
 
 
 def _beside(actor: "Actor", goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
-    """Return the free place nearest to a taken one, in its room; None if there is none."""
+    """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan, space = actor.home.plan, actor.space
     room = plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
     free = (space.part_of_cell == actor.part) & (detour.cost != CLOSED)

@@ -1,11 +1,13 @@
 """Personas fitted to the days of a log: times of waking and sleep, tasks, and pastimes."""
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+import yaml
 
 from fleet2d.fit.days import LivedDay, Stretch, sleep_states
 from fleet2d.fit.timeline import MINUTES, ActivityPlace, Timeline
@@ -354,7 +356,7 @@ def _seconds(seconds: int) -> str:
 
 def to_yaml(document: Mapping[str, Any]) -> str:
     """Return a persona as YAML, with one line per activity and task."""
-    lines = [f"about: {document['about']}", "activities:"]
+    lines = [_flow({"about": document["about"]})[1:-1], "activities:"]
     for name, fields in sorted(document["activities"].items()):
         lines.append(f"  {name}: {_flow(fields)}")
     lines += ["needs: {}", "errands: {}", "days:"]
@@ -370,13 +372,8 @@ def to_yaml(document: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _flow(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_flow(v)}" for key, v in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_flow(v) for v in value) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str) and (":" in value or not value):
-        return f'"{value}"'
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def _flow(fields: Mapping[str, Any]) -> str:
+    """Return a mapping as YAML in one line."""
+    return yaml.safe_dump(
+        dict(fields), default_flow_style=True, sort_keys=False, allow_unicode=True, width=math.inf
+    ).strip()
