@@ -54,7 +54,7 @@ def test_what_fails_is_told_kept_and_drawn(fleet2d: Cli) -> None:
 
 def test_the_command_that_is_printed_shows_the_moment_again(fleet2d: Cli) -> None:
     _, out, _ = fleet2d("test", written(still=FAILS), "simulation.duration=2 min")
-    line = next(line for line in out.splitlines() if "shown again by" in line)
+    line = next(line for line in out.splitlines() if "to see it" in line)
     run, show = line.partition(": ")[2].split(" && ")
 
     for command in (run, show):
@@ -84,7 +84,7 @@ def test_a_scenario_that_expects_nothing_is_refused(fleet2d: Cli) -> None:
     code, out, err = fleet2d("test", written(), written("other.yaml", apart=HOLDS))
 
     assert (code, out) == (2, "")
-    assert "home.yaml expects nothing" in err
+    assert "home.yaml has no expectations" in err
 
 
 def test_a_wrong_expectation_is_refused_before_anything_runs(fleet2d: Cli) -> None:

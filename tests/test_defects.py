@@ -67,7 +67,7 @@ def test_show_of_a_run_does_not_ignore_step(tmp_path: Path) -> None:
     fleet2d.run(scenario("1 min", users={"ana": {"type": "meander"}}), out=tmp_path / "run")
     result = CliRunner().invoke(app, ["show", str(tmp_path / "run"), "--step", "3"])
     assert isinstance(result.exception, InputError)
-    assert "--step goes with --layer" in str(result.exception)
+    assert "--step needs --layer" in str(result.exception)
     assert not (tmp_path / "run" / "picture.png").exists()
 
 

@@ -17,7 +17,7 @@ from fleet2d.view.layers import draw_layer, layer_on_axes
 
 
 @pytest.fixture(scope="module")
-def stored() -> Any:
+def layer_run() -> Any:
     content = scenario("3 min", robots={"astro": {"type": "patrol"}})
     content["floorplan"]["layers"] = {
         "explored": {"every": "1 min"},
@@ -51,10 +51,10 @@ def test_only_cells_with_a_value_are_coloured(dtype: Any) -> None:
     values[kitchen] = 1
     places = ((7.0, 1.0), (1.0, 2.5), (-0.05, 2.0))
 
-    before, after = colors(plan, None, *places), colors(plan, values, *places)
+    empty, drawn = colors(plan, None, *places), colors(plan, values, *places)
 
-    assert before[0] != after[0]
-    assert before[1:] == after[1:]
+    assert empty[0] != drawn[0]
+    assert empty[1:] == drawn[1:]
 
 
 def test_larger_values_have_another_colour() -> None:
@@ -67,28 +67,28 @@ def test_larger_values_have_another_colour() -> None:
     assert left != right
 
 
-def test_png_and_svg_are_written_the_same_twice(stored: Any, tmp_path: Path) -> None:
+def test_png_and_svg_are_written_the_same_twice(layer_run: Any, tmp_path: Path) -> None:
     for name in ("explored.astro", "last_seen.astro", "dust"):
         for ending, start in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
             first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
-            draw_layer(stored, name, first)
-            draw_layer(stored, name, second)
+            draw_layer(layer_run, name, first)
+            draw_layer(layer_run, name, second)
             assert first.read_bytes().startswith(start)
             assert first.read_bytes() == second.read_bytes()
 
 
-def test_a_layer_of_another_step_is_another_picture(stored: Any, tmp_path: Path) -> None:
-    draw_layer(stored, "explored.astro", tmp_path / "early.svg", 59)
-    draw_layer(stored, "explored.astro", tmp_path / "late.svg")
+def test_a_layer_of_another_step_is_another_picture(layer_run: Any, tmp_path: Path) -> None:
+    draw_layer(layer_run, "explored.astro", tmp_path / "early.svg", 59)
+    draw_layer(layer_run, "explored.astro", tmp_path / "late.svg")
     assert (tmp_path / "early.svg").read_bytes() != (tmp_path / "late.svg").read_bytes()
     assert b"after step 59" not in (tmp_path / "late.svg").read_bytes()
 
 
-def test_what_cannot_be_drawn_is_an_error_that_says_why(stored: Any, tmp_path: Path) -> None:
+def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run: Any, tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match="stored no layer 'mud'"):
-        draw_layer(stored, "mud", tmp_path / "a.png")
+        draw_layer(layer_run, "mud", tmp_path / "a.png")
     with pytest.raises(ArtifactError, match="not stored after step 60"):
-        draw_layer(stored, "explored.astro", tmp_path / "a.png", 60)
+        draw_layer(layer_run, "explored.astro", tmp_path / "a.png", 60)
     with pytest.raises(InputError, match=r"not as '\.gif'"):
-        draw_layer(stored, "dust", tmp_path / "a.gif")
+        draw_layer(layer_run, "dust", tmp_path / "a.gif")
     assert [] == list(tmp_path.iterdir())

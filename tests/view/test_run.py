@@ -32,9 +32,9 @@ from fleet2d.view.actogram import (
     room_color,
     rooms_by_day,
 )
-from fleet2d.view.life import field_of_view, opacity, telling_view
+from fleet2d.view.life import best_view, field_of_view, opacity
 from fleet2d.view.run import draw_run
-from fleet2d.view.traces import Trace, trace_of
+from fleet2d.view.traces import BodyTrace, trace_of
 
 MEANDER = {"type": "meander"}
 START = datetime(2026, 1, 5)
@@ -50,7 +50,7 @@ def words_in(svg: Path) -> str:
     return "\n".join(line for line in svg.read_text().splitlines() if "<!--" in line)
 
 
-def drawn(run: Run, tmp_path: Path) -> str:
+def words_of(run: Run, tmp_path: Path) -> str:
     """Draw a run; return the words in the picture."""
     draw_run(run, tmp_path / "run.svg")
     return words_in(tmp_path / "run.svg")
@@ -59,18 +59,18 @@ def drawn(run: Run, tmp_path: Path) -> str:
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_same_run_gives_same_bytes(tmp_path: Path, ending: str) -> None:
     run = base(out=tmp_path / "run")
-    first, second = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
-    draw_run(run, first)
-    draw_run(open_run(tmp_path / "run"), second)
-    assert first.read_bytes() == second.read_bytes()
-    assert [] == list(tmp_path.glob("*.unfinished"))
+    picture, repeated = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
+    draw_run(run, picture)
+    draw_run(open_run(tmp_path / "run"), repeated)
+    assert picture.read_bytes() == repeated.read_bytes()
+    assert [] == list(tmp_path.glob("*.partial"))
 
 
 def test_picture_says_what_was_run(tmp_path: Path) -> None:
     run = base()
     assert run.digest is not None
-    words = drawn(run, tmp_path)
-    for told in (
+    words = words_of(run, tmp_path)
+    for fact in (
         "base",
         "2 days in family_home",
         "seed 4",
@@ -79,7 +79,7 @@ def test_picture_says_what_was_run(tmp_path: Path) -> None:
         "astro",
         "away",
     ):
-        assert told in words
+        assert fact in words
     assert "interrupted" not in words
 
 
@@ -92,21 +92,21 @@ def test_run_without_users_or_robots_is_drawn(
     scenario = fleet2d.load_scenario(None, "simulation.duration=3 h").resolved()
     scenario["users"] = scenario["users"] if users is None else users
     scenario["robots"] = scenario["robots"] if robots is None else robots
-    words = drawn(fleet2d.run(scenario), tmp_path)
+    words = words_of(fleet2d.run(scenario), tmp_path)
     for name in (*scenario["users"], *scenario["robots"]):
         assert name in words
 
 
 @pytest.mark.parametrize(
-    ("override", "told"),
+    ("override", "note"),
     [
         ("artifacts.key_frames=false", "no key frames were stored: positions every 1 h"),
         ("artifacts={key_frames: false, trajectories: off}", "where users were is not stored"),
         ("artifacts={observations: false, events: false, outputs: false}", "ana"),
     ],
 )
-def test_run_that_stored_less_says_so(tmp_path: Path, override: str, told: str) -> None:
-    assert told in drawn(base(override), tmp_path)
+def test_run_that_stored_less_says_so(tmp_path: Path, override: str, note: str) -> None:
+    assert note in words_of(base(override), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_run_that_stored_less_says_so(tmp_path: Path, override: str, told: str) 
     ],
 )
 def test_short_and_long_runs_are_drawn(tmp_path: Path, overrides: tuple[str, ...]) -> None:
-    assert "ana" in drawn(fleet2d.run("bundled:rounds", *overrides), tmp_path)
+    assert "ana" in words_of(fleet2d.run("bundled:rounds", *overrides), tmp_path)
 
 
 def test_of_many_users_four_are_shown_and_the_rest_counted(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_of_many_users_four_are_shown_and_the_rest_counted(tmp_path: Path) -> No
             "users": users,
         }
     )
-    words = drawn(run, tmp_path)
+    words = words_of(run, tmp_path)
     assert "4 of 50 users are shown" in words
     assert "person_03" in words
     assert "person_04" not in words
@@ -141,11 +141,11 @@ def test_of_many_users_four_are_shown_and_the_rest_counted(tmp_path: Path) -> No
 def test_interrupted_run_is_drawn_and_marked(tmp_path: Path) -> None:
     simulation = Simulation(None, "simulation.duration=2 d")
     simulation.advance(100_000)
-    assert "interrupted" in drawn(simulation.finish(), tmp_path)
+    assert "interrupted" in words_of(simulation.finish(), tmp_path)
 
 
 def test_run_that_simulated_nothing_is_drawn(tmp_path: Path) -> None:
-    words = drawn(Simulation(None).finish(), tmp_path)
+    words = words_of(Simulation(None).finish(), tmp_path)
     assert "0 s in family_home" in words
 
 
@@ -177,8 +177,8 @@ def test_actogram_has_the_rooms_of_every_minute() -> None:
     assert ana is not None
     start = datetime.fromisoformat(run.manifest["start"])
     rooms = rooms_by_day(ana, start, 1_000_000, run.manifest["steps"])
-    stored = run.pandas("trajectories")
-    truth = stored[stored["entity"] == "ana"]["room"].cat.codes.to_numpy()
+    table = run.pandas("trajectories")
+    truth = table[table["entity"] == "ana"]["room"].cat.codes.to_numpy()
     # A minute has the colour of its middle; the run is sampled every 4 s.
     middles = np.arange(30, 2 * 86_400, 60) // 4
     assert truth[middles].tolist() == rooms.ravel()[10 * 60 + 30 :][: len(middles)].tolist()
@@ -191,8 +191,8 @@ def test_actogram_has_the_rooms_of_every_minute() -> None:
 def test_marks_are_the_share_of_five_minutes_that_the_user_was_seen() -> None:
     seen = np.array([0, 299, 300, 300, *range(600, 900), 86_399, 86_400])  # 300 by two robots
     marks = marks_by_day(seen, START, 1_000_000, 2)
-    at = np.argwhere(marks > 0).tolist()
-    assert [[0, 0], [0, 1], [0, 2], [0, 287], [1, 0]] == at
+    cells = np.argwhere(marks > 0).tolist()
+    assert [[0, 0], [0, 1], [0, 2], [0, 287], [1, 0]] == cells
     assert [2, 1, 300, 1, 1] == np.rint(marks[marks > 0] * 300).astype(int).tolist()
 
 
@@ -263,18 +263,18 @@ def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot() -> None:
 def test_each_user_has_a_line_in_the_legend(tmp_path: Path) -> None:
     scenario = fleet2d.load_scenario(None, "simulation.duration=3 h").resolved()
     scenario["users"] = dict.fromkeys(("ana", "bo", "cleo"), MEANDER)
-    words = drawn(fleet2d.run(scenario), tmp_path)
+    words = words_of(fleet2d.run(scenario), tmp_path)
     assert all(f"ways of {name}" in words for name in ("ana", "bo", "cleo"))
-    assert "ways walked" in drawn(base(), tmp_path)
+    assert "ways walked" in words_of(base(), tmp_path)
 
 
-def test_too_many_rings_are_left_out_and_that_is_said(tmp_path: Path) -> None:
-    few = drawn(base(), tmp_path)
+def test_too_many_rings_are_left_out_with_a_note(tmp_path: Path) -> None:
+    few = words_of(base(), tmp_path)
     assert "seen here by a robot" in few
     assert "are not drawn" not in few
     scenario = fleet2d.load_scenario(None, "simulation.duration=4 d").resolved()
     scenario["users"] = {"ana": MEANDER}
-    many = drawn(fleet2d.run(scenario), tmp_path)
+    many = words_of(fleet2d.run(scenario), tmp_path)
     assert "seen here by a robot" not in many
     assert "places where robots saw users are not drawn" in many
 
@@ -333,7 +333,7 @@ def test_hash_that_names_a_plan_is_shortened(tmp_path: Path) -> None:
         "floorplan": saved_plan(tmp_path / f"{'2deaa98e' * 4}.json", 5, 4),
         "users": {"ana": MEANDER},
     }
-    words = drawn(fleet2d.run(scenario), tmp_path)
+    words = words_of(fleet2d.run(scenario), tmp_path)
     assert "30 minutes in 2deaa98e…" in words
     assert "2deaa98e2" not in words
 
@@ -360,13 +360,13 @@ def test_field_of_view_is_what_is_visible_in_range_and_angle() -> None:
     run = base()
     camera = run.manifest["scenario"]["robots"]["astro"]["camera"]
     astro = trace_of(run, run.plan, "astro", 0, robot=True)
-    assert isinstance(astro, Trace)
-    view = telling_view(run.plan, astro, camera, {})
+    assert isinstance(astro, BodyTrace)
+    view = best_view(run.plan, astro, camera, {})
     assert view is not None
     outline = field_of_view(run.plan, view.xy, view.heading, camera)
     near, far = camera["range"]
-    whole = (far**2 - near**2) * np.deg2rad(camera["angle_deg"]) / 2
-    assert 0 < outline.area < 0.97 * whole
+    sector_area = (far**2 - near**2) * np.deg2rad(camera["angle_deg"]) / 2
+    assert 0 < outline.area < 0.97 * sector_area
     inside = np.array(outline.representative_point().coords)
     assert VisibleRegion(run.plan, *view.xy.tolist()).contains(inside).all()
     assert near <= np.hypot(*(inside[0] - view.xy)) <= far
@@ -374,4 +374,4 @@ def test_field_of_view_is_what_is_visible_in_range_and_angle() -> None:
 
 def test_camera_that_sees_all_round_is_drawn(tmp_path: Path) -> None:
     run = base("robots.astro.camera={range: [0, 2], angle_deg: 360}", "simulation.duration=3 h")
-    assert "what astro sees" in drawn(run, tmp_path)
+    assert "what astro sees" in words_of(run, tmp_path)

@@ -1,4 +1,4 @@
-"""Pictures on a dark ground."""
+"""Pictures of the dark theme."""
 
 import itertools
 from pathlib import Path
@@ -33,8 +33,8 @@ def test_words_and_bodies_stand_out_from_rooms_in_the_dark() -> None:
 
 def test_bodies_are_told_apart_in_the_dark() -> None:
     colors = dark_colors([*USER_COLORS])[:, :3]
-    for one, other in itertools.combinations(colors, 2):
-        assert np.abs(one - other).max() > 0.15
+    for color_a, color_b in itertools.combinations(colors, 2):
+        assert np.abs(color_a - color_b).max() > 0.15
 
 
 def test_colors_that_stand_for_numbers_stay() -> None:
@@ -43,13 +43,13 @@ def test_colors_that_stand_for_numbers_stay() -> None:
     axes = figure.add_subplot()
     shades = np.array([[[1.0, 1.0, 1.0], [0.2, 0.5, 0.9]]])
     scale = axes.imshow(shades, label=SCALE)
-    drawn = axes.imshow(shades)
+    picture = axes.imshow(shades)
     bars = axes.pcolormesh(np.arange(4.0).reshape(2, 2))
-    before = bars.to_rgba(bars.get_array())
+    bar_colors = bars.to_rgba(bars.get_array())
     darken(figure)
     assert np.array_equal(shades, scale.get_array())
-    assert drawn.get_array()[0, 0].max() < 0.15
-    assert np.array_equal(before, bars.to_rgba(bars.get_array()))
+    assert picture.get_array()[0, 0].max() < 0.15
+    assert np.array_equal(bar_colors, bars.to_rgba(bars.get_array()))
 
 
 def test_what_is_not_drawn_stays_so() -> None:

@@ -54,7 +54,7 @@ def about(
 
 
 def main() -> NoReturn:
-    """Run the command line; exit 0 done, 2 wrong input, 1 our fault, 130 interrupted."""
+    """Run the command line; exit codes: 0 success, 1 failure, 2 wrong input, 130 interrupted."""
     # NumPy starts a thread for each core when it is imported; nothing here multiplies matrices.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:

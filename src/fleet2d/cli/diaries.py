@@ -1,4 +1,4 @@
-"""Diaries: what somebody of a persona does on some days, as text and as a picture."""
+"""Diaries: the activities of a persona on some days, as text and as a picture."""
 
 from pathlib import Path
 
@@ -6,40 +6,40 @@ from fleet2d.errors import InputError
 from fleet2d.problems import suggest
 
 
-def show_diary(what: str | None, out: Path | None, days: int, seed: int) -> list[str]:
+def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list[str]:
     """Return a persona's diary as lines of text, the path of its picture last.
 
     Args:
-        what: A bundled persona's name, or a YAML file of one.
-        out: The picture to write; None: named after the persona, in the working directory.
-        days: How many days, from a Monday on.
-        seed: Of the days.
+        name: The name of a bundled persona, or a YAML file.
+        out: The picture to write; None: a file in the working directory, named after the persona.
+        days: The number of days, from a Monday on.
+        seed: The seed of the days.
 
     Raises:
-        InputError: There is no such persona, or it is not one.
+        InputError: There is no such persona, or the file is no persona.
     """
     from pydantic import TypeAdapter, ValidationError
 
     from fleet2d.routines.persona import AnyPersona, bundled_names
-    from fleet2d.view.diary import diary_days, draw_diary, written_diary
+    from fleet2d.view.diary import diary_days, diary_lines, draw_diary
 
-    if what is None:
+    if name is None:
         raise InputError(
-            f"--diary wants a persona: one of {', '.join(bundled_names())}, or a YAML file"
+            f"--diary needs a persona: one of {', '.join(bundled_names())}, or a YAML file"
         )
-    path = Path(what)
-    if what not in bundled_names() and not path.is_file():
+    path = Path(name)
+    if name not in bundled_names() and not path.is_file():
         raise InputError(
-            f"there is no persona {what!r}{suggest(what, bundled_names())}; your own is the path of"
+            f"there is no persona {name!r}{suggest(name, bundled_names())}; your own is the path of"
             " a YAML file"
         )
     try:
-        persona = TypeAdapter(AnyPersona).validate_python(what)
+        persona = TypeAdapter(AnyPersona).validate_python(name)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{what}: {where + ': ' if where else ''}{first['msg']}") from None
-    lived = diary_days(persona, days, seed)
+        problem = error.errors()[0]
+        key = ".".join(str(part) for part in problem["loc"])
+        raise InputError(f"{name}: {key + ': ' if key else ''}{problem['msg']}") from None
+    diary = diary_days(persona, days, seed)
     target = out or Path(f"{path.stem}-diary.png")
-    draw_diary(persona, path.stem, lived, target)
-    return [*written_diary(path.stem, persona, lived), str(target)]
+    draw_diary(persona, path.stem, diary, target)
+    return [*diary_lines(path.stem, persona, diary), str(target)]

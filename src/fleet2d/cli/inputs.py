@@ -1,4 +1,4 @@
-"""Commands that only read what a user gives: validate, schema, components, convert."""
+"""Commands that read inputs without running them: validate, schema, components, convert."""
 
 import json
 from collections.abc import Collection
@@ -29,7 +29,7 @@ def validate(
     ] = 0.15,
     resolution: Resolution = None,
 ) -> None:
-    """Check a scenario, and that everybody can be where they should; or a floor plan."""
+    """Check a scenario, with the places of all people and robots; or a floor plan."""
     from fleet2d.floorplan.load import is_floorplan
 
     scenario, overrides = split(arguments)
@@ -54,14 +54,14 @@ def validate(
         for note in actor.notes:
             typer.echo(f"note: {actor.path}.{note}")
         for behavior in actor.behaviors:
-            for note in getattr(behavior, "notes", ()):  # what it made of its input
+            for note in getattr(behavior, "notes", ()):
                 typer.echo(f"note: {actor.path}: {note}")
 
 
 def _check_floorplan(
     source: str, out: Path | None, radius: float, resolution: float | None
 ) -> None:
-    """Print a floor plan's findings and draw them; exit with 2 if nobody can live there."""
+    """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable."""
     from fleet2d.floorplan.home.checkup import checkup
     from fleet2d.floorplan.load import load_floorplan
     from fleet2d.view.checkup import draw_checkup
@@ -84,7 +84,7 @@ def _check_floorplan(
 
 def schema(
     floorplan: Annotated[
-        bool, typer.Option("--floorplan", help="That of a floor plan in Fleet2D's own format.")
+        bool, typer.Option("--floorplan", help="The schema of Fleet2D's own floor plan format.")
     ] = False,
 ) -> None:
     """Print the JSON Schema of a scenario, for completion in an editor."""
@@ -104,11 +104,11 @@ def components(
     """List every registered type, with its fields, units and defaults."""
     from fleet2d.scenario.schema import describe_components
 
-    described = describe_components()
+    descriptions = describe_components()
     if as_json:
-        typer.echo(json.dumps([asdict(component) for component in described], indent=2))
+        typer.echo(json.dumps([asdict(component) for component in descriptions], indent=2))
         return
-    for component in described:
+    for component in descriptions:
         names = " or ".join((component.type, *component.aliases))
         typer.echo(f"{component.kind}: {names}\n    {component.summary}")
         for field in component.fields:
@@ -120,13 +120,13 @@ def components(
 
 
 def convert(
-    old: Annotated[
+    source: Annotated[
         Path,
         typer.Argument(
             help="A floor plan of any format, or a configuration of the published Fleet2D."
         ),
     ],
-    new: Annotated[
+    target: Annotated[
         Path,
         typer.Argument(help="The floor plan (.json, .yaml, .geojson) or the scenario to write."),
     ],
@@ -135,18 +135,18 @@ def convert(
     """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
     from fleet2d.floorplan.load import is_floorplan, load_floorplan
 
-    if is_floorplan(old):
+    if is_floorplan(source):
         from fleet2d.floorplan.save import save_floorplan
 
-        plan = load_floorplan(old, resolution=resolution)
-        save_floorplan(plan, new)
-        remarks = list(plan.notes)
+        plan = load_floorplan(source, resolution=resolution)
+        save_floorplan(plan, target)
+        notes = list(plan.notes)
     else:
-        remarks = converter()(old, new)
-    for remark in remarks:
-        typer.echo(f"note: {remark}")
-    typer.echo(new)
+        notes = converter()(source, target)
+    for note in notes:
+        typer.echo(f"note: {note}")
+    typer.echo(target)
 
 
-def _count(things: Collection[Any], noun: str) -> str:
-    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
+def _count(items: Collection[Any], noun: str) -> str:
+    return f"{len(items)} {noun}{'' if len(items) == 1 else 's'}"

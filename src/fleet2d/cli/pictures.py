@@ -19,7 +19,7 @@ Figure = Annotated[
 
 
 def show(  # noqa: PLR0913 - options of the command line
-    what: Annotated[
+    source: Annotated[
         Path | None,
         typer.Argument(metavar="[FLOORPLAN|RUN_DIR|PERSONA]", help="Left out: the bundled home."),
     ] = None,
@@ -32,13 +32,13 @@ def show(  # noqa: PLR0913 - options of the command line
         int | None, typer.Option(help="With --layer: as it was after this step; else the last.")
     ] = None,
     diary: Annotated[
-        bool, typer.Option("--diary", help="Of a persona: what it does on some days.")
+        bool, typer.Option("--diary", help="Of a persona: its activities on some days.")
     ] = False,
     days: Annotated[int, typer.Option(min=1, max=60, help="With --diary: how many days.")] = 7,
     seed: Annotated[int, typer.Option(help="With --diary: of the days.")] = 4,
     reliability: Annotated[
         str | None,
-        typer.Option(help="Of a run: how often what this algorithm believed of presence was true."),
+        typer.Option(help="Of a run: how often forecasts of presence by this algorithm came true."),
     ] = None,
     fov: Annotated[
         str | None,
@@ -62,19 +62,19 @@ def show(  # noqa: PLR0913 - options of the command line
     """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
     from fleet2d.view.theme import themed
 
-    wanted = RunPicture(layer, step, reliability, at, begin, end, figure)
+    picture = RunPicture(layer, step, reliability, at, begin, end, figure)
     with themed(theme), restrict_to(trust, trust_dir):
         if diary:
             from fleet2d.cli.diaries import show_diary
 
-            for line in show_diary(None if what is None else str(what), out, days, seed):
+            for line in show_diary(None if source is None else str(source), out, days, seed):
                 typer.echo(line)
         else:
-            typer.echo(_draw(what, out, wanted, fov, resolution))
+            typer.echo(_draw(source, out, picture, fov, resolution))
 
 
 class RunPicture(NamedTuple):
-    """Which picture of a run is wanted."""
+    """The options that choose a picture of a run."""
 
     layer: str | None = None
     step: int | None = None
@@ -85,10 +85,10 @@ class RunPicture(NamedTuple):
     figure: Literal["life", "heat", "strip"] = "life"
 
     def check(self) -> None:
-        """Refuse two pictures at a time.
+        """Check that the options choose one picture.
 
         Raises:
-            InputError: Two are asked for.
+            InputError: They choose two.
         """
         stretch = self.begin is not None or self.end is not None or self.figure != "life"
         kinds = [self.layer is not None or self.step is not None, self.reliability is not None]
@@ -99,57 +99,59 @@ class RunPicture(NamedTuple):
 
 
 def _draw(
-    what: Path | None,
+    source: Path | None,
     out: Path | None,
-    wanted: RunPicture,
+    picture: RunPicture,
     fov: str | None,
     resolution: float | None,
 ) -> Path:
-    """Draw a run or a floor plan; return where."""
-    if wanted.step is not None and wanted.layer is None:
-        raise InputError("--step goes with --layer: it says as of which step a layer is drawn")
-    is_run = what is not None and (what / "manifest.json").exists()
-    if fov is not None if is_run else wanted != RunPicture():
+    """Draw a run or a floor plan; return the path of the picture."""
+    if picture.step is not None and picture.layer is None:
+        raise InputError("--step needs --layer: it is the step of the layer to draw")
+    is_run = source is not None and (source / "manifest.json").exists()
+    if fov is not None if is_run else picture != RunPicture():
         raise InputError(
             "--layer, --step, --reliability, --at, --from, --to and --figure are for a run's"
             " directory, --fov for a floor plan"
         )
-    if what is not None and is_run:
-        return _draw_run(what, out, wanted)
-    if what is not None and what.is_dir():
-        raise RunDirectoryError(f"{what} holds no run: give a run directory or a floor plan's file")
-    if what is not None and not what.exists() and what.parent != Path():
+    if source is not None and is_run:
+        return _draw_run(source, out, picture)
+    if source is not None and source.is_dir():
         raise RunDirectoryError(
-            f"there is no {what}: give the directory of a run (what --out named), a floor plan's"
+            f"{source} holds no run: give a run directory or a floor plan's file"
+        )
+    if source is not None and not source.exists() and source.parent != Path():
+        raise RunDirectoryError(
+            f"there is no {source}: give the directory of a run (what --out named), a floor plan's"
             " file, synthetic:SEED, or family_home"
         )
-    return _draw_floorplan(what, out, fov, resolution)
+    return _draw_floorplan(source, out, fov, resolution)
 
 
-def _draw_run(directory: Path, out: Path | None, wanted: RunPicture) -> Path:
-    """Draw a stored run in its home, one of its layers, or a reliability diagram; return where."""
+def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
+    """Draw a picture of a stored run; return its path."""
     from fleet2d.runs.run import open_run
 
-    wanted.check()
+    picture.check()
     run = open_run(directory)
-    if wanted.layer is not None:
+    if picture.layer is not None:
         from fleet2d.view.layers import draw_layer
 
-        target = out or directory / f"{wanted.layer}.png"
-        draw_layer(run, wanted.layer, target, wanted.step)
-    elif wanted.reliability is not None:
+        target = out or directory / f"{picture.layer}.png"
+        draw_layer(run, picture.layer, target, picture.step)
+    elif picture.reliability is not None:
         from fleet2d.view.reliability import draw_reliability
 
-        target = out or directory / f"{wanted.reliability}-reliability.png"
-        draw_reliability(run, wanted.reliability, target)
-    elif wanted.at is not None:
+        target = out or directory / f"{picture.reliability}-reliability.png"
+        draw_reliability(run, picture.reliability, target)
+    elif picture.at is not None:
         from fleet2d.viewer.moments import clock_of, step_of
         from fleet2d.viewer.pictures import draw_moment
 
-        step = step_of(wanted.at, clock_of(run))
+        step = step_of(picture.at, clock_of(run))
         target = out or directory / f"step-{step}.png"
         draw_moment(run, min(step, run.manifest["steps"] - 1), target)
-    elif wanted == RunPicture():
+    elif picture == RunPicture():
         from fleet2d.view.run import draw_run
 
         target = out or directory / "picture.png"
@@ -158,20 +160,20 @@ def _draw_run(directory: Path, out: Path | None, wanted: RunPicture) -> Path:
         from fleet2d.viewer.moments import steps_of
         from fleet2d.viewer.pictures import draw_stretch
 
-        first, end = steps_of(run, wanted.begin, wanted.end)
-        target = out or directory / f"{wanted.figure}-{first}-{end}.png"
-        draw_stretch(run, first, end, target, wanted.figure)
+        first, end = steps_of(run, picture.begin, picture.end)
+        target = out or directory / f"{picture.figure}-{first}-{end}.png"
+        draw_stretch(run, first, end, target, picture.figure)
     return target
 
 
 def _draw_floorplan(
-    what: Path | None, out: Path | None, fov: str | None, resolution: float | None
+    source: Path | None, out: Path | None, fov: str | None, resolution: float | None
 ) -> Path:
-    """Draw a floor plan, or what a camera sees in it; return where."""
+    """Draw a floor plan, or a field of view in it; return the path of the picture."""
     from fleet2d.floorplan.load import load_floorplan
     from fleet2d.view.floorplan import draw_floorplan
 
-    plan = load_floorplan(what, resolution=resolution) if what else load_floorplan()
+    plan = load_floorplan(source, resolution=resolution) if source else load_floorplan()
     target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
     if fov is not None:
         from fleet2d.view.fov import draw_fov, parse_pose

@@ -1,6 +1,6 @@
 """Commands of installed packages: entry points of the group `fleet2d.command`.
 
-Fleet2D's own commands that few need are declared the same way. They load when they are called.
+Some of Fleet2D's own commands are declared the same way. Commands are loaded when they are called.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,34 +18,34 @@ GROUP = "fleet2d.command"
 
 
 class Commands(TyperGroup):
-    """The commands of Fleet2D, and behind them those of installed packages."""
+    """The commands of Fleet2D, followed by those of installed packages."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands that can be loaded."""
-        own = super().list_commands(ctx)
-        others = sorted({entry.name for entry in _entry_points()} - set(own))
-        return [*own, *(name for name in others if self.get_command(ctx, name) is not None)]
+        built_in = super().list_commands(ctx)
+        plugins = sorted({entry.name for entry in _entry_points()} - set(built_in))
+        return [*built_in, *(name for name in plugins if self.get_command(ctx, name) is not None)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command, None if there is none of that name."""
-        own = super().get_command(ctx, cmd_name)
-        if own is not None:
-            return own
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            return command
         entry = next((entry for entry in _entry_points() if entry.name == cmd_name), None)
         return None if entry is None else _load(entry, ctx)
 
 
 def _entry_points(group: str = GROUP) -> Iterator[Any]:
-    from importlib.metadata import entry_points  # slow to import, and seldom needed
+    from importlib.metadata import entry_points  # slow to import, and rarely needed
 
     return iter(entry_points(group=group))
 
 
 def _load(entry: Any, ctx: Any) -> Any:
-    """Load a command; one whose package is gone is left out, a broken one is reported."""
+    """Load a command; None if its package is missing or, with a message, if it fails."""
     try:
         value = entry.load()
-    except Exception as error:  # noqa: BLE001 - whatever the module of somebody else does
+    except Exception as error:  # noqa: BLE001 - a plugin may raise anything
         missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
         if not missing or not f"{entry.module}.".startswith(f"{missing}."):
             typer.echo(f"the command {entry.name!r} ({entry.value}) fails: {error}", err=True)
@@ -59,13 +59,13 @@ def _load(entry: Any, ctx: Any) -> Any:
 
 
 def converter() -> Callable[[Path, Path], list[str]]:
-    """Return what turns a configuration of another program into a scenario.
+    """Return the function that converts a configuration of another program into a scenario.
 
     Raises:
-        InputError: None is installed.
+        InputError: There is none.
     """
     for entry in _entry_points("fleet2d.converter"):
         with suppress(ModuleNotFoundError):
             convert: Callable[[Path, Path], list[str]] = entry.load()
             return convert
-    raise InputError("nothing is installed that converts this file: it is no floor plan")
+    raise InputError("this file is no floor plan, and no converter for it is installed")

@@ -1,6 +1,7 @@
-"""`fleet2d test`: scenarios that say what they expect, run over seeds and judged."""
+"""`fleet2d test`: scenarios with expectations, run with several seeds and judged."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,21 +18,22 @@ if TYPE_CHECKING:
     from fleet2d.scenario.model import Scenario
 
 FIRST_SEED = 1
-MOST_KEPT = 5
-"""Of one scenario so many failing seeds are stored or drawn."""
+MOST_STORED = 5
+"""The most failing seeds of one scenario that are stored or drawn."""
 
 
 @dataclass
-class Case:
-    """A scenario with a seed, and what became of it.
+class ScenarioCase:
+    """A scenario with a seed, and its results.
 
     Attributes:
-        source: The scenario's file, as it was named.
+        source: The file of the scenario, as on the command line.
         scenario: The scenario, with the seed.
-        verdicts: On each expectation, by name.
-        error: What broke the run; empty if nothing did.
-        wall_s: How long it took.
-        files: What was kept of a failure.
+        overrides: Changes of the scenario, as on the command line.
+        verdicts: The verdicts on expectations, by name.
+        error: The error that ended the run; empty if there is none.
+        wall_s: The wall time of the run [s].
+        files: The run directory and pictures of a failure.
     """
 
     source: str
@@ -44,22 +46,22 @@ class Case:
 
     @property
     def seed(self) -> int:
-        """Its seed."""
+        """The seed."""
         assert self.scenario.simulation.seed is not None
         return self.scenario.simulation.seed
 
     @property
     def fails(self) -> bool:
-        """Whether it broke, or violates an expectation."""
+        """Whether the run failed or violates an expectation."""
         return bool(self.error) or not all(v.holds for v in self.verdicts.values())
 
     @property
     def name(self) -> str:
-        """What its directory and pictures are called."""
+        """The name of its run directory and pictures."""
         return f"{file_name(Path(self.source).stem) or 'run'}-seed-{self.seed}"
 
-    def again(self, verdict: "Verdict") -> str:
-        """Return the commands that show the moment again."""
+    def commands(self, verdict: "Verdict") -> str:
+        """Return the commands that run it and show the worst moment of a verdict."""
         changes = " ".join(f"'{override}'" for override in self.overrides)
         run = f"fleet2d run {self.source} {changes}".rstrip()
         worst = verdict.worst
@@ -72,10 +74,10 @@ def run_tests(
         list[str],
         typer.Argument(
             metavar="SCENARIO.yaml... [KEY.PATH=VALUE]...",
-            help="Scenarios that say what they expect, and changes to all of them.",
+            help="Scenarios with expectations, and changes to all of them.",
         ),
     ],
-    seeds: Annotated[int, typer.Option(min=1, help="With how many seeds each is run.")] = 1,
+    seeds: Annotated[int, typer.Option(min=1, help="The number of seeds of each.")] = 1,
     seed: Annotated[
         int | None, typer.Option(min=0, help="The first seed; left out: the scenario's own, or 1.")
     ] = None,
@@ -88,21 +90,21 @@ def run_tests(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Run scenarios and judge what they expect; exit code 1 where something is violated."""
+    """Run scenarios and judge their expectations; exit code 1 if one is violated."""
     files = [argument for argument in arguments if "=" not in argument]
     overrides = [argument for argument in arguments if "=" in argument]
     if not files:
-        raise InputError("say which scenarios: fleet2d test SCENARIO.yaml…")
+        raise InputError("name the scenarios to test: fleet2d test SCENARIO.yaml…")
     if pictures is not None:
         _check_pictures()
     cases = [case for file in files for case in _cases(file, overrides, seeds, seed)]
-    kept: dict[str, int] = {}
+    failures: Counter[str] = Counter()
     for case in cases:
         _run(case)
         if case.fails and not case.error and (pictures or out):
-            kept[case.source] = kept.get(case.source, 0) + 1
-            if kept[case.source] <= MOST_KEPT:
-                _keep(case, pictures, out)
+            failures[case.source] += 1
+            if failures[case.source] <= MOST_STORED:
+                _store(case, pictures, out)
     if junit is not None:
         from fleet2d.cli.junit import write_junit
 
@@ -117,11 +119,13 @@ def run_tests(
         raise typer.Exit(1)
 
 
-def _cases(source: str, overrides: Sequence[str], seeds: int, seed: int | None) -> Iterator[Case]:
-    """Yield a scenario with each of its seeds; all of it is checked before anything runs.
+def _cases(
+    source: str, overrides: Sequence[str], seeds: int, seed: int | None
+) -> Iterator[ScenarioCase]:
+    """Yield a scenario with each of its seeds, after a check of its set-up.
 
     Raises:
-        InputError: The scenario, or something that it expects, is wrong; or it expects nothing.
+        InputError: The scenario or an expectation is wrong, or it has no expectations.
     """
     from fleet2d.engine.simulation import Simulation
     from fleet2d.scenario.model import load_scenario
@@ -129,39 +133,42 @@ def _cases(source: str, overrides: Sequence[str], seeds: int, seed: int | None) 
     scenario = load_scenario(source, *overrides)
     if not scenario.expect:
         raise InputError(
-            f"{source} expects nothing: write, for example,\n"
+            f"{source} has no expectations: write, for example,\n"
             "  expect: {keeps_off: 'always(distance(ana, astro) > 0.5 m)'}"
         )
-    own = scenario.simulation.seed
-    first = seed if seed is not None else FIRST_SEED if own is None else own
+    if seed is None:
+        seed = scenario.simulation.seed
+    first_seed = FIRST_SEED if seed is None else seed
     Simulation(scenario)
-    for number in range(first, first + seeds):
+    for number in range(first_seed, first_seed + seeds):
         simulation = scenario.simulation.model_copy(update={"seed": number})
-        yield Case(source, scenario.model_copy(update={"simulation": simulation}), overrides)
+        yield ScenarioCase(
+            source, scenario.model_copy(update={"simulation": simulation}), overrides
+        )
 
 
-def _run(case: Case) -> None:
+def _run(case: ScenarioCase) -> None:
     """Run a case, and judge it."""
     import time
 
-    began = time.perf_counter()
+    start_s = time.perf_counter()
     try:
         simulation = _simulation(case)
         simulation.run()
         case.verdicts = simulation.verdicts()
     except Fleet2DError as error:
         case.error = str(error)
-    case.wall_s = time.perf_counter() - began
+    case.wall_s = time.perf_counter() - start_s
 
 
-def _simulation(case: Case, out: Path | None = None) -> "Simulation":
+def _simulation(case: ScenarioCase, out: Path | None = None) -> "Simulation":
     from fleet2d.engine.simulation import Simulation
 
     return Simulation(case.scenario, out=out)
 
 
-def _keep(case: Case, pictures: Path | None, out: Path | None) -> None:
-    """Run a case that failed once more, to store it, and to draw the moments."""
+def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
+    """Run a failed case again, to store it and to draw the worst moments."""
     directory = None if out is None else out / case.name
     run = _simulation(case, directory).run()
     if directory is not None:
@@ -180,14 +187,18 @@ def _keep(case: Case, pictures: Path | None, out: Path | None) -> None:
 
 
 def _check_pictures() -> None:
-    """Refuse pictures where nothing can draw them, before anything is run."""
+    """Check that pictures can be drawn, before anything is run.
+
+    Raises:
+        InputError: matplotlib is missing.
+    """
     from importlib.util import find_spec
 
     if find_spec("matplotlib") is None:
         raise InputError("--pictures needs matplotlib: pip install 'fleet2d[viz]'")
 
 
-def _content(case: Case) -> dict[str, Any]:
+def _content(case: ScenarioCase) -> dict[str, Any]:
     return {
         "scenario": case.source,
         "seed": case.seed,

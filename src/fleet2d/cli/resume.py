@@ -1,4 +1,4 @@
-"""The command that goes on with a run: resume."""
+"""The command that continues a run: resume."""
 
 import sys
 from contextlib import nullcontext, redirect_stdout
@@ -18,12 +18,12 @@ def resume(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Go on with a run that was interrupted or killed, to the digest of an undisturbed one."""
+    """Continue an interrupted or killed run; the result equals that of an undisturbed run."""
     from fleet2d.engine.resume import reopen
 
-    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what components print
-        simulation, remark = reopen(directory, trust_of(trust, trust_dir))
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
+        simulation, note = reopen(directory, trust_of(trust, trust_dir))
         if not quiet:
-            typer.echo(remark, err=True)
-        stored = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
-    print_results(stored, as_json=as_json, quiet=quiet)
+            typer.echo(note, err=True)
+        run = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+    print_results(run, as_json=as_json, quiet=quiet)

@@ -1,4 +1,4 @@
-"""Commands that run, and what they report: run, export."""
+"""The commands run and export."""
 
 import gc
 import json
@@ -37,11 +37,11 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Simulate a scenario and store the run."""
-    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what components print
-        stored = run_with_progress(
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
+        result = run_with_progress(
             _set_up(arguments, seed, out), show=sys.stderr.isatty() and not quiet
         )
-    print_results(stored, as_json=as_json, quiet=quiet)
+    print_results(result, as_json=as_json, quiet=quiet)
 
 
 def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> "Simulation":
@@ -60,17 +60,17 @@ def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> 
             if out is None:
                 with suppress(OSError):
                     directory.rmdir()
-                    directory.parent.rmdir()  # if it was the first run here
+                    directory.parent.rmdir()  # fails if there are other runs
             raise
 
 
-def print_results(stored: "Run", *, as_json: bool, quiet: bool) -> None:
-    """Print what came of a run: one JSON object, a table for people, or nothing."""
-    summary = summary_of(stored)
+def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
+    """Print the results of a run: as one JSON object, as a table, or nothing."""
+    summary = summary_of(result)
     if as_json:
         typer.echo(json.dumps(summary))
     elif not quiet:
-        print_summary(summary, stored)
+        print_summary(summary, result)
 
 
 def export(
@@ -109,25 +109,25 @@ def export(
 
 
 def _fresh_directory(name: str) -> Path:
-    """Make and return runs/NAME-001, or the first number that is free."""
-    plain = file_name(name) or "run"
+    """Create and return runs/NAME-001, or the directory of the first free number."""
+    stem = file_name(name) or "run"
     number = 1
     while True:
-        directory = Path("runs") / f"{plain}-{number:03d}"
+        directory = Path("runs") / f"{stem}-{number:03d}"
         try:
-            directory.mkdir(parents=True)  # so that a run started beside this one takes the next
+            directory.mkdir(parents=True)  # at once, so that a parallel run takes the next
         except FileExistsError:
             number += 1
         except OSError as error:
             raise RunDirectoryError(
-                f"{directory} can't be made: {error.strerror}; name another directory by --out"
+                f"{directory} can't be created: {error.strerror}; name another directory by --out"
             ) from error
         else:
             return directory
 
 
 def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
-    """Run to the end, with a bar on stderr if it is to be shown.
+    """Run to the end, with a progress bar on stderr if `show`.
 
     Raises:
         Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
@@ -145,7 +145,7 @@ def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
 
 
 def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
-    gc.freeze()  # what is loaded lives to the end: the collector need not go through it every time
+    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     if not show:
         return simulation.run()
     from rich.console import Console
@@ -154,12 +154,12 @@ def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("", total=simulation.clock.steps)
-        began = time.perf_counter()
+        start_s = time.perf_counter()
 
-        def tell(now: "Simulation") -> None:
-            simulated = now.step * now.clock.step_us / 1e6
-            speedup = simulated / (time.perf_counter() - began)
-            text = f"{now.time:%a %d %b %Y %H:%M}  {speedup:,.0f} x real time"
-            progress.update(task, completed=now.step, description=text)
+        def update(current: "Simulation") -> None:
+            simulated_s = current.step * current.clock.step_us / 1e6
+            speedup = simulated_s / (time.perf_counter() - start_s)
+            text = f"{current.time:%a %d %b %Y %H:%M}  {speedup:,.0f} x real time"
+            progress.update(task, completed=current.step, description=text)
 
-        return simulation.run(tell)
+        return simulation.run(update)

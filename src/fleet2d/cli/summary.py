@@ -1,4 +1,4 @@
-"""What is said of a run when it is over."""
+"""The summary of a finished run."""
 
 import os
 import sys
@@ -18,26 +18,26 @@ SEPARATOR = " · "
 _LOADED = time.perf_counter()
 
 
-def summary_of(stored: "Run") -> dict[str, Any]:
-    """Return what `--json` prints."""
-    manifest = stored.manifest
+def summary_of(run: "Run") -> dict[str, Any]:
+    """Return the content of `--json`."""
+    manifest = run.manifest
     wall = {**manifest["wall_s"], "total": _since_start()}
     return {
-        "run_dir": str(stored.directory),
+        "run_dir": str(run.directory),
         "steps": manifest["steps"],
         "simulated_s": manifest["simulated_s"],
         "seed": manifest["seed"],
-        "digest": stored.digest,
+        "digest": run.digest,
         "wall_s": wall,
         "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
         "peak_rss_mb": _peak_rss_mb(),
-        "metrics": stored.metrics,
-        **({"expectations": judged} if (judged := manifest["expectations"]) else {}),
+        "metrics": run.metrics,
+        **({"expectations": verdicts} if (verdicts := manifest["expectations"]) else {}),
     }
 
 
-def print_summary(summary: dict[str, Any], stored: "Run") -> None:
-    """Print the summary for people: speed, a table of metrics, notes."""
+def print_summary(summary: dict[str, Any], run: "Run") -> None:
+    """Print the summary as text: speed, a table of metrics, notes."""
     from rich.console import Console
     from rich.table import Table
 
@@ -57,27 +57,27 @@ def print_summary(summary: dict[str, Any], stored: "Run") -> None:
     )
     table, hidden = Table("metric", "of", "value", "", show_edge=False), 0
     for metric, result in summary["metrics"].items():
-        measured = _class_of(stored, metric)
-        rows = _flat(measured.summary(result))
+        metric_class = _class_of(run, metric)
+        rows = _flat(metric_class.summary(result))
         hidden += len(_flat(result)) - len(rows)
-        said = None
+        last_unit = None
         for name, value in rows:
-            unit = measured.units.get(name.rsplit(SEPARATOR, 1)[-1], measured.unit)
-            table.add_row(metric, name, _shown(value, unit), "" if unit == said else unit)
-            metric, said = "", unit
+            unit = metric_class.units.get(name.rsplit(SEPARATOR, 1)[-1], metric_class.unit)
+            table.add_row(metric, name, _text(value, unit), "" if unit == last_unit else unit)
+            metric, last_unit = "", unit
     if table.row_count:
         console.print(table)
     if hidden:
         console.print(f"{hidden} more numbers are in the run: --json shows them", highlight=False)
-    print_expectations(console, stored.manifest["expectations"])
-    for note in stored.notes or stored.manifest["notes"]:
+    print_expectations(console, run.manifest["expectations"])
+    for note in run.notes or run.manifest["notes"]:
         console.print(f"note: {note}", highlight=False)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
     console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True)
 
 
-def _shown(value: Any, unit: str) -> str:
-    """Return a number as people read it: shares in percent, few digits."""
+def _text(value: Any, unit: str) -> str:
+    """Return a value as text: shares in percent, other numbers with few digits."""
     if not isinstance(value, float):
         return str(value)
     if unit.startswith("share"):
@@ -85,15 +85,16 @@ def _shown(value: Any, unit: str) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
-def _class_of(stored: "Run", metric: str) -> "type[Metric]":
-    """Return the class of a metric, which knows its unit and what of it matters."""
+def _class_of(run: "Run", metric: str) -> "type[Metric]":
+    """Return the class of a metric, which has its units and its summary."""
     from fleet2d.component import lookup
 
-    configured = stored.manifest["scenario"]["metrics"][metric]
+    configured = run.manifest["scenario"]["metrics"][metric]
     return cast("type[Metric]", lookup("metric", configured["type"]))
 
 
 def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
+    """Return nested results as rows (name, value)."""
     if not isinstance(result, dict):
         return [(prefix, result)]
     return [
@@ -104,21 +105,17 @@ def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
 
 
 def _since_start() -> float:
-    """Return the wall time since this process began [s]."""
+    """Return the wall time since this process started [s]."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
         return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
-    except (
-        OSError,
-        AttributeError,
-        ValueError,
-        IndexError,
-    ):  # not Linux: since this module was loaded
+    except (OSError, AttributeError, ValueError, IndexError):
+        # Not on Linux: the time since this module was loaded.
         return time.perf_counter() - _LOADED
 
 
 def _peak_rss_mb() -> float | None:
-    """Return the most memory that this process has held [MB]; None where nobody says."""
+    """Return the largest memory of this process so far [MB]; None where the system can't say."""
     try:
         import resource
     except ImportError:

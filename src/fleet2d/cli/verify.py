@@ -9,16 +9,16 @@ import typer
 def verify(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
 ) -> None:
-    """Check that a stored run is as it was stored, without running anything."""
+    """Check that the files of a stored run are unchanged, without running anything."""
     from fleet2d.artifacts.seal import verify_run
 
-    found = verify_run(directory)
-    for note in found.notes:
+    result = verify_run(directory)
+    for note in result.notes:
         typer.echo(f"note: {note}")
-    for name in found.foreign:
+    for name in result.foreign:
         typer.echo(f"note: {name} is no part of the run")
-    for name, how in found.differing.items():
-        typer.echo(f"{name} {how}", err=True)
-    if found.differing:
+    for name, difference in result.differing.items():
+        typer.echo(f"{name} {difference}", err=True)
+    if result.differing:
         raise typer.Exit(1)
-    typer.echo(f"verified: {f'seal {found.digest}' if found.digest else 'the tables'}")
+    typer.echo(f"verified: {f'seal {result.digest}' if result.digest else 'the tables'}")

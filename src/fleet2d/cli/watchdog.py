@@ -1,4 +1,4 @@
-"""Who keeps a run waiting: the component whose code has been running for long is named."""
+"""Name the component whose code has been running for a long time."""
 
 import sys
 import threading
@@ -14,45 +14,45 @@ import typer
 from fleet2d.blame import blame
 
 FIRST_S = 30.0
-"""The code of a component may run for so long before anything is said; then twice as long."""
+"""Time after which a running component is named [s]; the next message comes after twice as long."""
 
 
 @contextmanager
 def watched(first_s: float = FIRST_S) -> Iterator[None]:
-    """Say on stderr which component has been running for long, and in which line of its code."""
-    over = threading.Event()
-    here = threading.get_ident()
+    """Print the component that has been running for long to stderr, with the line of its code."""
+    is_over = threading.Event()
+    thread_id = threading.get_ident()
     thread = threading.Thread(
-        target=_watch, args=(over, here, first_s), daemon=True, name="fleet2d-watchdog"
+        target=_watch, args=(is_over, thread_id, first_s), daemon=True, name="fleet2d-watchdog"
     )
     thread.start()
     try:
         yield
     finally:
-        over.set()
+        is_over.set()
         thread.join(timeout=1)
 
 
-def _watch(over: threading.Event, thread: int, first_s: float) -> None:
-    seen, since, limit = blame.now, time.monotonic(), first_s
-    while not over.wait(first_s / 6):
-        now = time.monotonic()
-        if blame.now is None or blame.now is not seen:
-            seen, since, limit = blame.now, now, first_s
-        elif now - since >= limit:
-            limit *= 2
-            when = "before the first step" if seen.step is None else f"at step {seen.step}"
-            frame = sys._current_frames().get(thread)
+def _watch(is_over: threading.Event, thread_id: int, first_s: float) -> None:
+    call, start_s, limit_s = blame.now, time.monotonic(), first_s
+    while not is_over.wait(first_s / 6):
+        time_s = time.monotonic()
+        if blame.now is None or blame.now is not call:
+            call, start_s, limit_s = blame.now, time_s, first_s
+        elif time_s - start_s >= limit_s:
+            limit_s *= 2
+            moment = "before the first step" if call.step is None else f"at step {call.step}"
+            frame = sys._current_frames().get(thread_id)
             typer.echo(
-                f"{seen.path} has been running for {now - since:.0f} s {when}{_line(frame)};"
+                f"{call.path} has been running for {time_s - start_s:.0f} s {moment}{_line(frame)};"
                 " Ctrl-C twice stops it",
                 err=True,
             )
 
 
 def _line(frame: FrameType | None) -> str:
-    """Return where the code of the user is now; empty if it is none of theirs."""
-    others = (str(Path(__file__).parents[1]), sys.prefix, sys.base_prefix, "<")
+    """Return the current line of the user's code as text; empty if there is none."""
+    other_code = (str(Path(__file__).parents[1]), sys.prefix, sys.base_prefix, "<")
     lines = traceback.extract_stack(frame) if frame else []
-    theirs = [f for f in lines if not f.filename.startswith(others)]
-    return f" ({Path(theirs[-1].filename).name}:{theirs[-1].lineno})" if theirs else ""
+    frames = [f for f in lines if not f.filename.startswith(other_code)]
+    return f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""

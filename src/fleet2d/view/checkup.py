@@ -35,24 +35,24 @@ def draw_checkup(plan: FloorPlan, findings: Sequence[Finding], path: Path) -> No
 
     Args:
         plan: The home.
-        findings: What is wrong or odd with it; they are numbered from 1.
-        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
+        findings: Its findings, which are numbered from 1.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
 
     Raises:
-        InputError: The name ends otherwise, the file can't be written.
+        InputError: The file name has another suffix, or the file can't be written.
     """
     check_picture(path)
     with drawing_style():
         width, height = figure_size(plan)
-        words = _lines(findings, int(width * LETTERS_PER_IN))
-        below = LINE_IN * (len(words) + 2)
+        lines = _lines(findings, int(width * LETTERS_PER_IN))
+        below = LINE_IN * (len(lines) + 2)
         figure = Figure(figsize=(width, height + below), dpi=DPI)
         FigureCanvasAgg(figure)
         axes = figure.add_axes((0, below / (height + below), 1, height / (height + below)))
         floorplan_axes(plan, axes)
         for number, finding in enumerate(findings, start=1):
             _mark(axes, number, finding)
-        for row, (text, color) in enumerate(words):
+        for row, (text, color) in enumerate(lines):
             y = (below - LINE_IN * (row + 1)) / (height + below)
             figure.text(0.03, y, text, fontsize=8, color=color, va="center")
         save_figure(figure, path)

@@ -3,7 +3,7 @@
 import io
 import re
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,6 +20,7 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.standing import grown_cells
@@ -35,34 +36,34 @@ from fleet2d.palette import (
     WALL_COLOR,
 )
 from fleet2d.view.objects import draw_objects, label_objects
-from fleet2d.view.theme import finished
+from fleet2d.view.theme import apply_theme
 
-# Kinds of pictures, and what each would say of when or by what it was made.
+# Formats of pictures, each with the metadata that would differ from time to time.
 STAMPS = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
 ENDINGS = tuple(STAMPS)
 
-WALL_M = 0.15  # drawn round the outline; a file says nothing of how thick the outer walls are
+WALL_M = 0.15  # thickness of outer walls, which files don't contain
 LONG_SIDE_IN = 10.0
 SHORT_SIDE_IN = 3.2
 DPI = 150
 MAX_FONT_PT = 9.0
 MIN_FONT_PT = 3.5
-# Width of a letter of the font in parts of its size, and of the room that a name may fill.
+# Width of a letter of the font as a share of its size; share of a room that its name may fill.
 LETTER = 0.62
 FILL = 0.9
-# Cells of at least this part of a room's greatest squared depth make up its middle.
+# The middle of a room consists of cells with at least this share of its greatest squared depth.
 DEEP = 0.9
 
 
 def draw_floorplan(plan: FloorPlan, path: Path) -> None:
-    """Draw a floor plan to a PNG or SVG file; the same plan gives the same bytes.
+    """Draw a floor plan to a PNG, SVG or PDF file; the same plan gives the same bytes.
 
     Args:
-        plan: What to draw.
-        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
+        plan: The floor plan.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
 
     Raises:
-        InputError: The name ends otherwise, the file can't be written.
+        InputError: The file name has another suffix, or the file can't be written.
     """
     check_picture(path)
     with drawing_style():
@@ -74,7 +75,11 @@ def draw_floorplan(plan: FloorPlan, path: Path) -> None:
 
 
 def check_picture(path: Path) -> None:
-    """Raise InputError unless a file's name ends as that of a picture that we write."""
+    """Check that a file has the suffix of a picture.
+
+    Raises:
+        InputError: It has another suffix.
+    """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise InputError(
@@ -83,7 +88,7 @@ def check_picture(path: Path) -> None:
 
 
 def drawing_style() -> AbstractContextManager[Any]:
-    """Return the context to draw in: the project's style, whatever the user's own settings are."""
+    """Return the context for drawing in the style of Fleet2D, whatever the user's settings."""
     style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": "DejaVu Sans"}
     style.pop("backend")
     context: AbstractContextManager[Any] = mpl.rc_context(style)
@@ -91,26 +96,22 @@ def drawing_style() -> AbstractContextManager[Any]:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure in the theme of the moment, without a date in it, whole or not at all.
+    """Write a figure in the current theme, without a date; readers see all of the file, or none.
 
     Raises:
         InputError: The file can't be written.
     """
     unstamped = {STAMPS[path.suffix.lower()]: None}
     picture = io.BytesIO()
-    finished(figure).savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
-    unfinished = path.with_name(f".{path.name}.unfinished")
+    apply_theme(figure).savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
     try:
-        unfinished.write_bytes(picture.getvalue())
-        unfinished.replace(path)
+        write_atomically(path, picture.getvalue())
     except OSError as error:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
         raise InputError(f"can't write the picture {path}: {error.strerror}") from error
 
 
 def figure_size(plan: FloorPlan) -> tuple[float, float]:
-    """Return the width and height [in] at which the plan fills its figure."""
+    """Return the width and height of a figure that the plan fills [in]."""
     x0, x1, y0, y1 = _limits(plan)
     width, height = x1 - x0, y1 - y0
     scale = LONG_SIDE_IN / max(width, height)
@@ -118,13 +119,13 @@ def figure_size(plan: FloorPlan) -> tuple[float, float]:
 
 
 def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bool = True) -> None:
-    """Draw a floor plan on axes, in metres, for others to draw over.
+    """Draw a floor plan on axes, in metres, as the background of other artists.
 
-    What is drawn here stays below `zorder` 2, except the words, at 5.
+    All of it has a `zorder` below 2, except text, which has 5.
 
     Args:
-        plan: What to draw.
-        axes: Where to draw; its limits are set.
+        plan: The floor plan.
+        axes: The axes to draw on; their limits are set.
         names: Whether to write the rooms' names and areas.
         title: Whether to write the plan's name and area above it.
     """
@@ -140,21 +141,21 @@ def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bo
     if plan.entrance is not None:
         _draw_entrance(plan.entrance, axes)
     if names:
-        bare = _bare_floor(plan)
+        empty = _empty_floor(plan)
         for room in plan.rooms:
-            _write_room(plan, room, bare, axes)
+            _write_room(plan, room, empty, axes)
         label_objects(plan, axes)
     if title:
-        words = f"{len(plan.rooms)} room{'s' * (len(plan.rooms) != 1)}"
+        rooms = f"{len(plan.rooms)} room{'s' * (len(plan.rooms) != 1)}"
         height = 0.65 * _margin(plan)
         left, _, _, top = plan.bounds
         style: dict[str, Any] = {"va": "center", "color": TEXT_COLOR, "zorder": 5}
-        text = f"{short_name(plan.name)}\n{plan.area_m2:,.1f} m² · {words}"
+        text = f"{short_name(plan.name)}\n{plan.area_m2:,.1f} m² · {rooms}"
         axes.text(left - WALL_M, top + height, text, fontsize=11, linespacing=1.4, **style)
 
 
 def short_name(name: str) -> str:
-    """Return a plan's name as pictures show it: of a long hash, only the first digits.
+    """Return the name of a plan for pictures: of a long hash, only the first digits.
 
     Example:
         >>> short_name("2deaa98e9acd1293d5224e25715c1393"), short_name("family_home")
@@ -164,13 +165,13 @@ def short_name(name: str) -> str:
 
 
 def _margin(plan: FloorPlan) -> float:
-    """Return the space around the plan [m]: room for a title of two lines at any scale."""
+    """Return the space around the plan [m]: enough for a title of two lines at any scale."""
     x0, y0, x1, y1 = plan.bounds
     return 0.35 + 0.085 * max(x1 - x0, y1 - y0)
 
 
 def scale_depth(plan: FloorPlan) -> float:
-    """Return how far below the plan [m] the words under its scale begin."""
+    """Return the distance from the plan to the text under its scale bar [m]."""
     return 0.58 * _margin(plan)
 
 
@@ -181,35 +182,35 @@ def _limits(plan: FloorPlan) -> tuple[float, float, float, float]:
 
 
 def _draw_walls(plan: FloorPlan, axes: Axes) -> None:
-    """Draw the walls: the free space grown by a wall, under the free space."""
+    """Draw the walls: the free space enlarged by the thickness of a wall, under the free space."""
     thickness = WALL_M * plan.lattice.units_per_m
-    # Steps of a few centimetres in a traced outline would show as notches in its outer walls.
-    even = shapely.simplify(shapely.union_all(plan.polygons), thickness / 5)
-    solid = shapely.buffer(even, thickness, join_style="mitre")
+    # Without steps of a few centimetres in traced outlines, which look like notches in outer walls.
+    smooth = shapely.simplify(shapely.union_all(plan.polygons), thickness / 5)
+    solid = shapely.buffer(smooth, thickness, join_style="mitre")
     walls = _outline(plan, shapely.get_parts(solid).tolist())
     axes.add_patch(PathPatch(walls, facecolor=WALL_COLOR, edgecolor="none", zorder=0))
 
 
 def _draw_rooms(plan: FloorPlan, axes: Axes) -> None:
-    """Draw the rooms' cells as an image, cut along the walls."""
+    """Draw the cells of rooms as an image, clipped at the walls."""
     colors = [to_rgb(ROOM_COLORS.get(room.type, OTHER_COLOR)) for room in plan.rooms]
     table = np.array([*colors, to_rgb(ROOM_COLORS["unknown"])])
-    image = table[_spread(plan.room_of_cell)]  # the last colour serves -1
-    inside = PathPatch(_outline(plan, plan.polygons), transform=axes.transData)
+    image = table[_spread(plan.room_of_cell)]  # index -1 is the last colour
+    free_space = PathPatch(_outline(plan, plan.polygons), transform=axes.transData)
     low = plan.lattice.origin
     size = np.array([plan.lattice.columns, plan.lattice.rows]) * plan.lattice.cell
-    shown = axes.imshow(
+    artist = axes.imshow(
         image,
         extent=(low[0], low[0] + float(size[0]), low[1], low[1] + float(size[1])),
         origin="lower",
         interpolation="nearest",
         zorder=1,
     )
-    shown.set_clip_path(inside)
+    artist.set_clip_path(free_space)
 
 
 def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
-    """Draw a thin line where two rooms meet without a wall."""
+    """Draw a thin line where two rooms touch without a wall."""
     rooms = plan.room_of_cell
     lines = []
     for flip, grid in ((False, rooms), (True, rooms.T)):
@@ -225,7 +226,7 @@ def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
 
 
 def _spread(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Let rooms grow by a cell into what isn't free, so that their colour reaches slanted walls."""
+    """Enlarge rooms by two cells into walls, so that their colour reaches slanted walls."""
     grown = np.pad(room_of_cell, 1, constant_values=NO_ROOM)
     for _ in range(2):
         around = [np.roll(grown, shift, axis) for axis in (0, 1) for shift in (1, -1)]
@@ -238,7 +239,7 @@ def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
     """Return polygons [lattice] as one path [m]."""
     parts = []
     for polygon in polygons:
-        # Holes have to run the other way round to be holes.
+        # Holes need the opposite orientation.
         for ring in rings(shapely.orient_polygons(polygon)):
             corners = plan.lattice.to_metres(shapely.get_coordinates(ring))
             parts.append(Outline(corners, closed=True))
@@ -246,7 +247,7 @@ def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
 
 
 def _draw_scale(plan: FloorPlan, axes: Axes) -> None:
-    """Draw a bar of a round length, a black and a white half, below the plan's left corner."""
+    """Draw a scale bar of a round length below the left corner of the plan."""
     x0, y0, x1, _ = plan.bounds
     length = next((m for m in (50, 20, 10, 5, 2) if m <= (x1 - x0) / 3), 1)
     margin = _margin(plan)
@@ -277,46 +278,46 @@ def _draw_entrance(entrance: tuple[float, float], axes: Axes) -> None:
     )
 
 
-def _bare_floor(plan: FloorPlan) -> NDArray[np.int16]:
-    """Return the room of each cell that no object stands on, -1 elsewhere, (rows, columns)."""
-    bare = plan.room_of_cell.copy()
-    for thing in plan.objects:
-        window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
-        bare[window][covered] = NO_ROOM
-    return bare
+def _empty_floor(plan: FloorPlan) -> NDArray[np.int16]:
+    """Return the room of each cell without an object, else -1: int16 (rows, columns)."""
+    empty = plan.room_of_cell.copy()
+    for item in plan.objects:
+        window, covered = grown_cells(plan.lattice, item.footprint, 0.0)
+        empty[window][covered] = NO_ROOM
+    return empty
 
 
-def _write_room(plan: FloorPlan, room: Room, bare: NDArray[np.int16], axes: Axes) -> None:
-    """Write a room's name and area in the middle of its floor that is bare.
+def _write_room(plan: FloorPlan, room: Room, empty: NDArray[np.int16], axes: Axes) -> None:
+    """Write the name and area of a room in the middle of its empty floor.
 
-    As large as fits, and upright in narrow rooms.
+    The text is as large as fits, and upright in narrow rooms.
     """
-    inside = bare == room.index
+    inside = empty == room.index
     if not inside.any():
         inside = plan.room_of_cell == room.index
     row, column = _middle(inside)
     across, up = _clear_lengths(plan.lattice.cell, inside, row, column)
-    axes.apply_aspect()  # only now does the transform to pixels hold
+    axes.apply_aspect()  # needed for the transform to pixels
     pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
     points_per_m = float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
-    text = f"{room.name}\n{room.area_m2:,.1f} m²"
-    for words in (text, room.name.rpartition("_")[2]):
-        # A line is as wide as its letters, and the lines are as high as one and a half of them.
-        lines = words.split("\n")
+    name_and_area = f"{room.name}\n{room.area_m2:,.1f} m²"
+    for text in (name_and_area, room.name.rpartition("_")[2]):
+        # Widths and heights in multiples of the font size.
+        lines = text.split("\n")
         width, height = LETTER * max(map(len, lines)), 1.5 * len(lines)
         flat = FILL * points_per_m * min(across / width, up / height)
         upright = FILL * points_per_m * min(up / width, across / height)
-        turn = flat < min(upright, 5.0)
-        size = min(upright if turn else flat, MAX_FONT_PT)
+        is_upright = flat < min(upright, 5.0)
+        size = min(upright if is_upright else flat, MAX_FONT_PT)
         if size >= MIN_FONT_PT:
             x, y = plan.lattice.to_metres(plan.lattice.cell_centre(row, column)).tolist()
             style: dict[str, Any] = {"ha": "center", "va": "center", "color": TEXT_COLOR}
-            axes.text(x, y, words, fontsize=size, rotation=90 * turn, zorder=5, **style)
+            axes.text(x, y, text, fontsize=size, rotation=90 * is_upright, zorder=5, **style)
             return
 
 
 def _middle(cells: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the (row, column) in the middle of those that are about as deep inside as any."""
+    """Return the (row, column) in the middle of the cells that are deepest inside."""
     rows, columns = np.nonzero(cells)
     top, left = int(rows.min()), int(columns.min())
     inside = np.zeros((int(rows.max()) - top + 3, int(columns.max()) - left + 3), np.bool_)
@@ -324,17 +325,17 @@ def _middle(cells: NDArray[np.bool_]) -> tuple[int, int]:
     depth = squared_distance(inside)[rows - top + 1, columns - left + 1]
     deep = np.flatnonzero(depth >= DEEP * depth.max())
     rows, columns = rows[deep], columns[deep]
-    away = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
-    nearest = int(np.argmin(away))
+    distance = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
+    nearest = int(np.argmin(distance))
     return int(rows[nearest]), int(columns[nearest])
 
 
 def _clear_lengths(
     cell: float, inside: NDArray[np.bool_], row: int, column: int
 ) -> tuple[float, float]:
-    """Return how far cells extend from one along x and y, as far to either side [m]."""
+    """Return the lengths along x and y that are free on both sides of a cell [m]."""
     lengths = []
-    for line, here in ((inside[row], column), (inside[:, column], row)):
-        gaps = np.abs(np.flatnonzero(~line) - here)
+    for line, index in ((inside[row], column), (inside[:, column], row)):
+        gaps = np.abs(np.flatnonzero(~line) - index)
         lengths.append(float(2 * gaps.min() - 1) * cell)
     return lengths[0], lengths[1]

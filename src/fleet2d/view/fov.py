@@ -1,4 +1,4 @@
-"""Draw what is in view of a pose: as a region, and as the set of cells, by each method."""
+"""Draw the field of view of a camera: as a region, and as a set of cells."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -34,15 +34,15 @@ ROBOT_COLOR = "#22344f"
 RADIUS_M = 0.17
 
 
-class Pose(NamedTuple):
-    """Where a camera is, and what it could see.
+class CameraPose(NamedTuple):
+    """The pose of a camera, with its range and angle.
 
     Attributes:
-        x: [m].
-        y: [m].
-        heading_deg: Counter-clockwise from +x.
+        x: Its position [m].
+        y: Its position [m].
+        heading_deg: Its heading, counter-clockwise from +x [degrees].
         far: Its range [m].
-        angle_deg: Width of its field of view, at most 360.
+        angle_deg: Its angle of view, at most 360 [degrees].
     """
 
     x: float
@@ -57,46 +57,47 @@ class Pose(NamedTuple):
         return Reach(0, far * far, max(1, round(self.angle_deg / 360 * TURN)))
 
 
-def parse_pose(text: str) -> Pose:
-    """Return the pose that a text of three to five numbers says.
+def parse_pose(text: str) -> CameraPose:
+    """Return the pose of a text of three to five numbers.
 
     Raises:
-        InputError: It doesn't.
+        InputError: The text has other numbers, or something else.
 
     Example:
         >>> parse_pose("2.5, 1, 90")
-        Pose(x=2.5, y=1.0, heading_deg=90.0, far=4.5, angle_deg=108.0)
+        CameraPose(x=2.5, y=1.0, heading_deg=90.0, far=4.5, angle_deg=108.0)
     """
     try:
         numbers = [float(part) for part in text.split(",")]
-        pose = Pose(*numbers)
-        right = 0 < pose.far <= 1000 and 0 < pose.angle_deg <= 360 and np.isfinite(numbers).all()
+        pose = CameraPose(*numbers)
+        is_valid = 0 < pose.far <= 1000 and 0 < pose.angle_deg <= 360 and np.isfinite(numbers).all()
     except (ValueError, TypeError):
-        right = False
-    if not right:
+        is_valid = False
+    if not is_valid:
         raise InputError(
-            f"--fov {text}: x,y,heading is wanted [m, m, degrees], and if you like a range [m] and"
-            " an angle up to 360 degrees: --fov 2.5,1,90,4.5,108"
+            f"--fov {text}: write x,y,heading [m, m, degrees], optionally a range [m] and an angle"
+            " up to 360 degrees: --fov 2.5,1,90,4.5,108"
         )
     return pose
 
 
-def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
-    """Draw the field of view of a pose in a floor plan to a PNG or SVG file, by each method.
+def draw_fov(plan: FloorPlan, pose: CameraPose, path: Path) -> None:
+    """Draw the field of view of a camera in a floor plan to a PNG, SVG or PDF file.
 
-    Left the region of lines of sight and visibility polygons, right the cells of the flashlight.
+    Left is the region of `line_of_sight` and `visibility_polygon`, right the cells of
+    `flashlight`.
 
     Args:
         plan: The floor plan.
         pose: The camera.
-        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
 
     Raises:
         PlacementError: The pose is in a wall or outside the home.
-        InputError: The name ends otherwise, or the file can't be written.
+        InputError: The file name has another suffix, or the file can't be written.
     """
     check_picture(path)
-    VisibleRegion(SightWalls.of(Home(plan)), pose.x, pose.y)  # or says what is wrong with the place
+    VisibleRegion(SightWalls.of(Home(plan)), pose.x, pose.y)  # raises PlacementError
     with drawing_style():
         width, height = figure_size(plan)
         figure = Figure(figsize=(2 * width, height), dpi=DPI)
@@ -108,9 +109,9 @@ def draw_fov(plan: FloorPlan, pose: Pose, path: Path) -> None:
         save_figure(figure, path)
 
 
-def region_panel(plan: FloorPlan, pose: Pose, axes: Axes, title: str) -> None:
-    """Draw the exact region in view of a pose, and the sector that it is cut from."""
-    _ground(plan, axes, title)
+def region_panel(plan: FloorPlan, pose: CameraPose, axes: Axes, title: str) -> None:
+    """Draw the exact region in view of a pose, and the sector of its range and angle."""
+    _draw_plan(plan, axes, title)
     half = pose.angle_deg / 2
     ends = (pose.heading_deg - half, pose.heading_deg + half)
     sector = Wedge((pose.x, pose.y), pose.far, *ends, fill=False, ec=VIEW_EDGE, lw=0.8, ls=":")
@@ -118,34 +119,36 @@ def region_panel(plan: FloorPlan, pose: Pose, axes: Axes, title: str) -> None:
     axes.add_patch(sector)
     camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
     heading = float(np.deg2rad(pose.heading_deg))
-    seen = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
-    for part in shapely.get_parts(seen):
+    region = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
+    for part in shapely.get_parts(region):
         outline = shapely.get_coordinates(part.exterior)
         axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.5, ec="none", zorder=2.2))
         axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=1.0, zorder=3.1))
-    _robot(pose, axes)
+    _draw_robot(pose, axes)
 
 
-def cells_panel(plan: FloorPlan, pose: Pose, axes: Axes, method: FieldOfView, title: str) -> None:
+def cells_panel(
+    plan: FloorPlan, pose: CameraPose, axes: Axes, method: FieldOfView, title: str
+) -> None:
     """Draw the cells in view of a pose by a method."""
-    _ground(plan, axes, title)
+    _draw_plan(plan, axes, title)
     x, y = plan.lattice.point_at((pose.x, pose.y))
     heading = round(pose.heading_deg / 360 * TURN) % TURN
     mask = method.cells(Home(plan), x, y, heading, pose.reach(plan))
     layer_on_axes(plan, mask, axes)
-    _robot(pose, axes)
+    _draw_robot(pose, axes)
 
 
-def _ground(plan: FloorPlan, axes: Axes, title: str) -> None:
+def _draw_plan(plan: FloorPlan, axes: Axes, title: str) -> None:
     floorplan_axes(plan, axes, names=False, title=False)
     x0, _, _, y1 = plan.bounds
     axes.text(x0, y1 + 0.3, title, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
 
 
-def _robot(pose: Pose, axes: Axes) -> None:
+def _draw_robot(pose: CameraPose, axes: Axes) -> None:
     body = Circle((pose.x, pose.y), RADIUS_M, facecolor=ROBOT_COLOR, edgecolor="white", lw=0.9)
     body.set_zorder(4.3)
     axes.add_patch(body)
-    turned = np.deg2rad(pose.heading_deg)
-    nose = (pose.x + RADIUS_M * np.cos(turned), pose.y + RADIUS_M * np.sin(turned))
+    heading = np.deg2rad(pose.heading_deg)
+    nose = (pose.x + RADIUS_M * np.cos(heading), pose.y + RADIUS_M * np.sin(heading))
     axes.plot([pose.x, nose[0]], [pose.y, nose[1]], color="white", lw=1.2, zorder=4.4)

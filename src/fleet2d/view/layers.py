@@ -31,7 +31,7 @@ from fleet2d.view.theme import SCALE
 COLORS = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.35, 1.0, 256)))
 SEEN_COLOR = (0.12, 0.53, 0.54)
 SOLID = 0.75
-BAR_IN = 0.95  # beside the plan: the scale of the colours and its words
+BAR_IN = 0.95  # width of the colour bar with its labels, beside the plan
 
 
 def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None:
@@ -40,12 +40,12 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
     Args:
         run: The run.
         name: The layer, such as ``explored.astro``.
-        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
-        step: After which step, one of those after which it was stored; None for the last.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
+        step: The step after which the layer was stored; None for the last.
 
     Raises:
         ArtifactError: The run stored no such layer, or not after that step.
-        InputError: The name ends otherwise, or the file can't be written.
+        InputError: The file name has another suffix, or the file can't be written.
     """
     check_picture(path)
     values = read_layer(run, name, step)
@@ -60,44 +60,44 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
         FigureCanvasAgg(figure)
         axes = figure.add_axes((0, 0, width / (width + beside), 1))
         floorplan_axes(plan, axes, title=False)
-        shown = layer_on_axes(plan, values, axes)
-        words = f"{name}{f' [{unit}]' if unit else ''}, after step {step}"
+        colors = layer_on_axes(plan, values, axes)
+        title = f"{name}{f' [{unit}]' if unit else ''}, after step {step}"
         x0, _, _, y1 = plan.bounds
-        axes.text(x0, y1 + 0.3, words, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
-        if shown is not None:
+        axes.text(x0, y1 + 0.3, title, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
+        if colors is not None:
             bar = figure.add_axes(((width + 0.1) / (width + beside), 0.12, 0.018, 0.76))
-            figure.colorbar(shown, cax=bar).ax.tick_params(labelsize=8)
+            figure.colorbar(colors, cax=bar).ax.tick_params(labelsize=8)
         save_figure(figure, path)
 
 
 def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMappable | None:
-    """Draw a layer's values over a floor plan; return what a scale of colours is made from.
+    """Draw the values of a layer over a floor plan; return their colours for a colour bar.
 
-    Cells that aren't free are left out, and those of no value; of a layer of step numbers, -1 is
-    no value.
+    Cells that aren't free or have no value are left out: NaN is no value, and in a layer of steps
+    -1 is none.
 
     Args:
-        plan: The floor plan, drawn already.
-        values: (rows, columns); of bool, cells that are true are tinted, and there is no scale.
-        axes: Where to draw, in metres.
+        plan: The floor plan, already drawn.
+        values: (rows, columns); of bool, true cells are tinted, and there is no colour bar.
+        axes: The axes to draw on, in metres.
     """
     image = np.zeros((*values.shape, 4))
-    shown: ScalarMappable | None = None
+    colors: ScalarMappable | None = None
     if values.dtype == np.bool_:
         image[plan.free & values] = (*SEEN_COLOR, SOLID)
     else:
-        there = plan.free & ~np.isnan(values.astype(np.float64))
-        if values.dtype.kind == "i" and (values[there] >= -1).all():
-            there &= values >= 0
-        inside = values[there].astype(np.float64)
-        low, high = (float(inside.min()), float(inside.max())) if inside.size else (0.0, 1.0)
-        shown = ScalarMappable(Normalize(low, high if high > low else low + 1.0), COLORS)
-        image[there] = shown.to_rgba(inside)
-        image[there, 3] = SOLID
+        has_value = plan.free & ~np.isnan(values.astype(np.float64))
+        if values.dtype.kind == "i" and (values[has_value] >= -1).all():
+            has_value &= values >= 0
+        numbers = values[has_value].astype(np.float64)
+        low, high = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 1.0)
+        colors = ScalarMappable(Normalize(low, high if high > low else low + 1.0), COLORS)
+        image[has_value] = colors.to_rgba(numbers)
+        image[has_value, 3] = SOLID
     left, bottom = plan.lattice.origin
     width, height = (n * plan.lattice.cell for n in (plan.lattice.columns, plan.lattice.rows))
     extent = (left, left + width, bottom, bottom + height)
     axes.imshow(
         image, extent=extent, origin="lower", interpolation="nearest", zorder=2.1, label=SCALE
     )
-    return shown
+    return colors

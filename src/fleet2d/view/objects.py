@@ -1,4 +1,4 @@
-"""Draw what stands in a floor plan: doorways, furniture, and where robots are not to go."""
+"""Draw the objects of a floor plan: doorways, furniture, and no-go areas of robots."""
 
 from types import MappingProxyType
 from typing import Any
@@ -20,15 +20,15 @@ LABEL_COLOR = "#6d737c"
 NO_GO_COLOR = "#c8452f"
 
 LABEL_PT = (2.6, 5.0)
-# Width of a letter of the font in parts of its size.
+# Width of a letter of the font, as a share of its size.
 LETTER = 0.62
 # Corners of a circle, and of a door's quarter of one.
 CIRCLE = 24
 SWING = 12
 
-# Symbols inside a footprint as plans show them, in shares of its width (-0.5 is the right side, 0.5
+# Symbols of architectural plans, in shares of the width of a footprint (-0.5 is the right side, 0.5
 # the left) and of its depth (-0.5 is the back): boxes (x0, y0, x1, y1), and circles (x, y, radius)
-# with the radius a share of the smaller of both.
+# with the radius as a share of the smaller of both.
 _BED = ((-0.5, -0.14, 0.5, -0.14),)
 _FRONT = ((-0.5, 0.3, 0.5, 0.3),)
 SYMBOLS: MappingProxyType[str, tuple[tuple[float, ...], ...]] = MappingProxyType(
@@ -57,25 +57,24 @@ SYMBOLS: MappingProxyType[str, tuple[tuple[float, ...], ...]] = MappingProxyType
     }
 )
 
-# Their symbols are known from any plan, and leave no room for words.
+# Their symbols are well known, and leave no space for text.
 UNLABELLED = frozenset(
     ("chair", "nightstand", "toilet", "washbasin", "sink", "stove", "shower", "charger")
 )
 
 
 def draw_objects(plan: FloorPlan, axes: Axes) -> None:
-    """Draw furniture with its symbols, doorways, and areas that robots keep out of, in metres."""
+    """Draw furniture with its symbols, doorways, and no-go areas of robots, in metres."""
     for blocks, fill in FILL_COLORS.items():
-        shown = [
-            Outline(shapely.get_coordinates(ring), closed=True)
-            for thing in plan.objects
-            if thing.blocks == blocks
-            for ring in (thing.footprint.exterior,)
+        outlines = [
+            Outline(shapely.get_coordinates(item.footprint.exterior), closed=True)
+            for item in plan.objects
+            if item.blocks == blocks
         ]
         dashes = "--" if blocks == "nothing" else "-"
         style: dict[str, Any] = {"facecolor": fill, "edgecolor": EDGE_COLOR, "zorder": 1.6}
-        axes.add_collection(PathCollection(shown, linewidths=0.6, linestyles=dashes, **style))
-    lines = [line for thing in plan.objects for line in _symbol(thing)]
+        axes.add_collection(PathCollection(outlines, linewidths=0.6, linestyles=dashes, **style))
+    lines = [line for item in plan.objects for line in _symbol(item)]
     axes.add_collection(LineCollection(lines, lw=0.4, color=EDGE_COLOR, zorder=1.65))
     _draw_no_go(plan, axes)
     _draw_doorways(plan, axes)
@@ -83,34 +82,34 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
 
 def label_objects(plan: FloorPlan, axes: Axes) -> None:
     """Write the type of each object on it, where it is large enough."""
-    axes.apply_aspect()  # only now does the transform to pixels hold
+    axes.apply_aspect()  # needed for the transform to pixels
     pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
     points_per_m = float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
-    for thing in plan.objects:
-        x0, y0, x1, y1 = thing.footprint.bounds
-        words = thing.type.replace("_", " ")
+    for item in plan.objects:
+        x0, y0, x1, y1 = item.footprint.bounds
+        label = item.type.replace("_", " ")
         across, up = x1 - x0, y1 - y0
-        flat = min(across / (LETTER * len(words)), up / 1.2) * points_per_m
-        upright = min(up / (LETTER * len(words)), across / 1.2) * points_per_m
+        flat = min(across / (LETTER * len(label)), up / 1.2) * points_per_m
+        upright = min(up / (LETTER * len(label)), across / 1.2) * points_per_m
         size = min(max(flat, upright), LABEL_PT[1])
-        if size < LABEL_PT[0] or thing.type in UNLABELLED:
+        if size < LABEL_PT[0] or item.type in UNLABELLED:
             continue
-        middle = thing.footprint.centroid
+        middle = item.footprint.centroid
         style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
-        turn = 90 * (upright > flat)
-        axes.text(middle.x, middle.y, words, fontsize=size, rotation=turn, zorder=4, **style)
+        rotation = 90 * (upright > flat)
+        axes.text(middle.x, middle.y, label, fontsize=size, rotation=rotation, zorder=4, **style)
 
 
-def _symbol(thing: PlacedObject) -> list[NDArray[np.float64]]:
+def _symbol(item: PlacedObject) -> list[NDArray[np.float64]]:
     """Return the lines inside a footprint [m]."""
-    forward = np.array([np.cos(thing.heading), np.sin(thing.heading)])
+    forward = np.array([np.cos(item.heading), np.sin(item.heading)])
     left = np.array([-forward[1], forward[0]])
-    corners = shapely.get_coordinates(thing.footprint)
+    corners = shapely.get_coordinates(item.footprint)
     along, across = corners @ forward, corners @ left
     width, depth = float(np.ptp(across)), float(np.ptp(along))
     middle = (across.min() + width / 2) * left + (along.min() + depth / 2) * forward
     lines = []
-    for shape in SYMBOLS.get(thing.type, ()):
+    for shape in SYMBOLS.get(item.type, ()):
         if len(shape) == 4:
             x0, y0, x1, y1 = shape
             points = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]) * (width, depth)
@@ -123,7 +122,7 @@ def _symbol(thing: PlacedObject) -> list[NDArray[np.float64]]:
 
 
 def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
-    """Draw doors open, with their swing, as plans do; mere openings as a dotted line."""
+    """Draw doors with their swing, as plans do, and openings without a door as dotted lines."""
     leaves, swings, openings = [], [], []
     for door in plan.doorways:
         start, end = np.array(door.start), np.array(door.end)

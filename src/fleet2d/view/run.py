@@ -1,4 +1,4 @@
-"""Draw a stored run: the home being lived in, and who was where in every hour of every day."""
+"""Draw a stored run: life in the home, and the room of each user in every minute of every day."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -30,23 +30,23 @@ from fleet2d.view.floorplan import (
     short_name,
 )
 from fleet2d.view.life import (
-    SPOTS,
-    View,
+    MOST_PLACES,
+    CameraView,
+    best_view,
     clear_names,
+    draw_paths,
     draw_presence,
     draw_sightings,
     draw_view,
-    draw_ways,
     places_of,
-    telling_view,
 )
 from fleet2d.view.page import LINE_IN, QUIET_COLOR, Chip, Page
-from fleet2d.view.traces import Trace, trace_of
+from fleet2d.view.traces import BodyTrace, trace_of
 
-SHOWN = 4  # users that have an actogram, and robots that are drawn
+MOST_BODIES = 4  # users with an actogram, and robots
 
 # Inches.
-WIDTH = 10.67  # at most: beside a narrow plan the picture is narrower
+WIDTH = 10.67  # the largest; with a narrow plan the picture is narrower
 EDGE = 0.32
 HEADER = 0.82
 FOOTER = 0.28  # below the last line of the legends
@@ -54,7 +54,7 @@ GAP = 0.3
 DATES = 0.78  # beside the first actogram
 CAPTION = 0.42  # above each actogram
 ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 4.9, 3: 5.1, 4: 5.4}
-LEFT_LEAST = (7.2, 3.7)  # of the plan, its legend and the header; alone, beside actograms
+LEFT_LEAST = (7.2, 3.7)  # least width of the plan with legend and header: alone, beside actograms
 BODY_MOST = 6.6
 BODY_LEAST = (2.3, 3.4)
 ROW_LEAST = 0.08
@@ -69,8 +69,8 @@ WIDE_SEPARATOR = "   ·   "
 
 
 @dataclass(frozen=True)
-class Seen:
-    """The observations of the users that are shown."""
+class Observations:
+    """The observations of the users in the picture; all arrays have one row for each."""
 
     step: NDArray[np.int64]
     robot: NDArray[Any]
@@ -79,17 +79,17 @@ class Seen:
 
 
 def draw_run(run: Run, path: Path) -> None:
-    """Draw a run to a PNG or SVG file; the same run gives the same bytes.
+    """Draw a run to a PNG, SVG or PDF file; the same run gives the same bytes.
 
-    Left is the floor plan with where bodies were, the ways they went, and what robots saw; right an
-    actogram per user, of at most four: a row per day, coloured by room.
+    Left is the floor plan with the presence and paths of bodies and what robots saw; right an
+    actogram for each user, of at most four: a row per day, coloured by room.
 
     Args:
-        run: A stored run, or one in memory; whole or interrupted.
-        path: Where to; the name ends with `.png` or `.svg`. A file there is replaced.
+        run: A run, stored or in memory, complete or interrupted.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
 
     Raises:
-        InputError: The name ends otherwise, or the file can't be written.
+        InputError: The file name has another suffix, or the file can't be written.
         ArtifactError: The run has no floor plan.
 
     Example:
@@ -110,7 +110,7 @@ def run_figure(run: Run) -> Figure:
 
 
 class _Picture:
-    """The picture of a run: what is gathered, then drawn part by part."""
+    """The picture of a run: its data are collected, then drawn part by part."""
 
     def __init__(self, run: Run) -> None:
         self.run, self.plan = run, run.plan
@@ -120,8 +120,8 @@ class _Picture:
         self.notes: list[str] = []
         self.users = self._traces("users", robot=False)
         self.robots = self._traces("robots", robot=True)
-        self.notes += _told_together([*self.users, *self.robots])
-        self.seen = _observations(run, [user.name for user in self.users])
+        self.notes += _notes_by_bodies([*self.users, *self.robots])
+        self.observations = _observations(run, [user.name for user in self.users])
         self.rings = self._rings()
         self.views = list(self._views())
         self.panels = self.users or self.robots
@@ -131,45 +131,47 @@ class _Picture:
         self._actograms()
         self._footer()
 
-    def _traces(self, bucket: str, *, robot: bool) -> list[Trace]:
+    def _traces(self, bucket: str, *, robot: bool) -> list[BodyTrace]:
         names = self.run.manifest["entities"][bucket]
-        if len(names) > SHOWN:
-            self.notes.append(f"{SHOWN} of {len(names)} {bucket} are shown")
+        if len(names) > MOST_BODIES:
+            self.notes.append(f"{MOST_BODIES} of {len(names)} {bucket} are shown")
         if not self.steps:
             return []
-        found = []
-        for number, name in enumerate(names[:SHOWN]):
+        traces = []
+        for number, name in enumerate(names[:MOST_BODIES]):
             trace = trace_of(self.run, self.plan, name, number, robot=robot)
             if trace is not None:
-                found.append(trace)
-        if names and not found:
+                traces.append(trace)
+        if names and not traces:
             self.notes.append(f"where {bucket} were is not stored")
-        return found
+        return traces
 
     def _rings(self) -> dict[str, NDArray[np.float64]]:
         """Return the places where each robot saw users; none if there are too many to draw."""
-        found = {
-            robot.name: places_of(self.seen.xy[self.seen.robot == robot.name])
+        places_of_robot = {
+            robot.name: places_of(self.observations.xy[self.observations.robot == robot.name])
             for robot in self.robots
         }
-        found = {name: places for name, places in found.items() if len(places)}
-        count = sum(map(len, found.values()))
-        if count > SPOTS:
+        rings = {name: places for name, places in places_of_robot.items() if len(places)}
+        count = sum(map(len, rings.values()))
+        if count > MOST_PLACES:
             self.notes.append(f"the {count:,} places where robots saw users are not drawn")
             return {}
-        return found
+        return rings
 
-    def _views(self) -> Iterator[View]:
+    def _views(self) -> Iterator[CameraView]:
         for robot in self.robots:
             camera = self._body("robots", robot.name).get("camera")
             if camera is None:
                 continue
-            mine = self.seen.robot == robot.name
-            where: dict[int, Any] = {}
-            shown = mine & np.isin(self.seen.step, robot.step)
-            for step, xy in zip(self.seen.step[shown].tolist(), self.seen.xy[shown], strict=True):
-                where[step] = np.vstack([where[step], xy]) if step in where else xy[None]
-            view = telling_view(self.plan, robot, camera, where)
+            seen = self.observations
+            rows = (seen.robot == robot.name) & np.isin(seen.step, robot.step)
+            sightings: dict[int, Any] = {}
+            for step, xy in zip(seen.step[rows].tolist(), seen.xy[rows], strict=True):
+                sightings[step] = (
+                    np.vstack([sightings[step], xy]) if step in sightings else xy[None]
+                )
+            view = best_view(self.plan, robot, camera, sightings)
             if view is not None:
                 yield view
 
@@ -177,10 +179,8 @@ class _Picture:
         body = self.run.manifest["scenario"].get(bucket, {}).get(name, {})
         return dict(body)
 
-    # Parts of the picture
-
     def _lay_out(self) -> None:
-        """Choose the size of everything, and open the figure."""
+        """Choose the size of all parts, and create the figure."""
         self.days = [
             rooms_by_day(trace, self.start, self.step_us, self.steps) for trace in self.panels
         ]
@@ -189,7 +189,7 @@ class _Picture:
         self.page = Page(self.figure)
         self.life_lines = self.page.lines(self.left, list(self._life_chips()), SMALL)
         self.room_lines = self.page.lines(self.right - DATES, list(self._room_chips()), SMALL)
-        # Few days leave space in which their legend begins.
+        # With few days, the legend starts in the space below their rows.
         days = ROW_MOST * len(self.days[0]) if self.days else 0.0
         self.rows_high = min(self.body - CAPTION - TICKS, days)
         spare = self.body - CAPTION - TICKS - self.rows_high
@@ -200,14 +200,14 @@ class _Picture:
         self.page.resize(self.width, self.height)
 
     def _lay_out_plan(self) -> None:
-        """Choose the size of the plan and so of the picture: a narrow or a flat one is smaller."""
+        """Choose the size of the plan, and with it that of the picture."""
         x0, y0, x1, y1 = self.plan.bounds
         edge = 0.03 * max(x1 - x0, y1 - y0)
         left, right, low, high = x0 - edge, x1 + edge, y0 - scale_depth(self.plan), y1 + edge
         self.right = ACTOGRAMS[len(self.panels)]
         beside = 2 * EDGE + self.right + (GAP if self.right else 0.0)
         most, least = WIDTH - beside, LEFT_LEAST[len(self.panels) > 0]
-        # The words under the scale have a size in inches, in a home of any size.
+        # The text under the scale bar has the same size in inches in any home.
         scale = min(most / (right - left), (BODY_MOST - SCALE_WORDS) / (high - low))  # in/m
         low -= SCALE_WORDS / scale
         self.limits = (left, right, low, high)
@@ -218,7 +218,7 @@ class _Picture:
         self.width = self.left + beside
 
     def _axes(self, x: float, y: float, width: float, height: float) -> Any:
-        """Open axes at a place [in]."""
+        """Add axes at a place [in]."""
         box = (x / self.width, y / self.height, width / self.width, height / self.height)
         return self.figure.add_axes(box)
 
@@ -226,11 +226,11 @@ class _Picture:
         scenario = self.run.manifest["scenario"]
         top = self.height
         name = scenario.get("name") or "run"
-        lasted = _length(self.steps * self.step_us)
+        duration = _length(self.steps * self.step_us)
         x = self.page.write(EDGE, top - 0.42, self.page.fit(name, 16, 4.0), 16, weight="bold")
-        words = f"{lasted} in {short_name(self.plan.name)}"
-        words = self.page.fit(words, 16, self.width - EDGE - x - 0.15)
-        self.page.write(x + 0.12, top - 0.42, words, 16, color=QUIET_COLOR)
+        subtitle = f"{duration} in {short_name(self.plan.name)}"
+        subtitle = self.page.fit(subtitle, 16, self.width - EDGE - x - 0.15)
+        self.page.write(x + 0.12, top - 0.42, subtitle, 16, color=QUIET_COLOR)
         end = self.start + timedelta(microseconds=self.steps * self.step_us)
         digest = self.run.digest
         facts = [
@@ -253,7 +253,7 @@ class _Picture:
         axes.set(xlim=(left, right), ylim=(low, high))
         clear_names(self.plan, self.views, axes)
         for trace in (*self.robots, *self.users):
-            draw_ways(trace, axes)
+            draw_paths(trace, axes)
         for trace in self.users:
             draw_presence(self.plan, trace, axes)
         for robot in self.robots:
@@ -267,16 +267,17 @@ class _Picture:
         for user in self.users:
             yield Chip("spot", user.color, user.name)
             if len(user.legs):
-                alone = len(self.users) == 1
-                yield Chip("way", user.color, "ways walked" if alone else f"ways of {user.name}")
+                is_alone = len(self.users) == 1
+                label = "ways walked" if is_alone else f"ways of {user.name}"
+                yield Chip("way", user.color, label)
         for robot in self.robots:
             facts = filter(None, [robot.name, self._covers(robot.name)])
             yield Chip("way", robot.color, SEPARATOR.join(facts))
         if self.rings:
             yield Chip("ring", self.robots[0].color, "seen here by a robot")
         for view in self.views:
-            when = self.start + timedelta(microseconds=view.step * self.step_us)
-            yield Chip("view", None, f"what {view.robot.name} sees, {_date(when)}")
+            time = self.start + timedelta(microseconds=view.step * self.step_us)
+            yield Chip("view", None, f"what {view.robot.name} sees, {_date(time)}")
 
     def _actograms(self) -> None:
         count = len(self.panels)
@@ -288,47 +289,42 @@ class _Picture:
         height = self.rows_high
         bottom = self.foot + self.body - CAPTION - height
         for number, (trace, rooms) in enumerate(zip(self.panels, self.days, strict=True)):
-            at = x + number * (width + gap)
-            axes = self._axes(at, bottom, width, height)
-            steps = self.seen.step[self.seen.user == trace.name]
+            left = x + number * (width + gap)
+            axes = self._axes(left, bottom, width, height)
+            steps = self.observations.step[self.observations.user == trace.name]
             marks = marks_by_day(steps, self.start, self.step_us, len(rooms))
             draw_actogram(self.plan, rooms, marks, self.start, axes, dates=number == 0)
-            self._caption(trace, at, bottom + height, width)
+            self._caption(trace, left, bottom + height, width)
         self.page.legend(x, bottom - TICKS - 0.13, self.room_lines, SMALL)
 
-    def _caption(self, trace: Trace, x: float, y: float, width: float) -> None:
+    def _caption(self, trace: BodyTrace, x: float, y: float, width: float) -> None:
         name = self.page.fit(trace.name, 9.5, width)
         self.page.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
         facts = [] if trace.robot else [f"{_percent(float(np.mean(trace.room >= 0)))} at home"]
-        seen = self._metric("sightings").get(trace.name)
-        if seen is not None and self.robots:
-            facts.append(f"{_percent(seen)} of that seen")
+        share = self._metric("sightings").get(trace.name)
+        if share is not None and self.robots:
+            facts.append(f"{_percent(share)} of that seen")
         facts += [covers] if (covers := self._covers(trace.name)) else []
         while len(facts) > 1 and self.page.fit(SEPARATOR.join(facts), SMALL, width).endswith("…"):
             facts.pop()
         self.page.write(x, y + 0.09, SEPARATOR.join(facts), SMALL, color=QUIET_COLOR)
 
     def _room_chips(self) -> Iterator[Chip]:
-        here = np.unique([room for rooms in self.days for room in np.unique(rooms)]).astype(
-            np.int64
-        )
-        told = set()
-        for index in here[here >= 0].tolist():
-            kind = self.plan.rooms[index].type
-            if kind not in told:
-                told.add(kind)
-                yield Chip("room", room_color(self.plan, index), kind.replace("_", " "))
-        if (here == -1).any():
+        indices = {room for rooms in self.days for room in np.unique(rooms).tolist()}
+        index_of_type: dict[str, int] = {}
+        for index in sorted(index for index in indices if index >= 0):
+            index_of_type.setdefault(self.plan.rooms[index].type, index)
+        for kind, index in index_of_type.items():
+            yield Chip("room", room_color(self.plan, index), kind.replace("_", " "))
+        if -1 in indices:
             yield Chip("away", None, "away")
-        if np.isin([user.name for user in self.users], self.seen.user).any():
-            words = f"seen by a robot: height is the share of {24 * 60 // MARKS} min"
-            yield Chip("seen", "#dfe1e4", words)
+        if np.isin([user.name for user in self.users], self.observations.user).any():
+            label = f"seen by a robot: height is the share of {24 * 60 // MARKS} min"
+            yield Chip("seen", "#dfe1e4", label)
 
     def _footer(self) -> None:
-        for number, words in enumerate(reversed(self.note_lines)):
-            self.page.write(EDGE, 0.2 + number * LINE_IN, words, NOTE)
-
-    # Numbers
+        for number, line in enumerate(reversed(self.note_lines)):
+            self.page.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
 
     def _metric(self, kind: str) -> Mapping[str, Any]:
         """Return the result of the first metric of a type."""
@@ -345,30 +341,30 @@ class _Picture:
         return f"{metres / 1000:.1f} km a day" if metres >= 1000 else f"{metres:.0f} m a day"
 
 
-def _observations(run: Run, users: list[str]) -> Seen:
+def _observations(run: Run, users: list[str]) -> Observations:
     """Return the observations of some users."""
     if "observations" not in run.tables:
         none = np.zeros(0, np.int64)
-        return Seen(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
+        return Observations(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
     table = run.tables["observations"]
     robot, user = (
         np.array([*names, ""])[code]
         for code, names in map(categories, (table["robot"], table["user"]))
     )
-    mine = np.isin(user, users)
+    rows = np.isin(user, users)
     xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
-    return Seen(table["step"].to_numpy()[mine], robot[mine], user[mine], xy[mine])
+    return Observations(table["step"].to_numpy()[rows], robot[rows], user[rows], xy[rows])
 
 
-def _told_together(traces: list[Trace]) -> Iterator[str]:
-    """Yield what isn't shown as it was, each remark once, with the bodies that it is about."""
+def _notes_by_bodies(traces: list[BodyTrace]) -> Iterator[str]:
+    """Yield each note of traces once, with the names of the bodies that have it."""
     for note in dict.fromkeys(trace.note for trace in traces if trace.note):
         names = ", ".join(trace.name for trace in traces if trace.note == note)
         yield f"{names}: {note}"
 
 
-def _date(when: datetime) -> str:
-    return f"{when:%a} {when.day} {when:%b %Y %H:%M}"
+def _date(time: datetime) -> str:
+    return f"{time:%a} {time.day} {time:%b %Y %H:%M}"
 
 
 def _length(us: int) -> str:

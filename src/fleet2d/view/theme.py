@@ -1,7 +1,7 @@
-"""Light and dark: pictures are drawn for a light ground, and turned over for a dark one.
+"""Light and dark themes: pictures are drawn for a light background, then converted to a dark one.
 
-No drawing knows of it. What is pale becomes dark and the other way round, hues stay; strong
-colours, which stand for somebody or for an alarm, only become brighter.
+Drawing code needn't know the theme. Pale colours become dark and dark ones pale, with the same hue;
+strong colours, which identify bodies and alarms, only become brighter.
 """
 
 from collections.abc import Iterator
@@ -25,11 +25,11 @@ from fleet2d.errors import InputError
 Theme = Literal["light", "dark"]
 THEMES: tuple[Theme, ...] = get_args(Theme)
 SCALE = "scale"
-"""Label of an image whose colours stand for numbers: they are the same on any ground."""
+"""Label of an image whose colours stand for numbers: they are the same in both themes."""
 
-# Lightness of Oklab: white becomes the page's dark ground, the darkest ink nearly white.
-GROUND, INK, TURN = 0.207, 0.93, 0.31
-# Chroma from which a colour counts as strong: its lightness is lifted, and keeps its order.
+# Lightness of Oklab: white becomes the dark background of the page, the darkest ink almost white.
+BACKGROUND, INK, DARKEST = 0.207, 0.93, 0.31
+# Colours between these chromas are blended: below they are inverted, above they become brighter.
 PALE, STRONG = 0.118, 0.14
 LEAST, LIFT = 0.44, 0.5
 
@@ -66,7 +66,7 @@ def check_theme(name: str) -> Theme:
 
 @contextmanager
 def themed(theme: Theme) -> Iterator[None]:
-    """Have pictures written in a theme."""
+    """Draw pictures in a theme within a block."""
     token = _theme.set(theme)
     try:
         yield
@@ -74,25 +74,25 @@ def themed(theme: Theme) -> Iterator[None]:
         _theme.reset(token)
 
 
-def finished(figure: Figure) -> Figure:
-    """Turn a figure that is drawn over, once, if the theme of the moment is dark."""
+def apply_theme(figure: Figure) -> Figure:
+    """Convert a finished figure to the current theme, in place; return it. Call it only once."""
     if _theme.get() == "dark":
         darken(figure)
     return figure
 
 
 def darken(figure: Figure) -> None:
-    """Turn the colours of a figure over, in place."""
-    figure.draw_without_rendering()  # ticks and their labels exist only now
+    """Convert the colours of a figure to the dark theme, in place."""
+    figure.draw_without_rendering()  # creates ticks and their labels
     for artist in figure.findobj():
         _darken_artist(artist)
 
 
 def dark_colors(colors: ArrayLike) -> NDArray[np.float64]:
-    """Return colours for a dark ground, (n, 4) in 0 to 1.
+    """Return colours of the dark theme: RGBA in 0 to 1, float64 (n, 4).
 
     Args:
-        colors: What matplotlib takes for one colour or several.
+        colors: One colour or several, in any form of matplotlib.
 
     Example:
         >>> from matplotlib.colors import to_hex
@@ -100,18 +100,18 @@ def dark_colors(colors: ArrayLike) -> NDArray[np.float64]:
         ['#181818', '#e2e7f1']
     """
     rgba: NDArray[np.float64] = to_rgba_array(colors).copy()
-    rgba[:, :3] = _turned(rgba[:, :3])
+    rgba[:, :3] = _dark(rgba[:, :3])
     return rgba
 
 
-def _turned(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return colours (n, 3) with their lightness turned over."""
+def _dark(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return colours of the dark theme: RGB, float64 (n, 3)."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     lab = np.cbrt(linear @ _CONES.T) @ _LAB.T
     light, chroma = lab[:, 0], np.hypot(lab[:, 1], lab[:, 2])
-    over = np.clip(GROUND + (1 - light) * (INK - GROUND) / (1 - TURN), 0, 1)
+    inverted = np.clip(BACKGROUND + (1 - light) * (INK - BACKGROUND) / (1 - DARKEST), 0, 1)
     strong = np.clip((chroma - PALE) / (STRONG - PALE), 0, 1)
-    lab[:, 0] = (1 - strong) * over + strong * (LEAST + LIFT * light)
+    lab[:, 0] = (1 - strong) * inverted + strong * (LEAST + LIFT * light)
     linear = np.clip(np.linalg.solve(_CONES, np.linalg.solve(_LAB, lab.T) ** 3).T, 0, 1)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
@@ -119,47 +119,47 @@ def _turned(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
 def _darken_artist(artist: Artist) -> None:
     if isinstance(artist, Patch):
         face, edge = artist.get_facecolor(), artist.get_edgecolor()
-        artist.set_facecolor(_turned_or_none(face))
-        artist.set_edgecolor(_turned_or_none(edge))
+        artist.set_facecolor(_dark_or_transparent(face))
+        artist.set_edgecolor(_dark_or_transparent(edge))
     elif isinstance(artist, Line2D):
-        artist.set_color(_turned_or_none(artist.get_color()))
-        artist.set_markerfacecolor(_turned_or_none(artist.get_markerfacecolor()))
-        artist.set_markeredgecolor(_turned_or_none(artist.get_markeredgecolor()))
+        artist.set_color(_dark_or_transparent(artist.get_color()))
+        artist.set_markerfacecolor(_dark_or_transparent(artist.get_markerfacecolor()))
+        artist.set_markeredgecolor(_dark_or_transparent(artist.get_markeredgecolor()))
     elif isinstance(artist, Text):
-        artist.set_color(_turned_or_none(artist.get_color()))
+        artist.set_color(_dark_or_transparent(artist.get_color()))
         if (box := artist.get_bbox_patch()) is not None:
             _darken_artist(box)
         for effect in artist.get_path_effects() or ():
-            _darken_rim(effect)
+            _darken_outline(effect)
     elif isinstance(artist, Collection):
         _darken_collection(artist)
     elif isinstance(artist, AxesImage):
         _darken_image(artist)
 
 
-def _turned_or_none(color: Any) -> Any:
-    """Return a colour turned over; one that is not drawn stays."""
+def _dark_or_transparent(color: Any) -> Any:
+    """Return a colour of the dark theme; a transparent colour stays as it is."""
     colors = dark_colors(color)
     return tuple(colors[0].tolist()) if len(colors) and colors[0, 3] else color
 
 
-def _darken_rim(effect: Any) -> None:
-    """Turn the colour over of a rim around words."""
+def _darken_outline(effect: Any) -> None:
+    """Convert the colour of an outline around text."""
     style = getattr(effect, "_gc", {})
     if "foreground" in style:
-        style["foreground"] = _turned_or_none(style["foreground"])
+        style["foreground"] = _dark_or_transparent(style["foreground"])
 
 
-def _darken_collection(lines: Collection) -> None:
-    if lines.get_array() is not None:  # its colours stand for numbers
+def _darken_collection(artist: Collection) -> None:
+    if artist.get_array() is not None:  # its colours stand for numbers
         return
-    for get, put in (
-        (lines.get_facecolor, lines.set_facecolor),
-        (lines.get_edgecolor, lines.set_edgecolor),
+    for get_colors, set_colors in (
+        (artist.get_facecolor, artist.set_facecolor),
+        (artist.get_edgecolor, artist.set_edgecolor),
     ):
-        colors = np.asarray(get())
+        colors = np.asarray(get_colors())
         if len(colors):
-            put(dark_colors(colors))
+            set_colors(dark_colors(colors))
 
 
 def _darken_image(image: AxesImage) -> None:
@@ -169,6 +169,6 @@ def _darken_image(image: AxesImage) -> None:
     flat = pixels.reshape(-1, pixels.shape[2]).astype(np.float64)
     if pixels.dtype == np.uint8:
         flat /= 255
-    kinds, which = np.unique(flat[:, :3], axis=0, return_inverse=True)
-    flat[:, :3] = _turned(kinds)[which.ravel()]
+    colors, color_of_pixel = np.unique(flat[:, :3], axis=0, return_inverse=True)
+    flat[:, :3] = _dark(colors)[color_of_pixel.ravel()]
     image.set_data(flat.reshape(pixels.shape))

@@ -1,4 +1,4 @@
-"""What a stored run says of one body, ready to be drawn: where it was, and the ways it went."""
+"""The samples of a body in a stored run, ready for drawing: positions, rooms and paths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 
-SAMPLES = 40_000  # a short run is sampled more often than once a minute, up to about so many times
+SAMPLES = 40_000  # of short runs; longer runs have a sample a minute
 SAMPLE_US = 60_000_000
-# A random walk has a leg per step: a whole one is a scribble that takes long to draw.
+# A random walk has a leg for each step: all of them would be slow to draw, and no legible picture.
 LEGS = 1_500
 WALKED_STEPS = 4_000_000
-# Positions farther apart in time than this are not joined by a line.
+# Positions with a longer time between them are not connected by a line.
 JOINED_US = 5_000_000
 
 F64 = NDArray[np.float64]
@@ -29,20 +29,20 @@ I64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Trace:
-    """One body over a run; the arrays of samples are of one length.
+class BodyTrace:
+    """The samples of one body over a run; their arrays have the same length.
 
     Attributes:
         name: Its name in the scenario.
-        color: The colour to draw it in.
+        color: Its colour.
         robot: Whether it is a robot.
-        every_us: Time between two samples [us].
-        step: Steps of the samples, int64.
-        xy: Where it was, float64 (n, 2) [m].
-        heading: float64 [rad].
-        room: Index of the room, -1 while away, int16.
-        legs: Straight pieces that it walked, float64 (m, 2, 2) [m], none twice.
-        note: What is not shown as it was; "" if all is.
+        every_us: The time between two samples [us].
+        step: The steps of the samples, int64 (n,).
+        xy: The positions, float64 (n, 2) [m].
+        heading: The headings, float64 (n,) [rad].
+        room: The index of the room, -1 while away, int16 (n,).
+        legs: Straight pieces of its paths without duplicates, float64 (m, 2, 2) [m].
+        note: What the trace doesn't show exactly; empty if nothing.
     """
 
     name: str
@@ -57,25 +57,24 @@ class Trace:
     note: str = ""
 
 
-def trace_of(run: Run, plan: FloorPlan, name: str, number: int, *, robot: bool) -> Trace | None:
-    """Return what is stored of a body, None if nothing is.
+def trace_of(run: Run, plan: FloorPlan, name: str, number: int, *, robot: bool) -> BodyTrace | None:
+    """Return the trace of a body, None if nothing is stored of it.
 
     Args:
         run: The run.
         plan: Its home.
         name: The body.
-        number: Which of the users or robots it is, for its colour.
+        number: Its number among the users or robots, for its colour.
         robot: Whether it is a robot.
     """
     color = _color(run, name, number, robot=robot)
+    reason = "no key frames were stored"
     if "key_frames" in run.tables:
         try:
-            return _rebuilt(run, plan, name, color, robot=robot)
+            return _from_key_frames(run, plan, name, color, robot=robot)
         except ArtifactError as error:
-            trace = _sampled(run, plan, name, color, str(error), robot=robot)
-    else:
-        trace = _sampled(run, plan, name, color, "no key frames were stored", robot=robot)
-    return trace
+            reason = str(error)
+    return _from_trajectories(run, plan, name, color, reason, robot=robot)
 
 
 def _color(run: Run, name: str, number: int, *, robot: bool) -> str:
@@ -86,14 +85,16 @@ def _color(run: Run, name: str, number: int, *, robot: bool) -> str:
     return body_color(number, robot=robot)
 
 
-def _rebuilt(run: Run, plan: FloorPlan, name: str, color: str, *, robot: bool) -> Trace:
+def _from_key_frames(run: Run, plan: FloorPlan, name: str, color: str, *, robot: bool) -> BodyTrace:
     step_us, steps = run.manifest["step_us"], run.manifest["steps"]
     stride = max(1, min(SAMPLE_US, steps * step_us // SAMPLES) // step_us)
     every_us = stride * step_us
     path = rebuild_path(run, plan, name, timedelta(microseconds=every_us))
     xy = np.stack([path.x, path.y], axis=1)
     legs, note = _legs_of(run, plan, name)
-    return Trace(name, color, robot, every_us, path.step, xy, path.heading, path.room, legs, note)
+    return BodyTrace(
+        name, color, robot, every_us, path.step, xy, path.heading, path.room, legs, note
+    )
 
 
 def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
@@ -104,25 +105,25 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
         if steps > WALKED_STEPS or step_us > JOINED_US:
             return _no_legs(), ""
         path = rebuild_path(run, plan, name, timedelta(microseconds=step_us))
-        legs = _joined(np.stack([path.x, path.y], axis=1), path.away)
+        legs = _legs_between(np.stack([path.x, path.y], axis=1), path.away)
         if len(legs) <= LEGS:
             return legs, ""
         moving = np.flatnonzero(np.diff(path.x).astype(bool) | np.diff(path.y).astype(bool))
         minutes = max(1, round(int(moving[LEGS]) * step_us / 6e7))
         return legs[:LEGS], f"only the ways of the first {minutes} min are drawn"
-    # Where a leg was broken off, the next plan begins: the end that was only planned is left out.
+    # The end of a leg that was interrupted is only planned, and left out.
     reached = keys["kind"] != "planned"
     xy = np.stack([keys["x"][reached], keys["y"][reached]], axis=1)
-    legs = _joined(xy, keys["away"][reached])
-    # A patrol goes the same ways for weeks: each is drawn once, to the centimetre.
+    legs = _legs_between(xy, keys["away"][reached])
+    # A patrol repeats the same paths for weeks: equal legs, to the centimetre, are drawn once.
     _, first = np.unique(np.rint(legs.reshape(-1, 4) * 100), axis=0, return_index=True)
     return legs[np.sort(first)], ""
 
 
-def _sampled(
-    run: Run, plan: FloorPlan, name: str, color: str, why: str, *, robot: bool
-) -> Trace | None:
-    """Return what the trajectories table says, sampled as it is."""
+def _from_trajectories(
+    run: Run, plan: FloorPlan, name: str, color: str, reason: str, *, robot: bool
+) -> BodyTrace | None:
+    """Return the samples of the table of trajectories; `reason` is for the note."""
     if "trajectories" not in run.tables:
         return None
     rows = _rows(run, "trajectories", name, ("step", "x", "y", "heading", "away"), "room")
@@ -134,32 +135,31 @@ def _sampled(
     xy = np.stack([rows["x"], rows["y"]], axis=1)
     index = {room.name: room.index for room in plan.rooms}
     room = np.array([index.get(word, -1) for word in rows["room"].tolist()], np.int16)
-    legs = _joined(xy, rows["away"])[:LEGS] if every_us <= JOINED_US else _no_legs()
-    note = f"{why}: positions every {_length(every_us)}"
-    shown = (rows["step"], xy, rows["heading"], room)
-    return Trace(name, color, robot, every_us, *shown, legs, note)
+    legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= JOINED_US else _no_legs()
+    note = f"{reason}: positions every {_length(every_us)}"
+    samples = (rows["step"], xy, rows["heading"], room)
+    return BodyTrace(name, color, robot, every_us, *samples, legs, note)
 
 
 def _rows(
-    run: Run, table: str, name: str, columns: Sequence[str], words: str
+    run: Run, table: str, name: str, columns: Sequence[str], category: str
 ) -> dict[str, NDArray[Any]]:
-    """Return columns of a body's rows of a table; `words` is a column of categories."""
-    whole = run.tables[table]
-    code, names = categories(whole["entity"])
-    mine = code == names.index(name) if name in names else np.zeros(len(code), np.bool_)
-    rows = {column: whole[column].to_numpy()[mine] for column in columns}
-    code, names = categories(whole[words])
-    rows[words] = np.array([*names, ""])[code[mine]]
+    """Return columns of the rows of a body; `category` is a column of texts."""
+    content = run.tables[table]
+    code, names = categories(content["entity"])
+    of_body = code == names.index(name) if name in names else np.zeros(len(code), np.bool_)
+    rows = {column: content[column].to_numpy()[of_body] for column in columns}
+    code, names = categories(content[category])
+    rows[category] = np.array([*names, ""])[code[of_body]]
     return rows
 
 
-def _joined(xy: F64, away: NDArray[np.bool_]) -> F64:
-    """Return the moves from position to position, without those across an absence."""
+def _legs_between(xy: F64, away: NDArray[np.bool_]) -> F64:
+    """Return the legs between positions, without those from and to an absence: (n, 2, 2) [m]."""
     legs = np.stack([xy[:-1], xy[1:]], axis=1)
-    gone = away.astype(bool)
-    walked = (legs[:, 0] != legs[:, 1]).any(axis=1) & ~gone[:-1] & ~gone[1:]
-    found: F64 = legs[walked]
-    return found
+    home = ~away.astype(bool)
+    moves: F64 = legs[(legs[:, 0] != legs[:, 1]).any(axis=1) & home[:-1] & home[1:]]
+    return moves
 
 
 def _no_legs() -> F64:

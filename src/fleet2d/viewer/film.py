@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import drawing_style, figure_size
-from fleet2d.view.theme import finished
+from fleet2d.view.theme import apply_theme
 from fleet2d.viewer.stage import Stage
 from fleet2d.viewer.stamps import TextStamps
 
@@ -53,7 +53,7 @@ def write_film(
         end: The step before which to end.
         speed: Simulated time over the time of the film.
         height: The height of the film [pixels].
-        on_progress: Called now and then with the number of finished frames, and of all frames.
+        on_progress: Called now and then with the number of apply_theme frames, and of all frames.
 
     Raises:
         InputError: The file name has another suffix, a number is out of range, or the file can't be
@@ -68,7 +68,7 @@ def write_film(
     with drawing_style():
         figure = _figure(run, height)
         stage = Stage(run, first, end, figure=figure, stride=stride)
-        finished(figure)
+        apply_theme(figure)
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
         frames = _frames(stage, first, moments, on_progress)

@@ -18,7 +18,7 @@ NOTEBOOK_DPI = 100
 def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") -> Any:
     """Draw a run, or a moment of it; see `Run.draw`."""
     from fleet2d.view.run import run_figure
-    from fleet2d.view.theme import check_theme, finished, themed
+    from fleet2d.view.theme import apply_theme, check_theme, themed
     from fleet2d.viewer.pictures import moment_figure, moment_on_axes
 
     last = run.manifest["steps"] - 1
@@ -27,7 +27,7 @@ def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") ->
         moment_on_axes(run, min(step, last), axes)
         return axes
     with themed(check_theme(theme)):
-        return finished(run_figure(run) if at is None else moment_figure(run, step))
+        return apply_theme(run_figure(run) if at is None else moment_figure(run, step))
 
 
 def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
@@ -35,7 +35,7 @@ def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
     from matplotlib.figure import Figure
 
     from fleet2d.view.floorplan import drawing_style, figure_size, floorplan_axes
-    from fleet2d.view.theme import check_theme, finished, themed
+    from fleet2d.view.theme import apply_theme, check_theme, themed
 
     if axes is not None:
         floorplan_axes(plan, axes, title=False)
@@ -43,7 +43,7 @@ def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
     with drawing_style(), themed(check_theme(theme)):
         figure = Figure(figsize=figure_size(plan))
         floorplan_axes(plan, figure.add_axes((0, 0, 1, 1)))
-        return finished(figure)
+        return apply_theme(figure)
 
 
 def plan_png(plan: FloorPlan) -> bytes | None:
