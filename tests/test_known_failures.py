@@ -24,7 +24,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander
 from fleet2d.entities.robots.patrol import Patrol
-from fleet2d.entities.users.schedule import Day, Item, Schedule
+from fleet2d.entities.users.schedule import Agenda, Item, Schedule
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.scenario.model import SimulationSettings
 from fleet2d.sight.camera import Camera
@@ -298,7 +298,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         },
     },
     (Item, ITEM): {"at": "07:02", "place": "bathroom", "away": True, "dwell": "3 min", "activity": "bake"},
-    (Day, "users.ana.behaviors.0.days.0"): {"on": "weekend", "items": [{"at": "06:00", "place": "kitchen"}]},
+    (Agenda, "users.ana.behaviors.0.days.0"): {"on": "weekend", "items": [{"at": "06:00", "place": "kitchen"}]},
     (Schedule, "users.ana.behaviors.0"): {
         "days": [{"items": [{"at": "06:00", "away": True}]}], "rest": "kitchen",
         "when": "23:00-23:30",

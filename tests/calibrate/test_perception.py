@@ -18,7 +18,7 @@ from fleet2d.scenario.model import load_scenario
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.curve import Curve
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import Scene, error_tables
+from fleet2d.sight.tables import TableContext, error_tables
 
 
 def test_factors_without_effect_are_left_out_and_named() -> None:
@@ -97,7 +97,7 @@ def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1(
         assert 0.99 < right_share + mistaken <= 1 + 1e-12
     error_tables(
         [Camera().lens(1280, 10**6)], [Perception.model_validate(calibration.section())],
-        Scene(["ana", "ben"], [256.0] * 2, LATTICE, 10**6, "robots.r"),
+        TableContext(["ana", "ben"], [256.0] * 2, LATTICE, 10**6, "robots.r"),
     )  # fmt: skip
     assert any("ana, ben" in note for note in calibration.notes)
 
