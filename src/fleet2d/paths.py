@@ -1,5 +1,6 @@
 """Text and paths from a scenario, with the folder of the file that they are written in."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -34,26 +35,30 @@ def folder_of(text: object) -> Path:
     return text.folder if isinstance(text, Text) else Path.cwd()
 
 
-def _resolve_path(value: object) -> Path:
+def _existing(value: object, *, is_folder_allowed: bool = False) -> Path:
+    kind = "file or folder" if is_folder_allowed else "file"
     if not isinstance(value, str | Path) or not str(value):
-        raise problem(f"found {shown(value)}; the path of a file is wanted")
+        raise problem(f"found {shown(value)}; the path of a {kind} is wanted")
     path = (folder_of(value) / Path(value).expanduser()).resolve()
-    if not path.is_file():
-        reason = "a folder, not a file" if path.is_dir() else "no such file"
+    if not (path.is_file() or (is_folder_allowed and path.is_dir())):
+        reason = "a folder, not a file" if path.is_dir() else f"no such {kind}"
         raise problem(f"{reason}: {path}")
     return path
 
 
-InputPath = Annotated[
-    Path,
-    BeforeValidator(_resolve_path),
-    WithJsonSchema(
-        {
-            "type": "string",
-            "description": "a file's path, relative to the file it is written in",
-            "x-quantity": "path",
-        }
-    ),
-]
+_SCHEMA = WithJsonSchema(
+    {
+        "type": "string",
+        "description": "path, relative to the file it is written in",
+        "x-quantity": "path",
+    }
+)
+
+InputPath = Annotated[Path, BeforeValidator(_existing), _SCHEMA]
 """An existing file. Relative paths start from the folder of the YAML they are written in, on the
 command line and in Python from the current one; dumped as absolute."""
+
+InputFileOrFolder = Annotated[
+    Path, BeforeValidator(partial(_existing, is_folder_allowed=True)), _SCHEMA
+]
+"""An existing file or folder, likewise."""

@@ -6,15 +6,15 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.objects.occupancy_sensor import room_of
-from fleet2d.entities.objects.sensor import I64, Sensor, SensorView, first_cause
+from fleet2d.entities.objects.furniture_sensor import FurnitureSensor
+from fleet2d.entities.objects.sensor import I64, SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
-from fleet2d.units import Duration, Length, micros
+from fleet2d.units import Duration, Length
 
 
 @register("object", "smart_plug")
-class SmartPlug(Sensor):
+class SmartPlug(FurnitureSensor):
     """On while a person stays at a place from which a device is used: a stove, a desk, a TV.
 
     Passing by doesn't switch it on: the person has to stay on the spot for two steps.
@@ -34,14 +34,6 @@ class SmartPlug(Sensor):
             raise PlacementError(
                 f"{self.of} has no place to use it from: a plug can't tell its use"
             )
-
-    def place(self, home: Home) -> str:
-        """Return the room that the object stands in."""
-        return room_of(home, self.of)
-
-    def hold_us(self) -> int:
-        """Return how long it stays on [us]."""
-        return micros(self.hold)
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which a person stays at one of the object's places."""

@@ -4,8 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from fleet2d.entities.behavior import Situation
+from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.errors import ComponentError
 
 ANYONE = "anyone"
@@ -62,3 +63,27 @@ def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:
             f" RoomDistribution over the {rooms} rooms, is wanted"
         )
     return RoomBelief(np.asarray(share, np.float64), float(away))
+
+
+class BeliefBehavior(Behavior):
+    """Base of behaviors that depend on where a person is believed to be."""
+
+    user: str = Field(
+        default=ANYONE, min_length=1, description="the user to look for or to be near, or anyone"
+    )
+    source: str | None = Field(
+        default=None,
+        description="the algorithm that says where people are; left out: rooms count by their size",
+    )
+
+    def about(self) -> tuple[str, ...]:
+        """Return the user that it depends on, if it is one by name."""
+        return () if self.user == ANYONE else (self.user,)
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithm that it reads."""
+        return () if self.source is None else (self.source,)
+
+    def belief(self, now: Situation, user: str) -> RoomBelief:
+        """Return the probabilities of where a user is now, by its source."""
+        return room_belief(now, self.source, user)

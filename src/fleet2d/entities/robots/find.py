@@ -9,11 +9,11 @@ from pydantic import Field, model_validator
 
 from fleet2d.clock import midnight_of
 from fleet2d.component import register
-from fleet2d.entities.behavior import Behavior, Command, Situation
+from fleet2d.entities.behavior import Command, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed
 from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_camera, face, spot_back
-from fleet2d.entities.robots.belief import ANYONE, room_belief
+from fleet2d.entities.robots.belief import ANYONE, BeliefBehavior
 from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import PlacementError
 from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
@@ -53,7 +53,7 @@ class SearchState(NamedTuple):
 
 
 @register("behavior", "find")
-class Find(Behavior):
+class Find(BeliefBehavior):
     """Look for a person at given times or on command, until found, given up or believed out.
 
     A site is a room, with enough viewpoints that little of it stays out of view. The `policy`
@@ -72,11 +72,6 @@ class Find(Behavior):
     )
     answers: ClassVar[frozenset[str]] = frozenset({"find"})
 
-    user: str = Field(default=ANYONE, min_length=1, description="the person to find, or anyone")
-    source: str | None = Field(
-        default=None,
-        description="the algorithm that says where people are; left out: rooms count by their size",
-    )
     policy: Policy = Field(default="receding", description="in which order it looks at the rooms")
     at: tuple[TimeOfDay, ...] = Field(
         default=(),
@@ -124,10 +119,6 @@ class Find(Behavior):
             raise problem("it begins by 'at' (times of day) or 'every' (a duration), not by both")
         return self
 
-    def about(self) -> tuple[str, ...]:
-        """Return the person that it looks for."""
-        return () if self.user == ANYONE else (self.user,)
-
     def takes(self, command: Command) -> bool:
         """Tell whether it looks for the person of a command."""
         return super().takes(command) and self.user in (ANYONE, command.target)
@@ -147,10 +138,6 @@ class Find(Behavior):
         self.due: datetime | None = self._next(
             start if self.every else start - timedelta(microseconds=1), start
         )
-
-    def reads(self) -> tuple[str, ...]:
-        """Return the algorithm that it reads."""
-        return () if self.source is None else (self.source,)
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when the next search begins."""
@@ -261,7 +248,7 @@ class Find(Behavior):
     def _prior(self, now: Situation) -> tuple[NDArray[np.float64], float]:
         """Return the probability of each site, and that of being out, disregarding all looks."""
         assert self.search is not None
-        belief = room_belief(now, self.source, self.search.user)
+        belief = self.belief(now, self.search.user)
         sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
         shares = belief.share[self.sites.rooms]
         total = sum(shares.tolist())

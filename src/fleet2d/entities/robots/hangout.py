@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Situation
 from fleet2d.entities.hours import Hours, holds
 from fleet2d.entities.kinds import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import face
-from fleet2d.entities.robots.belief import ANYONE, room_belief
+from fleet2d.entities.robots.belief import BeliefBehavior
 from fleet2d.entities.robots.places import HangoutPlaces, Nearness
 from fleet2d.entities.robots.viewpoints import Viewpoints, viewpoints_of
 from fleet2d.errors import PlacementError
@@ -30,7 +30,7 @@ MOST_VIEWS = 4
 
 
 @register("behavior", "hangout")
-class Hangout(Behavior):
+class Hangout(BeliefBehavior):
     """Stand near where people likely are, out of their way.
 
     Every `period` it rates the places on a grid of 0.5 m by
@@ -53,11 +53,6 @@ class Hangout(Behavior):
 
     records: ClassVar[frozenset[str]] = frozenset({"explores", "relocates"})
 
-    source: str | None = Field(
-        default=None,
-        description="the algorithm that says where people are; left out: rooms count by their size",
-    )
-    user: str = Field(default=ANYONE, min_length=1, description="the user to be near, or anyone")
     period: PositiveDuration = Field(
         default=timedelta(minutes=30), description="how often it decides where to stand"
     )
@@ -108,14 +103,6 @@ class Hangout(Behavior):
         self.decides_at = actor.clock.start
         self.is_blocked = False  # a person is on its place, or in front of it
 
-    def reads(self) -> tuple[str, ...]:
-        """Return the algorithm that it reads."""
-        return () if self.source is None else (self.source,)
-
-    def about(self) -> tuple[str, ...]:
-        """Return the user that it stays near."""
-        return () if self.user == ANYONE else (self.user,)
-
     def decide(self, now: Situation) -> Plan:
         """Stay, or go to a better place; go back to its place after another behavior's turn."""
         plan, quiet_until = now.plan(), holds(self.quiet, now.time)
@@ -150,7 +137,7 @@ class Hangout(Behavior):
 
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until the next period."""
-        belief = room_belief(now, self.source, self.user)
+        belief = self.belief(now, self.user)
         scores = self._scores(now, belief.joint)
         best = int(np.argmax(scores))
         if self.place is None or scores[best] > scores[self.place] + self.hysteresis:

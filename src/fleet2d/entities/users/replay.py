@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
@@ -18,8 +18,7 @@ from fleet2d.logs.log import DAY_US, ActivityLog, LogError, PositionLog
 from fleet2d.logs.read import Layout, read_log
 from fleet2d.logs.rooms import map_rooms
 from fleet2d.logs.visits import LoggedVisit, VisitRule, visits_of
-from fleet2d.paths import folder_of
-from fleet2d.problems import problem, shown
+from fleet2d.paths import InputFileOrFolder
 from fleet2d.units import Duration, Length, PositiveDuration, Speed, micros
 
 if TYPE_CHECKING:
@@ -27,29 +26,6 @@ if TYPE_CHECKING:
 
 GAP_OF_ROOMS = timedelta(minutes=10)
 GAP_OF_FIXES = timedelta(minutes=1)
-
-
-def _resolve(value: object) -> Path:
-    if not isinstance(value, str | Path) or not str(value):
-        raise problem(f"found {shown(value)}; the path of a log is wanted")
-    path = (folder_of(value) / Path(value).expanduser()).resolve()
-    if not path.exists():
-        raise problem(f"no such file or folder: {path}")
-    return path
-
-
-LogPath = Annotated[
-    Path,
-    BeforeValidator(_resolve),
-    PlainSerializer(str, when_used="json"),
-    WithJsonSchema(
-        {
-            "type": "string",
-            "description": "path of a log, relative to the file it is written in",
-            "x-quantity": "path",
-        }
-    ),
-]
 
 
 def _rooms(value: object) -> object:
@@ -89,7 +65,7 @@ class Replay(Behavior):
 
     records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
 
-    path: LogPath = Field(description="the log, or the folder of a home's logs")
+    path: InputFileOrFolder = Field(description="the log, or the folder of a home's logs")
     format: Layout = Field(default="auto", description="its layout; auto looks")
     id: str | None = Field(default=None, description="the tag, where positions have several")
     columns: dict[str, str] = Field(
