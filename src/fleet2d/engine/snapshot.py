@@ -97,6 +97,9 @@ _NO_STATE = (
     "fleet2d.viewer",
 )
 
+# Objects that are written as a module and a name.
+_REFERENCES = (type, FunctionType, BuiltinFunctionType)
+
 MAGIC = b"fleet2d simulation"
 
 Constants = Mapping[str, object]
@@ -204,6 +207,7 @@ class _StateWriter(pickle.Pickler):
         if shared is None:
             self.dispatch_table = arrays.REDUCERS
         self._packages = {} if shared is not None else _packages_of(constants)
+        self._checked: set[int] = set()  # references to classes that are allowed, by id
 
     def persistent_id(self, obj: Any) -> object:
         name = self._names.get(id(obj))
@@ -215,8 +219,9 @@ class _StateWriter(pickle.Pickler):
                 return ("sha256",)
             obj = obj.copy()
         elif self._shared is None:
-            if isinstance(obj, type | FunctionType | BuiltinFunctionType):
+            if isinstance(obj, _REFERENCES) and id(obj) not in self._checked:
                 self._check_reference(obj)
+                self._checked.add(id(obj))
             return ("space", obj.key) if kind is Space else None
         elif kind not in _SHARED and not isinstance(obj, type):
             return None

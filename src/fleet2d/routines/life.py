@@ -11,7 +11,7 @@ from fleet2d.routines.recorded import draw_recorded, draw_source, in_free_rooms,
 from fleet2d.streams import Draws, stream_key
 
 # The number of days that are kept after they were drawn.
-CACHED_DAYS = 8
+CACHED_DAYS = 3
 
 
 class Life:
@@ -35,6 +35,10 @@ class Life:
         self._needs = stream_key(seed, path, "needs")
         self._cache: dict[int, Sequence[Doing]] = {}
 
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out the days, which are drawn again: they are most of the state of many people."""
+        return {**self.__dict__, "_cache": {}}
+
     def template(self, ordinal: int) -> DayPlan:
         """Return the plan of the template that a day is drawn from."""
         return self.persona.plans[self.persona.day(date.fromordinal(ordinal))]
@@ -54,7 +58,7 @@ class Life:
         """Return the doings of a day, from waking to the next waking [s since its midnight]."""
         if ordinal not in self._cache:
             if len(self._cache) >= CACHED_DAYS:
-                self._cache.clear()
+                del self._cache[next(iter(self._cache))]
             self._cache[ordinal] = self.draw_day(ordinal, self.template(ordinal))
         return self._cache[ordinal]
 
