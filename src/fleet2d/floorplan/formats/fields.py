@@ -20,7 +20,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.problems import Location, did_you_mean, problem
+from fleet2d.problems import Location, problem, suggest
 
 # No home is as large: a coordinate beyond this is not in metres.
 MAX_COORDINATE_M = 100_000.0
@@ -44,8 +44,7 @@ class FileModel(BaseModel):
             raise problem(f"is not an object with the keys {', '.join(fields)}")
         for key in content:
             if key not in fields:
-                hint = did_you_mean(key, fields)
-                raise problem(f"has an unknown key {key!r}{hint} Known: {', '.join(fields)}")
+                raise problem(f"has an unknown key {key!r}{suggest(key, fields, 'Known')}")
         for key, field in fields.items():
             if field.is_required() and key not in content:
                 raise problem(f"has no key {key!r}")

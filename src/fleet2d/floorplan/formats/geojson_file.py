@@ -21,7 +21,7 @@ from fleet2d.bounds import POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, clean_coordinate, shown_value
 from fleet2d.floorplan.rooms.vocabulary import room_type
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import suggest
 
 COLLECTION = "FeatureCollection"
 
@@ -157,9 +157,8 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
     kind = properties.get("kind")
     if kind is not None:
         if not isinstance(kind, str) or kind not in GEOMETRIES:
-            known = ", ".join(GEOMETRIES)
-            hint = did_you_mean(kind, GEOMETRIES)
-            raise FloorPlanError(f"{where}: unknown kind {shown_value(kind)}{hint} Known: {known}")
+            known = suggest(kind, GEOMETRIES, "Known")
+            raise FloorPlanError(f"{where}: unknown kind {shown_value(kind)}{known}")
         return kind, kind
     imdf = item.get("feature_type", properties.get("feature_type"))
     category = str(properties.get("category")).partition(".")[0]

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import Settings
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.problems import did_you_mean, problem_at
+from fleet2d.problems import problem_at, suggest
 from fleet2d.units import PositiveDuration
 
 LayerType = Literal[
@@ -189,10 +189,8 @@ class Layers(Mapping[str, Layer]):
                 if base in SEEN_LAYERS
                 else "add it by home.layers.add(), or in the scenario under floorplan.layers"
             )
-            known = ", ".join(self._layers) or "none"
             raise ComponentError(
-                f"there is no layer {name!r}{did_you_mean(name, self._layers)} There are: {known};"
-                f" {advice}"
+                f"there is no layer {name!r}{suggest(name, self._layers)}; {advice}"
             )
         return self._layers[name]
 

@@ -192,8 +192,8 @@ def label_rooms(
         merged.append(Region((), Polygon(), own_type=HALLWAY if is_hallway else None))
     room_of_cell, rooms = make_rooms(lattice, painted, merged)
     notes += [
-        f"{room.name} is a guess: no label covers its {room.area_m2:.1f} m2, from which one gets"
-        f" to {HALLWAY_ROOMS} rooms or more"
+        f"{room.name} is a guess: no label covers its {room.area_m2:.1f} m2, which lead to"
+        f" {HALLWAY_ROOMS} rooms or more"
         for room in rooms
         if room.type == HALLWAY and not room.labels
     ]

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from fleet2d.floorplan.synthetic.draws import Choices
-from fleet2d.floorplan.synthetic.geometry import Box, Wall
+from fleet2d.floorplan.synthetic.geometry import Wall
+from fleet2d.floorplan.synthetic.layout import RoomLayout
 from fleet2d.floorplan.synthetic.program import Brief
 
 JAMB = 2  # least distance of a door from the corner of a room [units]
@@ -95,30 +96,22 @@ class Access:
     cost: float
 
 
-def link_rooms(
-    briefs: Sequence[Brief], boxes: Sequence[Box], walls: Sequence[Wall], widths: Widths
-) -> Access | None:
+def link_rooms(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> Access | None:
     """Return the tree of links that joins all rooms at the least cost, or None if there is none.
 
     Prim's algorithm from the entryway, else the living room. Nobody has to pass through a private
     room, except to the bathroom or wardrobe that belongs to it.
     """
-    best = _best_links(briefs, boxes, walls, widths)
-    start = min(
-        range(len(briefs)),
-        key=lambda i: (
-            ("entryway", "living_room").index(briefs[i].kind)
-            if briefs[i].kind in ("entryway", "living_room")
-            else 9
-        ),
-    )
+    best = _best_links(layout, walls, widths)
+    kinds = [brief.kind for brief in layout.briefs]
+    start = kinds.index("entryway" if "entryway" in kinds else "living_room")
     reached, links, cost = {start}, [], 0.0
-    while len(reached) < len(briefs):
+    while len(reached) < len(kinds):
         candidates = [
             (price, pair, wall)
             for pair, (price, wall) in best.items()
             if (pair[0] in reached) != (pair[1] in reached)
-            and _passable(briefs, *(pair if pair[0] in reached else pair[::-1]))
+            and _passable(layout.briefs, *(pair if pair[0] in reached else pair[::-1]))
         ]
         if not candidates:
             return None
@@ -137,12 +130,13 @@ def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
 
 
 def _best_links(
-    briefs: Sequence[Brief], boxes: Sequence[Box], walls: Sequence[Wall], widths: Widths
+    layout: RoomLayout, walls: Sequence[Wall], widths: Widths
 ) -> dict[tuple[int, int], tuple[float, Wall]]:
     """Return the cost and the longest common wall of each pair of rooms that may be linked."""
+    briefs = layout.briefs
     best: dict[tuple[int, int], tuple[float, Wall]] = {}
     for wall in walls:
-        a, b = sorted((boxes[wall.first].room, boxes[wall.second].room))
+        a, b = _rooms(layout, wall)
         if a == b:
             continue
         price = _price(briefs, a, b)
@@ -163,12 +157,7 @@ def _price(briefs: Sequence[Brief], a: int, b: int) -> float | None:
 
 
 def add_loops(
-    access: Access,
-    briefs: Sequence[Brief],
-    boxes: Sequence[Box],
-    walls: Sequence[Wall],
-    widths: Widths,
-    choices: Choices,
+    access: Access, layout: RoomLayout, walls: Sequence[Wall], widths: Widths, choices: Choices
 ) -> list[Wall]:
     """Return the tree's links and a few more, since real homes have circular routes.
 
@@ -176,9 +165,9 @@ def add_loops(
     open: three would leave a post in the middle.
     """
     links = list(access.links)
-    open_pairs = {_rooms(boxes, wall) for wall in links}
-    for pair, (price, wall) in _best_links(briefs, boxes, walls, widths).items():
-        kinds = {briefs[pair[0]].kind, briefs[pair[1]].kind}
+    open_pairs = {_rooms(layout, wall) for wall in links}
+    for pair, (price, wall) in _best_links(layout, walls, widths).items():
+        kinds = {layout.briefs[room].kind for room in pair}
         percent = 0
         if kinds <= set(_SOCIAL):
             percent = 45 if not widths.open_plan else 0
@@ -192,27 +181,24 @@ def add_loops(
     return links
 
 
-def _rooms(boxes: Sequence[Box], wall: Wall) -> tuple[int, int]:
-    a, b = sorted((boxes[wall.first].room, boxes[wall.second].room))
+def _rooms(layout: RoomLayout, wall: Wall) -> tuple[int, int]:
+    """Return the rooms on the two sides of an inner wall, the lower first."""
+    a, b = sorted((layout.boxes[wall.first].room, layout.boxes[wall.second].room))
     return a, b
 
 
 def draw_gaps(
     links: Sequence[Wall],
-    briefs: Sequence[Brief],
-    boxes: Sequence[Box],
+    layout: RoomLayout,
     walls: Sequence[Wall],
     widths: Widths,
     choices: Choices,
 ) -> list[Gap]:
     """Draw the passages: openings between living spaces, elsewhere doors near a corner."""
-    gaps = [
-        Gap(wall, wall.low, wall.high, None)
-        for wall in walls
-        if boxes[wall.first].room == boxes[wall.second].room
-    ]
+    inside = [wall for wall in walls if len(set(_rooms(layout, wall))) == 1]
+    gaps = [Gap(wall, wall.low, wall.high, None) for wall in inside]
     for wall in links:
-        kinds = {briefs[room].kind for room in _rooms(boxes, wall)}
+        kinds = {layout.briefs[room].kind for room in _rooms(layout, wall)}
         opening = _opening(kinds, wall, widths, choices)
         if opening:
             gaps.append(Gap(wall, *opening, False))
@@ -235,16 +221,16 @@ def _opening(
             return wall.low, wall.high
         if choices.chance(30):
             return None
-        wide = min(choices.between(28, 56), wall.length - 8)
+        width = min(choices.between(28, 56), wall.length - 8)
     elif kinds <= {"hallway", "entryway"}:
-        wide = min(wall.length - 8, choices.between(24, 40))
+        width = min(wall.length - 8, choices.between(24, 40))
     elif kinds in ({"hallway", "living_room"}, {"hallway", "dining_room"}) and wall.length < 40:
         return (wall.low, wall.high) if choices.chance(60) else None
     elif kinds <= {"hallway", "entryway", *_SOCIAL} and choices.chance(60):
-        wide = min(wall.length - 8, choices.between(24, 40))
+        width = min(wall.length - 8, choices.between(24, 40))
     else:
         return None
-    if wide < widths.door:
+    if width < widths.door:
         return None
-    low = wall.low + (wall.length - wide) // 2
-    return low, low + wide
+    low = wall.low + (wall.length - width) // 2
+    return low, low + width

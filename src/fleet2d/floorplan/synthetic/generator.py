@@ -150,14 +150,14 @@ def _judge(
     if shape is None or boxes_overlap(layout.boxes):
         return None
     walls = inner_walls(layout.boxes)
-    access = link_rooms(layout.briefs, layout.boxes, walls, widths)
+    access = link_rooms(layout, walls, widths)
     if access is None or access.cost > WORST_ACCESS:
         return None
     outer = outer_walls(layout.boxes, walls)
     light = light_cost(layout, outer)
     if light is None:
         return None
-    front_wall = _front_wall(layout.briefs, layout.boxes, outer)
+    front_wall = _front_wall(layout, outer)
     if front_wall is None:
         return None
     corners = outline_corners(layout.boxes)
@@ -169,25 +169,22 @@ def _judge(
 
 def _finish(best: _Candidate, wishes: Wishes, choices: Choices) -> House | None:
     """Turn a layout and give it its doors; None where no front door fits."""
-    layout, walls = best.layout, best.walls
-    links = add_loops(best.access, layout.briefs, layout.boxes, walls, best.widths, choices)
-    boxes = turn_boxes(layout.boxes, choices.below(8))
+    links = add_loops(best.access, best.layout, best.walls, best.widths, choices)
+    layout = replace(best.layout, boxes=turn_boxes(best.layout.boxes, choices.below(8)))
     # The turned walls, for the same pairs of boxes.
-    inner = inner_walls(boxes)
+    inner = inner_walls(layout.boxes)
     pairs = {frozenset((wall.first, wall.second)) for wall in links}
     doors = [wall for wall in inner if frozenset((wall.first, wall.second)) in pairs]
-    gaps = draw_gaps(doors, layout.briefs, boxes, inner, best.widths, choices)
-    front_door = _front_door(layout.briefs, boxes, outer_walls(boxes, inner), choices)
+    gaps = draw_gaps(doors, layout, inner, best.widths, choices)
+    front_door = _front_door(layout, outer_walls(layout.boxes, inner), choices)
     if front_door is None:
         return None
-    return House(wishes, layout.briefs, boxes, gaps, front_door)
+    return House(wishes, layout.briefs, layout.boxes, gaps, front_door)
 
 
-def _front_door(
-    briefs: Sequence[Brief], boxes: Sequence[Box], outer: Sequence[Wall], choices: Choices
-) -> Gap | None:
+def _front_door(layout: RoomLayout, outer: Sequence[Wall], choices: Choices) -> Gap | None:
     """Return the front door, in the best wall for it, or None where there is none."""
-    best = _front_wall(briefs, boxes, outer)
+    best = _front_wall(layout, outer)
     if best is None:
         return None
     _, wall = best
@@ -196,20 +193,18 @@ def _front_door(
     return Gap(wall, low, low + FRONT_DOOR, True)
 
 
-def _front_wall(
-    briefs: Sequence[Brief], boxes: Sequence[Box], outer: Sequence[Wall]
-) -> tuple[int, Wall] | None:
+def _front_wall(layout: RoomLayout, outer: Sequence[Wall]) -> tuple[int, Wall] | None:
     """Return the best wall for the front door, and its rank (0 is the best)."""
     candidates = []
     for wall in outer:
-        kind = briefs[boxes[max(wall.first, wall.second)].room].kind
-        if kind in _FRONT and wall.length >= FRONT_DOOR + 4 and _approachable(wall, boxes):
+        kind = layout.briefs[layout.boxes[max(wall.first, wall.second)].room].kind
+        if kind in _FRONT and wall.length >= FRONT_DOOR + 4 and _approachable(wall, layout.boxes):
             candidates.append((_FRONT.index(kind), -min(wall.length, 60), wall))
     if not candidates:
         return None
     rank, _, wall = min(candidates)
-    entryway = any(brief.kind == "entryway" for brief in briefs)
-    return (rank if entryway else max(rank - 2, 0)), wall
+    has_entryway = any(brief.kind == "entryway" for brief in layout.briefs)
+    return (rank if has_entryway else max(rank - 2, 0)), wall
 
 
 def _approachable(wall: Wall, boxes: Sequence[Box]) -> bool:
