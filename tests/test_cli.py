@@ -234,8 +234,8 @@ def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components")
     assert 0 == code
     for kind in component.PACKAGES:
-        found = component.components(kind)
-        for name, cls in found.items():
+        result = component.components(kind)
+        for name, cls in result.items():
             assert f"{kind}: {name}" in out
             for field in cls.model_fields:
                 assert re.search(rf"^ +{field}:", out, re.MULTILINE), (name, field)

@@ -84,7 +84,7 @@ def test_class_variables_cannot_be_shadowed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "said"),
+    ("field", "message"),
     [
         ("user = 'mia'", "Guard.user has no type: write `user: str = \"mia\"` for configuration, "
                          "`user: ClassVar[str] = \"mia\"` for a constant"),
@@ -94,10 +94,10 @@ def test_class_variables_cannot_be_shadowed() -> None:
         ("to: object.__class__.__call__ = 3", "Guard has a field that can't be configuration: "),
     ],
 )  # fmt: skip
-def test_field_that_is_no_configuration_is_told_in_plain_words(field: str, said: str) -> None:
+def test_field_that_is_no_configuration_is_told_in_plain_words(field: str, message: str) -> None:
     with pytest.raises(TypeError) as caught:
         exec(f"class Guard(Lamp):\n    {field}", {"Lamp": Lamp})
-    assert str(caught.value).startswith(said)
+    assert str(caught.value).startswith(message)
     assert "BaseModel" not in str(caught.value)
 
 
@@ -151,9 +151,11 @@ def test_base_is_the_class_that_declares_the_kind() -> None:
 @pytest.mark.parametrize("name", ["meander", "schedule", "patrol"])
 def test_builtin_component_is_found_without_an_import(name: str) -> None:
     code = f"from fleet2d.component import lookup; print(lookup('behavior', {name!r}).type_name)"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
 
-    assert name == found.stdout.strip()
+    assert name == result.stdout.strip()
 
 
 OWN = """
@@ -216,7 +218,7 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "message"),
     [
         ("nowhere:Own", "no module named 'nowhere' in"),
         ("own:Missing", "own.py has no class 'Missing'. It has: Own"),
@@ -239,7 +241,7 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
     ],
 )
 def test_own_component_that_cannot_be_had_is_explained(
-    folders: tuple[Path, Path], name: str, said: str
+    folders: tuple[Path, Path], name: str, message: str
 ) -> None:
     (folders[0] / "broken.py").write_text("1 / 0")
     (folders[0] / "unparsable.py").write_text("class Own(")
@@ -255,7 +257,7 @@ def test_own_component_that_cannot_be_had_is_explained(
 
     with pytest.raises(ScenarioError) as caught:
         lookup("gadget", Text(name, folders[0]))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert "fleet2d_scenario" not in str(caught.value)
     assert str(folders[0]) not in sys.path
 

@@ -71,7 +71,7 @@ def test_places_are_lines(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (b"a: 1\nb: 2\na: 3", "home.yaml:3: the key 'a' is already in line 1"),
         (b"a: 1\nb: [1,\n", "home.yaml:3: not valid YAML: a value is missing, or a bracket is not closed"),
@@ -99,13 +99,13 @@ def test_places_are_lines(tmp_path: Path) -> None:
         (b"\x7fELF\x80\xff", "home.yaml is not a text file"),
     ],
 )  # fmt: skip
-def test_file_that_is_no_scenario_is_refused(tmp_path: Path, content: bytes, said: str) -> None:
+def test_file_that_is_no_scenario_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
     file = tmp_path / "home.yaml"
     file.write_bytes(content)
 
     with pytest.raises(ScenarioError) as caught:
         read_document(file, "home.yaml")
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_missing_file_names_the_nearest(tmp_path: Path) -> None:

@@ -64,14 +64,14 @@ def test_rewriting_moves_an_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "said"),
+    ("key", "message"),
     [
         ("sped", "unknown key 'sped': did you mean 'speed'? Allowed here: radius, speed"),
         (3, "unknown key 3. Allowed here: radius, speed"),
     ],
 )
-def test_unknown_key_names_the_known(key: object, said: str) -> None:
-    assert said == str(unknown_key(key, ["speed", "radius"]))
+def test_unknown_key_names_the_known(key: object, message: str) -> None:
+    assert message == str(unknown_key(key, ["speed", "radius"]))
 
 
 def test_nothing_near_is_not_guessed() -> None:

@@ -132,9 +132,9 @@ def test_it_never_drives_into_anybody_for_days_in_a_furnished_home() -> None:
     }
     stored = run(content)
     nearest = [own_approaches(stored, user) for user in ("ana", "ben")]
-    assert min(found.min() for found in nearest) >= 0.35
+    assert min(result.min() for result in nearest) >= 0.35
     # Nearer than it likes it comes only where it has waited, and there is no more room.
-    assert sum(int((found < KEPT - 0.01).sum()) for found in nearest) < 60
+    assert sum(int((result < KEPT - 0.01).sum()) for result in nearest) < 60
     rude = run({**content, "robots": {"astro": {"type": "patrol", "dwell": "1 min"}}})
     assert sum(int((own_approaches(rude, user) < 0.35).sum()) for user in ("ana", "ben")) > 10
 
@@ -175,9 +175,9 @@ def test_a_look_that_was_held_up_counts_as_one() -> None:
     still = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_around": False}
     content = polite(stands(3.0, 3.0), [find, still], "12 min", patience="3 s")
     content["users"]["ben"] = OUT
-    found = run(content)
-    assert "gives_way" in names(found)
-    assert {"kitchen_0", "bedroom_0", "bathroom_0"} <= visited(found)
+    result = run(content)
+    assert "gives_way" in names(result)
+    assert {"kitchen_0", "bedroom_0", "bathroom_0"} <= visited(result)
 
 
 def visited(stored: Any) -> set[str]:

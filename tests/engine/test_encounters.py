@@ -34,7 +34,7 @@ def simulation() -> Simulation:
 
 def twin(steps: list[Seen]) -> list[tuple[int, str]]:
     """Say what happens, step by step."""
-    found, near, coming, close, last = [], True, True, 0, float("inf")
+    result, near, coming, close, last = [], True, True, 0, float("inf")
     for k, step in enumerate(steps):
         gone = step.away or step.posture == LYING
         distance = float("inf") if gone else step.distance
@@ -44,29 +44,29 @@ def twin(steps: list[Seen]) -> list[tuple[int, str]]:
             coming = True
         close = close + 1 if distance <= 0.7 else 0
         if near and distance <= 2.5:
-            found.append((k, "robot_near"))
+            result.append((k, "robot_near"))
             near = False
         drives_up = step.moved and distance < last and step.posture == 0
         if coming and distance <= 0.9 and drives_up:
-            found.append((k, "robot_coming"))
+            result.append((k, "robot_coming"))
             coming = False
         if close == 3:
-            found.append((k, "robot_close"))
+            result.append((k, "robot_close"))
         last = distance
-    return found
+    return result
 
 
 @st.composite
 def meetings(draw: st.DrawFn) -> list[tuple[int, int, bool]]:
     """Distances [cm], postures, and whether she is away, of some steps in a row."""
     legs = draw(st.lists(st.tuples(st.integers(5, 390), st.integers(1, 6)), min_size=1, max_size=8))
-    found, at = [], 300
+    result, at = [], 300
     for goal, count in legs:
         posture = draw(st.sampled_from([0, 0, 0, SITTING, LYING]))
         away = draw(st.integers(0, 9)) == 0
-        found += [(at + (goal - at) * i // count, posture, away) for i in range(1, count + 1)]
+        result += [(at + (goal - at) * i // count, posture, away) for i in range(1, count + 1)]
         at = goal
-    return found
+    return result
 
 
 class Given(Bodies):
@@ -98,13 +98,13 @@ def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
     posture[0] = [posture for _, posture, _ in meeting]
     x, y = np.array([still[0], xs]), np.array([still[1], still[1]])
     bodies = Given(PoseBlock(x, y, zero, away, posture))
-    found, first, sizes = [], 0, iter(cuts)
+    result, first, sizes = [], 0, iter(cuts)
     while first < len(meeting):
         end = encounters.limit(bodies, min(first + next(sizes, 5), len(meeting)))
         assert first < end
         for row, event in encounters.interruptions(encounters.take(bodies, end)):
             assert 0 == row
-            found.append((end - 1, event.event))
+            result.append((end - 1, event.event))
         assert end == encounters.taken
         first = end
     moved = np.diff(xs, prepend=xs[0]) != 0
@@ -112,7 +112,7 @@ def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
         Seen(abs(user[0] - xs[k]) / UNITS, bool(moved[k]), posture, away)
         for k, (_, posture, away) in enumerate(meeting)
     ]
-    assert twin(steps) == found
+    assert twin(steps) == result
 
 
 _ACTORS: list[Any] = []

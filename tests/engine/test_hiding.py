@@ -41,8 +41,8 @@ def test_who_walks_through_the_view_hides_others_just_then() -> None:
     script = [10.0, [2.5, 2.8], 60.0]
     ben = {**WALK, "start": [2.5, 3.7], "start_heading_deg": -90, "script": script, "radius": 0.1}
     content = row_of_people(ben=ben)
-    found = seen(content)
-    gone = sorted({*range(40)} - {*found["ana"]})
+    result = seen(content)
+    gone = sorted({*range(40)} - {*result["ana"]})
 
     assert gone == [*range(gone[0], gone[-1] + 1)]
     assert 1 <= len(gone) <= 3
@@ -103,9 +103,9 @@ def test_run_past_bodies_is_the_same_by_every_exact_method(method: dict[str, Any
     content = crowd("20 min")
     expected = {**digests(run(content)), "run": ""}
 
-    found = run({**content, "sight": {"method": method, **HIDE["sight"]}})
+    result = run({**content, "sight": {"method": method, **HIDE["sight"]}})
 
-    assert expected == {**digests(found), "run": ""}
+    assert expected == {**digests(result), "run": ""}
     assert expected["observations"] != digests(run({**content, "sight": {}}))["observations"]
 
 

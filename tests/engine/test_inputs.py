@@ -33,8 +33,8 @@ def content(folder: Path, **sections: Any) -> dict[str, Any]:
 
 
 def test_a_model_within_an_algorithm_is_noted_with_its_weights(tmp_path: Path) -> None:
-    found = input_files(fleet2d.load_scenario(content(tmp_path)))
-    assert {flat_path(), tmp_path / "net.py", tmp_path / "weights.npy"} == set(found)
+    paths = input_files(fleet2d.load_scenario(content(tmp_path)))
+    assert {flat_path(), tmp_path / "net.py", tmp_path / "weights.npy"} == set(paths)
 
 
 def test_other_weights_are_said_to_have_changed(tmp_path: Path) -> None:

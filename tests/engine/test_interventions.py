@@ -153,12 +153,12 @@ def test_run_until_an_event_stops_right_after_the_first_one(max_span: int | None
     content = everything("30 min")
     content["simulation"]["max_span"] = max_span
     run = fleet2d.Simulation(content)
-    found = run.run_until(event="user_seen")
-    assert isinstance(found, Event)
-    assert run.step == found.step + 1
+    result = run.run_until(event="user_seen")
+    assert isinstance(result, Event)
+    assert run.step == result.step + 1
     events = fleet2d.run(everything("30 min")).pandas("events")
     first = events[events["event"] == "user_seen"].iloc[0]
-    assert (first["step"], first["entity"]) == (found.step, found.entity)
+    assert (first["step"], first["entity"]) == (result.step, result.entity)
 
 
 def test_waiting_for_an_event_changes_nothing_and_ends_at_its_timeout() -> None:

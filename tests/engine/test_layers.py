@@ -100,7 +100,7 @@ def by_brute_force(stored: Any, robot: str, camera: Mapping[str, Any]) -> NDArra
     near, far = (round(limit * plan.lattice.units_per_m) for limit in camera["range"])
     half = round(camera["angle_deg"] / 360 * 4096)
     known: dict[tuple[int, ...], Any] = {}
-    found = np.array([np.zeros(shape), np.full(shape, -1), np.full(shape, -1)], np.int64)
+    result = np.array([np.zeros(shape), np.full(shape, -1), np.full(shape, -1)], np.int64)
     xy = plan.lattice.to_lattice(np.stack([poses.x, poses.y], axis=1))
     headings = np.rint(poses.heading / (2 * np.pi) * 4096).astype(int) % 4096
     for step, (x, y, heading) in enumerate(zip(*xy.T.tolist(), headings.tolist(), strict=True)):
@@ -108,10 +108,10 @@ def by_brute_force(stored: Any, robot: str, camera: Mapping[str, Any]) -> NDArra
         if pose not in known:
             known[pose] = slow.cells_in_view(walls, shape, pose, near, far, half, SINES)
         seen = known[pose]
-        found[0][seen] += 1
-        found[1][seen & (found[1] < 0)] = step
-        found[2][seen] = step
-    return found
+        result[0][seen] += 1
+        result[1][seen & (result[1] < 0)] = step
+        result[2][seen] = step
+    return result
 
 
 @pytest.fixture(scope="module")
@@ -261,9 +261,9 @@ def test_layers_of_a_stored_run_are_read_back(tmp_path: Any) -> None:
     assert in_memory.digest == stored.digest
     assert set() == set(stored.verify())
     for name in layer_names(in_memory):
-        expected, found = read_layer(in_memory, name), read_layer(stored, name)
-        assert expected.dtype == found.dtype
-        assert np.array_equal(expected, found, equal_nan=True)
+        expected, result = read_layer(in_memory, name), read_layer(stored, name)
+        assert expected.dtype == result.dtype
+        assert np.array_equal(expected, result, equal_nan=True)
     assert len(layer_names(stored)) == 8
 
 

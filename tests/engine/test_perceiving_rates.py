@@ -126,9 +126,9 @@ def from_eye(x: Float64, y: Float64) -> tuple[Float64, Float64]:
 def hits(rows: Rows, robot: str, user: str) -> tuple[Rows, npt.NDArray[np.bool_]]:
     """Return the looks at which a user was in view, and in which of them a robot noticed."""
     looks = of(rows, "sharp", true_user=user)
-    found = of(rows, robot, true_user=user)["step"]
-    assert np.isin(found, looks["step"]).all()
-    return looks, np.isin(looks["step"], found)
+    result = of(rows, robot, true_user=user)["step"]
+    assert np.isin(result, looks["step"]).all()
+    return looks, np.isin(looks["step"], result)
 
 
 def check_by(
@@ -138,8 +138,8 @@ def check_by(
     group = np.digitize(values, np.asarray(edges))
     for g in range(len(np.asarray(edges)) + 1):
         inside = group == g
-        found, expected = happened[inside].mean(), share[inside].mean()
-        assert agree(happened[inside], share[inside]), (g, found, expected)
+        result, expected = happened[inside].mean(), share[inside].mean()
+        assert agree(happened[inside], share[inside]), (g, result, expected)
 
 
 def test_who_was_in_view_is_within_range_and_angle(rows: Rows) -> None:
@@ -180,27 +180,27 @@ def test_misses_come_in_runs_of_the_memory_in_seconds(rows: Rows) -> None:
 
 @pytest.mark.parametrize("user", USERS)
 def test_users_are_taken_for_each_other_as_often_as_told_by_distance(rows: Rows, user: str) -> None:
-    found = of(rows, "mistakes", true_user=user)
-    distance, _ = from_eye(found["true_x"], found["true_y"])
+    result = of(rows, "mistakes", true_user=user)
+    distance, _ = from_eye(result["true_x"], result["true_y"])
     right = np.interp(distance, [0, 6], [0.9, 0.3])
     mistaken = np.interp(distance, [0, 6], [0.05, 0.5])
     other = USERS[user == "ana"]
-    unknown = np.array([not isinstance(name, str) for name in found["user"]])
+    unknown = np.array([not isinstance(name, str) for name in result["user"]])
     edges = [2, 3, 4, 5]
     for taken, share in (
-        (found["user"] == user, right),
-        (found["user"] == other, mistaken),
+        (result["user"] == user, right),
+        (result["user"] == other, mistaken),
         (unknown, 1 - right - mistaken),
     ):
         check_by(distance, edges, taken, share)
 
 
 def test_positions_are_blurred_along_and_across_the_line_of_sight(rows: Rows) -> None:
-    found = of(rows, "blurs")
-    true, seen = (from_eye(found[f"{of}x"], found[f"{of}y"]) for of in ("true_", ""))
+    result = of(rows, "blurs")
+    true, seen = (from_eye(result[f"{of}x"], result[f"{of}y"]) for of in ("true_", ""))
     along = (seen[0] - true[0]) / (0.04 + 0.02 * true[0])
     across = ((seen[1] - true[1] + 180) % 360 - 180) / 2
-    facing = np.rad2deg(found["heading"] - found["true_heading"])
+    facing = np.rad2deg(result["heading"] - result["true_heading"])
     turned = ((facing + 180) % 360 - 180) / 12
     for z in (along, across, turned):
         assert abs(z.mean()) < 4.5 / np.sqrt(len(z))
@@ -225,10 +225,10 @@ ACTIVITIES = {
 def test_postures_and_activities_are_confused_as_told(
     rows: Rows, column: str, confusion: dict[str, dict[str, float]]
 ) -> None:
-    found = of(rows, "blurs")
+    result = of(rows, "blurs")
     every = {name for others in confusion.values() for name in others}
     for true, others in confusion.items():
-        mine = found[column][found[f"true_{column}"] == true]
+        mine = result[column][result[f"true_{column}"] == true]
         assert set(mine) <= every
         for name in every:
             assert agree(mine == name, others.get(name, 0.0)), (true, name)
@@ -242,17 +242,17 @@ def test_activities_are_true_at_the_look_and_unknown_to_cameras_that_do_not_tell
         mine = events["entity"] == user
         begun, names = events["step"][mine], events["detail"][mine]
         for robot, late in (("blurs", 0), ("late", 3)):
-            found = of(rows, robot, true_user=user)
-            at = np.searchsorted(begun, found["step"] - late, side="right") - 1
-            assert (found["true_activity"][at >= 0] == names[at[at >= 0]]).all()
+            result = of(rows, robot, true_user=user)
+            at = np.searchsorted(begun, result["step"] - late, side="right") - 1
+            assert (result["true_activity"][at >= 0] == names[at[at >= 0]]).all()
     for robot in ("sharp", "late"):
         assert not any(isinstance(name, str) for name in of(rows, robot)["activity"])
 
 
 def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows: Rows) -> None:
-    found = of(rows, "imagines")
-    false = np.array([not isinstance(name, str) for name in found["true_user"]])
-    x, y = found["x"][false], found["y"][false]
+    result = of(rows, "imagines")
+    false = np.array([not isinstance(name, str) for name in result["true_user"]])
+    x, y = result["x"][false], result["y"][false]
     at_spot = np.hypot(x - 7, y - 8) < 0.6
     area = (
         np.pi * 0.6**2 / (0.75 * np.pi * (6**2 - 0.3**2))
@@ -265,8 +265,8 @@ def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows
     distance, bearing = from_eye(x, y)
     assert distance.max() < 6.01
     assert np.abs(bearing[~at_spot]).max() < 135.1
-    assert agree(found["user"][false] == "ben", 0.4)
-    assert not (found["user"][false] == "ana").any()
+    assert agree(result["user"][false] == "ben", 0.4)
+    assert not (result["user"][false] == "ana").any()
     real = of(rows, "imagines", true_user="ana")
     assert (real["user"] == "ana").all()
 
@@ -274,11 +274,11 @@ def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows
 def test_looks_come_at_their_period_and_rows_after_their_latency(rows: Rows) -> None:
     """6 s are 3 steps of 2 s; 5 s are rounded up to 3."""
     for user in USERS:
-        looks, found = of(rows, "sharp", true_user=user), of(rows, "late", true_user=user)
+        looks, result = of(rows, "sharp", true_user=user), of(rows, "late", true_user=user)
         due = looks["step"] % 3 == 0
         due &= looks["step"] + 3 < 20 * 3600 // STEP_S
-        assert (looks["step"][due] + 3).tolist() == found["step"].tolist()
-        assert looks["x"][due].tolist() == found["x"].tolist()
+        assert (looks["step"][due] + 3).tolist() == result["step"].tolist()
+        assert looks["x"][due].tolist() == result["x"].tolist()
 
 
 def test_the_file_is_what_yaml_says_and_a_run_by_overrides_is_the_same(folder: Path) -> None:

@@ -242,11 +242,11 @@ def sights(stored: Any) -> list[tuple[int, str, str, str]]:
 
 
 def test_user_with_a_camera_sees_robots_come_and_go() -> None:
-    found = sights(run(facing()))
+    result = sights(run(facing()))
 
-    assert len(found) > 8
-    assert {("ana", "astro")} == {(who, whom) for _, who, _, whom in found}
-    assert ["robot_seen", "robot_lost"] * 4 == [event for _, _, event, _ in found[:8]]
+    assert len(result) > 8
+    assert {("ana", "astro")} == {(who, whom) for _, who, _, whom in result}
+    assert ["robot_seen", "robot_lost"] * 4 == [event for _, _, event, _ in result[:8]]
     behind = facing()
     behind["users"]["ana"]["start_heading_deg"] = 180
     assert [] == sights(run(behind))
@@ -265,9 +265,9 @@ def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like
         (step, event.replace("user", "robot"))
         for step, event in zip(rows["step"], rows["event"], strict=True)
     ]
-    found = sights(run({**content, "robots": {"astro": robot}}))
+    result = sights(run({**content, "robots": {"astro": robot}}))
 
-    assert expected == [(step, event) for step, _, event, _ in found]
+    assert expected == [(step, event) for step, _, event, _ in result]
 
 
 def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show() -> None:

@@ -92,12 +92,12 @@ def test_what_an_algorithm_put_out_does_not_change_with_its_own_arrays() -> None
         "keeper": {"type": f"{OWN}:Keeper", "period": "1 min"},
         "peek": {"type": f"{OWN}:Peek", "period": "1 min", "of": "keeper"},
     }
-    found = []
+    result = []
     for order in (("keeper", "peek"), ("peek", "keeper")):
         stored = run(small(algorithms={name: both[name] for name in order}))
-        found.append(stored.tables["peek"]["seen"].to_pylist())
-    assert found[0] == found[1]
-    assert [-1, 1, 2] == found[0][:3]
+        result.append(stored.tables["peek"]["seen"].to_pylist())
+    assert result[0] == result[1]
+    assert [-1, 1, 2] == result[0][:3]
 
 
 def test_nobody_writes_into_the_outputs() -> None:

@@ -176,13 +176,13 @@ def test_numpy_for_an_older_processor_gives_the_same_run(whole: Run, tmp_path: P
 
 def lives(stored: Run, *names: str) -> list[Any]:
     """Everything that is stored of some bodies, by column."""
-    found = []
+    result = []
     for name in names:
         for source in ("key_frames", "trajectories"):
             columns = table(stored, source, entity=name)
-            found.append({column: values.tolist() for column, values in columns.items()})
+            result.append({column: values.tolist() for column, values in columns.items()})
             assert len(columns["step"])
-    return json.loads(json.dumps(found, default=str))
+    return json.loads(json.dumps(result, default=str))
 
 
 def changed(**sections: Any) -> dict[str, Any]:
@@ -259,15 +259,15 @@ def test_another_seed_is_another_life(reference: Run) -> None:
 
 
 def test_digests_are_those_pinned(whole: Run) -> None:
-    found = {
+    result = {
         "base, 1 day": fleet2d.run(None, "simulation.duration=1 d").digest,
         "rounds, 1 day": fleet2d.run("bundled:rounds", "simulation.duration=1 d").digest,
         "every behavior, 2 h": whole.digest,
     }
     if os.environ.get("FLEET2D_WRITE_GOLDEN") == "1":
-        GOLDEN.write_text(json.dumps(found, indent=2) + "\n")
+        GOLDEN.write_text(json.dumps(result, indent=2) + "\n")
     pinned = json.loads(GOLDEN.read_text())
-    assert pinned == found, (
+    assert pinned == result, (
         "the same scenario gives another run than before. If that is meant, say in CHANGELOG.md what"
         " changes for users and why, and pin the new digests: FLEET2D_WRITE_GOLDEN=1 pytest"
         " tests/engine/test_spans.py. If it is not, or only on this machine, it is a bug."

@@ -39,8 +39,8 @@ def simulation(*script: dict[str, Any]) -> fleet2d.Simulation:
 
 
 def room(run: fleet2d.Simulation, name: str) -> str | None:
-    found: str | None = run.state[name]["room"]
-    return found
+    result: str | None = run.state[name]["room"]
+    return result
 
 
 def test_who_is_sent_goes_on_foot_stays_and_is_left_to_itself_in_the_end() -> None:
@@ -126,9 +126,9 @@ def test_a_robot_docks_when_called_and_finds_whom_it_is_called_to_find() -> None
     run.hold("ana")
     run.advance(120)
     run.call("astro", find="ana")
-    found = run.run_until(event="found", entity="astro", timeout="10 min")
-    assert found is not None
-    assert "ana" == found.detail
+    result = run.run_until(event="found", entity="astro", timeout="10 min")
+    assert result is not None
+    assert "ana" == result.detail
     run.battery("astro", "50 %")
     run.call("astro", dock=True)
     assert run.run_until(event="docks", timeout="5 min") is not None

@@ -64,29 +64,29 @@ def test_who_is_mistaken_is_perceived_as_the_other_at_the_same_places() -> None:
         (step, "ben" if during(step) and user == "ana" else user, x, y)
         for step, user, x, y in plain()
     ]
-    found = rows(fleet2d.run(home({"mistake": "astro", "user": "ana", "taken_for": "ben"})))
-    assert sorted(expected, key=str) == sorted(found, key=str)
+    result = rows(fleet2d.run(home({"mistake": "astro", "user": "ana", "taken_for": "ben"})))
+    assert sorted(expected, key=str) == sorted(result, key=str)
 
 
 def test_who_is_mistaken_for_nobody_known_is_perceived_without_a_name() -> None:
-    found = rows(fleet2d.run(home({"mistake": "astro", "user": "ana", "taken_for": "unknown"})))
+    result = rows(fleet2d.run(home({"mistake": "astro", "user": "ana", "taken_for": "unknown"})))
     missing = [row for row in plain() if during(row[0]) and row[1] == "ana"]
-    assert len(missing) == sum(during(step) and user is None for step, user, *_ in found)
+    assert len(missing) == sum(during(step) and user is None for step, user, *_ in result)
 
 
 def test_who_is_injected_is_perceived_in_every_look_and_all_else_stays() -> None:
-    found = rows(fleet2d.run(home({"inject": "astro", "user": "ben", "spot": [6.5, 1.5]})))
-    false = [row for row in found if row[1:] == ("ben", 6.5, 1.5)]
+    result = rows(fleet2d.run(home({"inject": "astro", "user": "ben", "spot": [6.5, 1.5]})))
+    false = [row for row in result if row[1:] == ("ben", 6.5, 1.5)]
     assert list(range(BEGIN, END)) == [row[0] for row in false]
-    assert plain() == [row for row in found if row not in false]
+    assert plain() == [row for row in result if row not in false]
 
 
 def test_a_worse_camera_notices_a_part_of_what_it_noticed() -> None:
-    found = rows(fleet2d.run(home({"fault": "astro", "detection": "50 %"})))
-    assert set(found) < set(plain())
+    result = rows(fleet2d.run(home({"fault": "astro", "detection": "50 %"})))
+    assert set(result) < set(plain())
     before = [row for row in plain() if during(row[0]) and row[1] == "ana"]
-    now = [row for row in found if during(row[0]) and row[1] == "ana"]
-    assert [row for row in found if not during(row[0])] == [r for r in plain() if not during(r[0])]
+    now = [row for row in result if during(row[0]) and row[1] == "ana"]
+    assert [row for row in result if not during(row[0])] == [r for r in plain() if not during(r[0])]
     assert 0.4 < len(now) / len(before) < 0.6
 
 
@@ -127,8 +127,8 @@ def test_what_a_dark_camera_would_have_had_in_view_is_not_explored() -> None:
 def test_overlapping_disturbances_end_one_by_one() -> None:
     first = {"at": "10 min", "switch_off": "astro", "camera": True, "duration": "4 min"}
     second = {"at": "12 min", "fault": "astro", "dark": True, "duration": "4 min"}
-    found = rows(fleet2d.run(home(first, second)))
-    assert [row for row in plain() if not 600 <= row[0] < 960] == found
+    result = rows(fleet2d.run(home(first, second)))
+    assert [row for row in plain() if not 600 <= row[0] < 960] == result
 
 
 def test_what_is_restored_is_over() -> None:
@@ -140,10 +140,10 @@ def test_what_is_restored_is_over() -> None:
     run.switch_on("astro", camera=True)
     run.advance(100)
     run.restore("astro")
-    found = rows(run.run())
+    result = rows(run.run())
     dark = [r for r in plain() if 600 <= r[0] < 700]
     missed = [r for r in plain() if 700 <= r[0] < 800 and r[1] == "ana"]
-    assert [row for row in plain() if row not in {*dark, *missed}] == found
+    assert [row for row in plain() if row not in {*dark, *missed}] == result
 
 
 def test_somebody_unknown_is_refused_where_a_run_has_no_column_for_the_truth() -> None:

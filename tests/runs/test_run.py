@@ -71,12 +71,13 @@ def test_tables_are_read_when_asked_for(directory: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "told"), [("nowhere", "does not exist"), ("file", "is a file"), (".", "no manifest")]
+    ("name", "message"),
+    [("nowhere", "does not exist"), ("file", "is a file"), (".", "no manifest")],
 )
-def test_open_what_is_no_run(tmp_path: Path, name: str, told: str) -> None:
+def test_open_what_is_no_run(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / "file").write_text("")
 
-    with pytest.raises(RunDirectoryError, match=told):
+    with pytest.raises(RunDirectoryError, match=message):
         open_run(tmp_path / name)
 
 

@@ -125,8 +125,8 @@ def assert_rebuilt(run: Run, stride: int = 1) -> None:
         np.testing.assert_array_equal(truth["time"].to_numpy(), path.time, name)
         np.testing.assert_array_equal(truth["away"], path.away, name)
         for column in ("x", "y"):
-            found = getattr(path, column)
-            np.testing.assert_array_equal(truth[column].to_numpy()[at_home], found[at_home], name)
+            result = getattr(path, column)
+            np.testing.assert_array_equal(truth[column].to_numpy()[at_home], result[at_home], name)
         np.testing.assert_array_equal(truth["heading"], path.heading, name)
         np.testing.assert_array_equal(truth["room"].cat.codes, path.room, name)
 
@@ -185,16 +185,16 @@ def test_run_that_was_cut_short_is_rebuilt(bodies: str, steps: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("entity", "every", "told"),
+    ("entity", "every", "message"),
     [
         ("bob", 60.0, "there is no 'bob'"),
         ("ana", 0.5, "no multiple of simulation.step"),
         ("ana", 0.0, "no multiple of simulation.step"),
     ],
 )
-def test_what_can_not_be_rebuilt_is_told(entity: str, every: float, told: str) -> None:
+def test_what_can_not_be_rebuilt_is_told(entity: str, every: float, message: str) -> None:
     run = run_of("schedule with away")
-    with pytest.raises(ArtifactError, match=told):
+    with pytest.raises(ArtifactError, match=message):
         run.path(entity, every=timedelta(seconds=every))
 
 

@@ -73,7 +73,7 @@ def test_composition_leaves_its_source_as_it_was() -> None:
 
 
 @pytest.mark.parametrize(
-    ("override", "said"),
+    ("override", "message"),
     [
         ("seed", "override 'seed': there is no '=' in it; write key.path=value"),
         ("=4", "override '=4': a part of its key is empty"),
@@ -86,10 +86,10 @@ def test_composition_leaves_its_source_as_it_was() -> None:
                                              "2 entries, and the first is 0"),
     ],
 )  # fmt: skip
-def test_override_that_makes_no_sense_is_refused(override: str, said: str) -> None:
+def test_override_that_makes_no_sense_is_refused(override: str, message: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         compose(BASE, [override])
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def write(folder: Path, **files: str) -> Path:
@@ -170,7 +170,7 @@ def test_cycle_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize(
-    ("extends", "said"),
+    ("extends", "message"),
     [
         ("gone.yaml", "home.yaml:1: extends: there is no file"),
         ("3", "home.yaml:1: extends: found 3; the path of a YAML file is wanted"),
@@ -178,14 +178,14 @@ def test_cycle_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     ],
 )
 def test_extending_what_is_not_there_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, extends: str, said: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, extends: str, message: str
 ) -> None:
     monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path / "bundled", base="name: x"))
     monkeypatch.chdir(write(tmp_path, home=f"extends: {extends}"))
 
     with pytest.raises(ScenarioError) as caught:
         compose("home.yaml")
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("source", [None, "bundled:base", {"extends": "bundled:base"}])
@@ -207,7 +207,7 @@ def test_name_is_not_inherited(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("override", "said"),
+    ("override", "message"),
     [
         ("robots.asto.speed=0.3", "override 'robots.asto.speed=0.3': there is no robots.asto: did "
          "you mean 'astro'? There are: astro; to add one give robots.asto.type, too"),
@@ -216,10 +216,10 @@ def test_name_is_not_inherited(tmp_path: Path) -> None:
         ("metrics.tally.of=x", "there is no metrics.tally. There are: none; to add one"),
     ],
 )  # fmt: skip
-def test_override_inside_an_entry_that_is_not_there_is_refused(override: str, said: str) -> None:
+def test_override_inside_an_entry_that_is_not_there_is_refused(override: str, message: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         compose(BASE, [override])
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_setting_inside_an_entry_that_is_not_there_is_refused() -> None:

@@ -221,14 +221,17 @@ def _convert(column: Column, values: Any) -> tuple[Any, Any]:
         raise ArtifactError(f"has {values.ndim} dimensions: give one value per row")
     if not values.size:
         return np.empty(0, DTYPES[column.kind]), True
-    if values.dtype.kind not in _ACCEPTED.get(column.kind, "iu"):
+    kind = values.dtype.kind
+    if kind not in _ACCEPTED.get(column.kind, "iu"):
         noun = column.kind if column.kind in ("float64", "bool") else "integers"
         raise ArtifactError(f"holds {values.dtype}, not {noun}: convert it first")
-    if values.dtype.kind == "M":
+    if kind == "f":
+        present = ~np.isnan(values)
+    elif kind == "M":
         values = values.astype("datetime64[us]", copy=False).view(np.int64)
         present = values != _NOT_A_TIME
     else:
-        present = _check_values(column, values, values if valid is None else values[valid])
+        present = _check_integers(column, values, values if valid is None else values[valid])
     if present is not None:
         valid = present if valid is None else valid & present
     if not column.nullable and valid is not None and not valid.all():
@@ -236,22 +239,20 @@ def _convert(column: Column, values: Any) -> tuple[Any, Any]:
     return values, True if valid is None else valid
 
 
-def _check_values(column: Column, values: Any, unmasked: Any) -> Any:
-    """Check the range of values; return which are neither NaN nor -1 where these mean missing."""
-    if values.dtype.kind == "f":
-        return ~np.isnan(values)
+def _check_integers(column: Column, values: Any, unmasked: Any) -> Any:
+    """Check the range of numbers or codes; return which codes are not -1 if that means missing."""
     dtype = DTYPES[column.kind]
     if column.kind != "category":
-        if not np.can_cast(values.dtype, dtype) and unmasked.size:
+        if values.dtype != dtype and not np.can_cast(values.dtype, dtype) and unmasked.size:
             bounds = np.iinfo(dtype)
             if int(unmasked.min()) < bounds.min or int(unmasked.max()) > bounds.max:
                 raise ArtifactError(f"holds numbers beyond {dtype}: declare it int64")
         return None
     lowest = -1 if column.nullable else 0
-    if unmasked.size and not lowest <= unmasked.min() <= unmasked.max() < len(column.categories):
+    count = len(column.categories)
+    if unmasked.size and not (lowest <= unmasked.min() and unmasked.max() < count):
         raise ArtifactError(
-            f"has code {int(unmasked.min())} or {int(unmasked.max())}: "
-            f"there are {len(column.categories)} categories"
+            f"has code {int(unmasked.min())} or {int(unmasked.max())}: there are {count} categories"
         )
     return values >= 0 if column.nullable else None
 
@@ -263,6 +264,8 @@ def _as_strings(column: Column, strings: Any) -> Any:
     if strings is not None and not isinstance(strings, str):
         strings = list(strings)
     types = set(map(type, strings if isinstance(strings, list) else [strings])) - {str}
+    if not types:
+        return strings
     if types == {type(None)} and not column.nullable:
         raise ArtifactError("has missing values (None): declare it nullable")
     if strange := types - {type(None)}:

@@ -184,7 +184,19 @@ class Manifest(BaseModel):
         Raises:
             RunDirectoryError: There is none, or it is not valid; the message says what is wrong.
         """
-        return cls.of_content(directory / FILE_NAME, read_content(directory))
+        path = directory / FILE_NAME
+        try:
+            if not is_regular(path):
+                raise RunDirectoryError(f"{path} is no file: give the directory of a run")
+            content = json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError))
+        except FileNotFoundError as error:
+            raise RunDirectoryError(
+                f"{directory} is no run directory, for it has no {FILE_NAME}: "
+                "give the directory that `fleet2d run --out` wrote"
+            ) from error
+        except OSError as error:
+            raise RunDirectoryError(f"{path} can't be read: {error.strerror}") from error
+        return cls.of_content(path, content)
 
     @classmethod
     def of_content(cls, path: Path, content: Any) -> Manifest:
@@ -214,26 +226,6 @@ class Manifest(BaseModel):
 
 # The fields that a manifest of every version has.
 _REQUIRED = Manifest.model_fields.keys() - {"expectations", "interventions", "resumed", "seal"}
-
-
-def read_content(directory: Path) -> Any:
-    """Return the content of a run's manifest as plain JSON data.
-
-    Raises:
-        RunDirectoryError: There is none, or it is no JSON.
-    """
-    path = directory / FILE_NAME
-    try:
-        if not is_regular(path):
-            raise RunDirectoryError(f"{path} is no file: give the directory of a run")
-        return json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError))
-    except FileNotFoundError as error:
-        raise RunDirectoryError(
-            f"{directory} is no run directory, for it has no {FILE_NAME}: "
-            "give the directory that `fleet2d run --out` wrote"
-        ) from error
-    except OSError as error:
-        raise RunDirectoryError(f"{path} can't be read: {error.strerror}") from error
 
 
 def json_of(path: Path, text: bytes) -> Any:

@@ -1,8 +1,8 @@
-"""Blocking: which bodies are about to walk into another one, step by step.
+"""Blocking: the bodies that are about to walk into another one, step by step.
 
 It follows from the poses alone. A body is in another one's way at a step if that one moves towards
-it, and both together so that they would overlap before the next step. The one that moves is asked
-at that step, before it moves, so it makes no difference where spans end.
+it, and they would overlap before the next step. The body that moves decides at that step, before it
+moves, so the result doesn't depend on spans.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,7 +20,7 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.events import Event
 from fleet2d.units import micros
 
-# Who goes round a body, or squeezes past it, takes no notice of that one for so long.
+# Time for which a body ignores another one that it goes round or squeezes past.
 PASSES = timedelta(seconds=10)
 
 I64 = NDArray[np.int64]
@@ -28,11 +28,11 @@ Bool = NDArray[np.bool_]
 
 
 class Wait(NamedTuple):
-    """That a body waits for another one.
+    """A body waits for another one.
 
     Attributes:
         since: The step at which it began to wait.
-        until: The step before which it stands, as far as it has decided.
+        until: The step before which it stands, by its last decision.
         blocker: The row of the body in its way.
     """
 
@@ -42,10 +42,10 @@ class Wait(NamedTuple):
 
 
 class Pass(NamedTuple):
-    """That a body has waited for another one, and now goes round it or squeezes past.
+    """A body that has waited for another one goes round it, or squeezes past.
 
     Attributes:
-        until: The step before which it takes no notice of the other one.
+        until: The step before which it ignores the other one.
         blocker: The row of the other one.
     """
 
@@ -54,7 +54,7 @@ class Pass(NamedTuple):
 
 
 class PoseColumns(NamedTuple):
-    """Where bodies are at consecutive steps, (bodies, steps) each."""
+    """Places of bodies at consecutive steps, (bodies, steps) each."""
 
     x: I64
     y: I64
@@ -65,7 +65,7 @@ class Blocking:
     """The bodies of a run that block each other's way.
 
     Attributes:
-        rows: Their rows among the bodies; empty if bodies are air to each other.
+        rows: Their rows among the bodies; empty if bodies don't block each other.
     """
 
     def __init__(
@@ -83,11 +83,11 @@ class Blocking:
 
     @property
     def waits(self) -> bool:
-        """Whether anybody waits for anybody."""
+        """Whether bodies block each other."""
         return len(self.rows) > 0
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step at which a body is to be asked anew: not the first of the span."""
+        """Return the step at which a body has to decide: not the first of the span."""
         first = self.taken
         block = bodies.block(first, end + 1)  # a move leads to the step after
         poses = PoseColumns(block.x, block.y, block.away)
@@ -98,12 +98,12 @@ class Blocking:
         return end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Go on to a step."""
+        """Advance to a step."""
         self.taken = end
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: it is asked at every decision."""
+        """Return nothing: it is checked at every decision."""
         return ()
 
     def in_way(self, bodies: Bodies, row: int) -> int | None:
@@ -120,7 +120,7 @@ class Blocking:
         return next((other for _, other in self._meetings(poses, row, step, np.array([0]))), None)
 
     def plan(self, now: Situation, other: int) -> Plan | None:
-        """Return how a body waits for another one, or goes round it; None if it squeezes past."""
+        """Return a plan to wait for another body, or to go round it; None to squeeze past."""
         row, lattice = now.actor.row, now.actor.home.plan.lattice
         actor = self._actors[row]
         around = [
@@ -150,16 +150,16 @@ class Blocking:
         return plan
 
     def _minds(self, row: int, other: int, step: int) -> bool:
-        """Tell whether a body waits for another one at a step, or is about to pass it."""
+        """Whether a body waits for another one at a step, or is about to pass it."""
         pairs = (self._waits[row], self._passes[row])
         return any(pair.blocker == other and pair.until > step for pair in pairs)
 
     def _meetings(
         self, poses: PoseColumns, row: int, first: int, columns: I64
     ) -> Iterator[tuple[int, int]]:
-        """Yield the first of some columns at which a body is blocked, and by whom, of each other.
+        """Yield for each other body the first column at which it blocks a body, and its row.
 
-        Each is earlier than the one before.
+        Only columns earlier than all before are yielded.
         """
         x, y, away = poses
         dx, dy = (c[row, columns + 1] - c[row, columns] for c in (x, y))
@@ -177,7 +177,7 @@ class Blocking:
                     break
 
     def _heeded(self, row: int) -> Iterable[int]:
-        """Return those for whom a body waits; a robot with `gives_way` minds people by that."""
+        """Return the rows that a body waits for; a robot with `gives_way` skips people."""
         polite = getattr(self._actors[row].entity, "gives_way", None) is not None
         return (r for r in range(self._users if polite else 0, len(self._actors)) if r != row)
 
@@ -187,15 +187,15 @@ class Blocking:
         return int(sum(radii) * self._actors[row].home.plan.lattice.units_per_m)
 
     def _is_past(self, row: int, other: int, step: int) -> bool:
-        """Tell whether a body passes another one at a step."""
+        """Whether a body passes another one at a step."""
         return self._passes[row].blocker == other and step < self._passes[row].until
 
 
 def _approach(x: I64, y: I64, row: int, other: int, columns: I64, reach: int) -> Bool:
-    """Tell in which columns a body moves towards another one, and so that the two overlap.
+    """Return in which columns a body moves towards another one so that they would overlap.
 
-    Both go straight from one step to the next. Sums and products are of whole numbers, exact as
-    long as nobody gets farther than some 100 m in a step.
+    Both move straight from one step to the next. Sums and products of integers are exact if no body
+    moves farther than about 100 m in a step.
     """
     dx, dy = (c[row, columns + 1] - c[row, columns] for c in (x, y))
     other_dx, other_dy = (c[other, columns + 1] - c[other, columns] for c in (x, y))
