@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.patches import Patches
+from fleet2d.floorplan.cache import read_only
 from fleet2d.kernels.evidence import gather_views
 from fleet2d.kernels.presence import count_sightings, list_sightings
 
@@ -78,7 +79,7 @@ class SightingCounts(NamedTuple):
         """The counts as an array: int64 (bins, users + 1, places)."""
         seen = np.zeros(self.shape, np.int64)
         seen[self.bin, self.user, self.place] = self.steps
-        return seen
+        return read_only(seen)
 
     @property
     def unknown(self) -> NDArray[np.bool_]:
@@ -86,7 +87,7 @@ class SightingCounts(NamedTuple):
         bins, users, places = self.shape
         signed = np.where(self.user == users - 1, self.steps, -self.steps)
         excess = np.bincount(self.bin * places + self.place, signed, bins * places)
-        return (excess > 0).reshape(bins, places)
+        return read_only((excess > 0).reshape(bins, places))
 
 
 class Parts(NamedTuple):
