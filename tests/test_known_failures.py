@@ -312,12 +312,16 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
     },
     (SimulationSettings, "simulation"): {
         "start": "2026-01-05T07:00:30", "duration": "14 min", "step": "2 s", "seed": 5,
+        "people_block": "3 s",
     },
     (ArtifactSettings, "artifacts"): {
         "trajectories": "1 min", "key_frames": False, "observations": False, "events": False,
         "outputs": False,
     },
-    (SightSettings, "sight"): {"method": {"type": f"{TESTS.as_posix()}/engine/test_points_in_view:XRay"}},
+    (SightSettings, "sight"): {
+        "method": {"type": f"{TESTS.as_posix()}/engine/test_points_in_view:XRay"},
+        "people_occlude": True,
+    },
 }  # fmt: skip
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
