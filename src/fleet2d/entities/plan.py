@@ -218,6 +218,12 @@ class Plan:
             self.time_us, self.x, self.y, self.heading, self.away = breakpoints[-1].tolist()
         return self
 
+    def jump(self, time_us: int, **changes: int) -> Self:
+        """Change x, y, heading or away at once, at a moment [us since the start]."""
+        pose = {"x": self.x, "y": self.y, "heading": self.heading, "away": self.away}
+        rows = [[time_us, *pose.values()], [time_us, *(pose | changes).values()]]
+        return self.follow(np.array(rows, np.int64))
+
     def turn_by(self, turns: float) -> Self:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
         self._check_goes_on()
@@ -278,7 +284,7 @@ class Plan:
         """Walk at random, for good; must be all that the plan does."""
         self.come_home()
         self._check_goes_on()
-        if len(self._legs) > 2 or self.time_us != self.began[0] * self._body.clock.step_us:
+        if len(self._legs) > 2 or self.time_us != self.began[0] * self.step_us:
             raise ComponentError(f"{self._body.path}: a plan that meanders can do nothing before")
         self.take("stand")
         home, body = self._body.home, self._body
@@ -350,8 +356,7 @@ class Plan:
     def finish(self) -> Motion:
         """Return the motion of the plan."""
         if self._motion is None:
-            track = Breakpoints(*self._legs.track())
-            self._motion = Track(track, self._body.clock.step_us)
+            self._motion = Track(Breakpoints(*self._legs.track()), self.step_us)
         return self._motion
 
     def data(self) -> dict[str, Any]:

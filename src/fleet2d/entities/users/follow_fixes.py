@@ -118,7 +118,7 @@ class FixFollower:
         if i < 0 or plan.time_us - time[i] > self.gap_us:
             self._vanish(plan, plan.time_us)
         else:
-            plan.follow(self._row(i, plan.time_us, 0))
+            plan.follow(self._row(i, plan.time_us))
         for j in range(i + 1, len(time)):
             if time[j] >= end_us:
                 break
@@ -153,21 +153,19 @@ class FixFollower:
             last = int(heading[i])
         return heading
 
-    def _row(self, i: int, at_us: int, away: int) -> I64:
+    def _row(self, i: int, at_us: int) -> I64:
+        """Return a breakpoint at a fix, int64 (1, 5)."""
         x, y = self.fixes.xy[i].tolist()
-        return np.array([[at_us, x, y, self.heading[i], away]], np.int64)
+        return np.array([[at_us, x, y, self.heading[i], 0]], np.int64)
 
     def _vanish(self, plan: "Plan", at_us: int) -> None:
         """Make the body's position unknown: it is away, without having walked out."""
-        pose = [plan.x, plan.y, plan.heading]
-        plan.follow(np.array([[at_us, *pose, plan.away], [at_us, *pose, 1]], np.int64))
-        plan.note("unknown")
+        plan.jump(at_us, away=1).note("unknown")
 
     def _appear(self, plan: "Plan", i: int) -> None:
-        at_us = int(self.fixes.time_us[i])
-        before = np.array([[at_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
-        plan.follow(np.concatenate([before, self._row(i, at_us, 0)]))
-        plan.note("known")
+        x, y = self.fixes.xy[i].tolist()
+        at_us, heading = int(self.fixes.time_us[i]), int(self.heading[i])
+        plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
 
     def _route(self, i: int, j: int) -> I64:
         """Return the route from a fix to another, straight if that is free; int64 (n, 2)."""
@@ -208,5 +206,5 @@ class FixFollower:
             done += length
             at_us = leave_us + int((arrive_us - leave_us) * (done / total))
             rows.append([at_us, x, y, int(heading_of(dx, dy)), 0])
-        last = self._row(j, arrive_us, 0)
+        last = self._row(j, arrive_us)
         plan.follow(np.concatenate([np.array(rows, np.int64).reshape(-1, 5), last]))

@@ -113,16 +113,12 @@ class RoomFollower:
 
     def _vanish(self, plan: "Plan", at_us: int) -> None:
         """Make the body's position unknown: it is away, without having walked out."""
-        pose = [plan.x, plan.y, plan.heading]
-        plan.follow(np.array([[at_us, *pose, plan.away], [at_us, *pose, 1]], np.int64))
-        plan.note("unknown")
+        plan.jump(at_us, away=1).note("unknown")
 
     def _appear(self, plan: "Plan", visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
         """Put the body where the log has it."""
-        away = int(visit.place == AWAY)
         x, y = self._spot(visit, plan)
-        before = [at_us, plan.x, plan.y, plan.heading, plan.away]
-        plan.follow(np.array([before, [at_us, x, y, plan.heading, away]], np.int64))
+        plan.jump(at_us, x=x, y=y, away=int(visit.place == AWAY))
         if known:
             plan.note("known", visit.place)
 
@@ -142,15 +138,11 @@ class RoomFollower:
             rows = self._way(plan, self._near(plan, spot))
         self._set_out(plan, rows, may_leave, arrive_us, before)
         if visit.place == AWAY:
-            pose = [arrive_us, plan.x, plan.y, plan.heading]
-            plan.follow(np.array([[*pose, 0], [*pose, 1]], np.int64))
-            plan.note("left_home")
+            plan.jump(arrive_us, away=1).note("left_home")
 
     def _come_home(self, plan: "Plan", out: LoggedVisit, arrive_us: int) -> None:
         back_us = max(plan.time_us, min((out.last + 1) * self.step_us, arrive_us - 1))
-        pose = [back_us, plan.x, plan.y, plan.heading]
-        plan.follow(np.array([[*pose, 1], [*pose, 0]], np.int64))
-        plan.note("came_home")
+        plan.jump(back_us, away=0).note("came_home")
 
     def _near(self, plan: "Plan", spot: tuple[int, int]) -> tuple[int, int]:
         """Return the place in the room of a spot that is nearest to the body."""
