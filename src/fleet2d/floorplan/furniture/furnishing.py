@@ -19,7 +19,7 @@ from fleet2d.problems import problem_at, suggest
 from fleet2d.units import AngleDeg, Length, PositiveLength
 
 # How far a piece may reach into a wall [m]: tape measures and traced walls differ by as much.
-INTO_WALL = 0.02
+WALL_TOLERANCE_M = 0.02
 
 
 class Furnishing(Settings):
@@ -101,7 +101,7 @@ def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
             f"{where}: {at} is not inside {plan.name}, whose free space lies from"
             f" ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m"
         )
-    lost = shapely.difference(thing.footprint.buffer(-INTO_WALL), free).area
+    lost = shapely.difference(thing.footprint.buffer(-WALL_TOLERANCE_M), free).area
     if lost > 0:
         x0, y0, x1, y1 = thing.footprint.bounds
         raise FloorPlanError(

@@ -14,7 +14,7 @@ from fleet2d.floorplan.geometry.mesh import GRID, Snapped, snap_polygon
 PARTS_LISTED = 5
 
 # Distance at which a coordinate counts as on the lattice, for rounding of decimals [lattice].
-ON_WALL = 1e-6
+LATTICE_TOLERANCE = 1e-6
 
 
 def free_on_lattice(
@@ -74,7 +74,7 @@ def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:
     exact = shapely.transform(free, lambda xy: xy * units_per_m)
     even = shapely.transform(exact, lambda xy: 2 * np.rint(xy / 2))
     moved = np.abs(shapely.get_coordinates(even) - shapely.get_coordinates(exact)).max()
-    if moved < ON_WALL and even.is_valid:
+    if moved < LATTICE_TOLERANCE and even.is_valid:
         parts = shapely.get_parts(even)
         return Snapped(parts.tolist(), even.area - exact.area, GRID * exact.length)
     return snap_polygon(exact)

@@ -9,12 +9,11 @@ import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.geometry.lattice import COORDINATE_LIMIT
 from fleet2d.kernels.mesh import SUB, WALL, Mesh
 
 GRID = 2
 """Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""
-LIMIT = 1 << 20
-"""Coordinates stay below this, so that no product in the kernels overflows."""
 
 Int64 = npt.NDArray[np.int64]
 
@@ -113,11 +112,11 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
                 "Walls must lie on even lattice units. Pass the polygon to snap_polygon first."
             )
         low, high = exact.min(axis=0), exact.max(axis=0)
-        if low.min() < 0 or high[0] > width or high[1] > height or high.max() >= LIMIT:
+        if low.min() < 0 or high[0] > width or high[1] > height or high.max() >= COORDINATE_LIMIT:
             raise FloorPlanError(
                 f"The walls reach from {low.tolist()} to {high.tolist()} lattice units, but the "
-                f"plan covers [0, 0] to [{width}, {height}], and nothing may reach {LIMIT}. "
-                "Use larger cells."
+                f"plan covers [0, 0] to [{width}, {height}], and nothing may reach "
+                f"{COORDINATE_LIMIT}. Use larger cells."
             )
         oriented = shapely.orient_polygons(polygon)
         rings.append(
@@ -131,7 +130,7 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
 
 def _keys(points: Int64) -> Int64:
     """Return one number per point that sorts like (x, y)."""
-    keys: Int64 = points[..., 0] * (2 * LIMIT) + points[..., 1]
+    keys: Int64 = points[..., 0] * (2 * COORDINATE_LIMIT) + points[..., 1]
     return keys
 
 
@@ -185,7 +184,7 @@ def _build(polygons: list[list[Int64]]) -> Mesh | None:
     # Not np.unique, which imports masked arrays.
     keys = np.sort(_keys(wall_starts))
     keys = keys[np.diff(keys, prepend=-1) != 0]
-    vertices = np.stack([keys // (2 * LIMIT), keys % (2 * LIMIT)], axis=1)
+    vertices = np.stack([keys // (2 * COORDINATE_LIMIT), keys % (2 * COORDINATE_LIMIT)], axis=1)
     corners = _triangulate(polygons)
     triangles = np.searchsorted(keys, _keys(corners))
     area = int(_doubled_areas(corners).sum())

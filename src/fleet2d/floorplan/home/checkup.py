@@ -42,14 +42,14 @@ PART_M2 = 0.5  # least area of floor whose loss matters
 DOOR_M = (0.5, 1.6)  # median width of a home's doors
 WIDEST_DOOR_M = 2.0
 # How far labels may reach over the outer walls, and which share of them may lie farther out.
-OVER_WALLS_M = 0.3
-OUTSIDE = 0.25
+MAX_OVER_WALLS_M = 0.3
+MAX_OUTSIDE_SHARE = 0.25
 # Share of the smaller of two labels, and area, from which on their overlap is reported.
-OVERLAP = 0.25
-OVERLAP_M2 = 1.0
+MAX_OVERLAP_SHARE = 0.25
+MAX_OVERLAP_M2 = 1.0
 # Largest distance from which furniture without places of use must be reachable [m].
 BESIDE_M = 0.5
-UNLABELLED = 0.5  # share of the floor without a known use from which on it is reported
+MAX_UNLABELLED_SHARE = 0.5  # share of the floor without a known use from which on it is reported
 
 _ORDER: tuple[Severity, ...] = ("unlivable", "wrong", "odd")
 
@@ -176,7 +176,7 @@ def _labels(plan: FloorPlan) -> Iterator[Finding]:
             yield Finding("room", "odd", text, room.anchor_xy)
     unlabelled = sum(room.area_m2 for room in plan.rooms if room.type == UNKNOWN)
     share = unlabelled / sum(room.area_m2 for room in plan.rooms)
-    if share > UNLABELLED:
+    if share > MAX_UNLABELLED_SHARE:
         text = f"{100 * share:.0f} % of the floor belongs to no room with a known use"
         yield Finding("labels", "odd", text)
     regions = _by_shape(plan)
@@ -199,10 +199,10 @@ def _by_shape(plan: FloorPlan) -> list[LabelledRegion]:
 
 def _outside(plan: FloorPlan, regions: list[LabelledRegion]) -> Iterator[Finding]:
     filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(_free(plan))]
-    reach = shapely.union_all(filled).buffer(OVER_WALLS_M, join_style="mitre")
+    reach = shapely.union_all(filled).buffer(MAX_OVER_WALLS_M, join_style="mitre")
     for region in regions:
         outside = shapely.difference(region.shape, reach)
-        if outside.area > OUTSIDE * region.shape.area:
+        if outside.area > MAX_OUTSIDE_SHARE * region.shape.area:
             at = outside.representative_point()
             yield Finding(
                 "outside",
@@ -222,7 +222,8 @@ def _overlaps(regions: list[LabelledRegion]) -> Iterator[Finding]:
         if i >= j or set(one.types) == set(other.types):
             continue
         both = shapely.intersection(one.shape, other.shape)
-        if both.area > max(OVERLAP_M2, OVERLAP * min(one.shape.area, other.shape.area)):
+        smaller = min(one.shape.area, other.shape.area)
+        if both.area > max(MAX_OVERLAP_M2, MAX_OVERLAP_SHARE * smaller):
             at = both.representative_point()
             yield Finding(
                 "overlap",

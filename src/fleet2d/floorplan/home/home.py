@@ -35,7 +35,7 @@ CACHED_VALUES = 512
 
 T = TypeVar("T")
 
-NOTHING: frozenset[int] = frozenset()
+NO_DOORS: frozenset[int] = frozenset()
 
 
 class Home:
@@ -63,8 +63,8 @@ class Home:
         self.doors = tuple(doors)
         self.rooms: tuple[Room, ...] = plan.rooms
         self.objects: tuple[PlacedObject, ...] = plan.objects
-        self.shut: frozenset[int] = NOTHING
-        self.locked: frozenset[int] = NOTHING
+        self.shut: frozenset[int] = NO_DOORS
+        self.locked: frozenset[int] = NO_DOORS
         self.version = 0
         self.layers = Layers(plan)
         self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))

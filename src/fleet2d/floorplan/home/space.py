@@ -30,7 +30,7 @@ from fleet2d.kernels.sight import line_of_sight
 # Snapping of the shrunk walls and rounding of a pose add up to less than this [lattice].
 ROUNDING = 3
 # Number of free cells that are tried for a way back into the space, nearest first.
-ESCAPES = 200
+ESCAPE_ATTEMPTS = 200
 # Number of results that a space caches of each of its searches.
 CACHED_ROUTES = 4096
 
@@ -205,7 +205,7 @@ class Space:
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
         walls = self.walls
         triangle = locate(walls, x, y)
-        for row, column in self._by_distance(x, y)[:ESCAPES].tolist():
+        for row, column in self._by_distance(x, y)[:ESCAPE_ATTEMPTS].tolist():
             target = self.plan.lattice.cell_centre(row, column)
             if triangle >= 0 and line_of_sight(walls, x, y, triangle, *target):
                 return target

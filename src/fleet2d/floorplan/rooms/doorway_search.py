@@ -25,7 +25,7 @@ MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.4
 """Widths of doorways, from what a person fits through to a double door."""
 MAX_OPENING_M = 2.8
 """The widest opening that still separates rooms, such as a kitchen and its dining area."""
-LEAN = 0.2
+MAX_LEAN = 0.2
 """Largest sine of the angle between a passage and the shortest line, since traced walls lean."""
 OFFSETS_M = (0.15, 0.3, 0.45, 0.6)
 """Distances behind a passage at which the space is checked; the last is the thickest wall."""
@@ -33,11 +33,11 @@ WIDENINGS_M = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 """Amounts of widening, on either side of a passage, that are checked behind it."""
 MIN_WIDENING_M, WIDENING_SHARE = 0.3, 0.2
 """Least widening behind a passage: in metres, and as a share of its width."""
-APART_M = 0.5
+MIN_APART_M = 0.5
 """Passages with middles nearer than this are the two sides of one wall."""
-SHRINK = 0.97
+VISIBLE_SHARE = 0.97
 """Share of a passage that must be visible from its middle; the very ends are on walls."""
-STUB_M = (0.15, 0.3, 0.45)
+STUBS_M = (0.15, 0.3, 0.45)
 """Distances beyond the ends of an opening at which there must be wall for it to be a gap in one."""
 ASIDE_M = 0.06
 """How far beside the line of an opening that wall may be."""
@@ -155,7 +155,7 @@ def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> NDArray[n
     for side in (walls.before[corner], walls.end[corner]):
         wall = side - walls.start[corner]
         component = (line * wall).sum(axis=1)
-        is_shortest &= component <= LEAN * length * np.sqrt((wall * wall).sum(axis=1))
+        is_shortest &= component <= MAX_LEAN * length * np.sqrt((wall * wall).sum(axis=1))
     return is_shortest
 
 
@@ -189,7 +189,7 @@ def _shortest_first(lines: I64) -> I64:
 def _all_free(mesh: Mesh, lines: I64) -> NDArray[np.bool_]:
     """Return which lines cross free space alone."""
     middle = (lines[:, :2] + lines[:, 2:]) // 2
-    half = np.rint((lines[:, 2:] - lines[:, :2]) * (SHRINK / 2)).astype(np.int64)
+    half = np.rint((lines[:, 2:] - lines[:, :2]) * (VISIBLE_SHARE / 2)).astype(np.int64)
     free: NDArray[np.bool_] = pairs_in_sight(mesh, middle, middle + half)
     free &= pairs_in_sight(mesh, middle, middle - half)
     return free
@@ -235,11 +235,11 @@ def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> NDA
     for end, outwards in ((lines[:, :2], -along), (lines[:, 2:], along)):
         in_wall = ~np.isin(_keys(end), corners)
         shifts = [
-            outwards * beyond + sideways * aside for sideways in SIDEWAYS for beyond in STUB_M
+            outwards * beyond + sideways * aside for sideways in SIDEWAYS for beyond in STUBS_M
         ]
         places = (end + np.rint(np.stack(shifts)).astype(np.int64)).reshape(-1, 2)
         seen = pairs_in_sight(mesh, places, places)  # in free space a place sees itself
-        walled = ~seen.reshape(len(SIDEWAYS), len(STUB_M), len(lines))
+        walled = ~seen.reshape(len(SIDEWAYS), len(STUBS_M), len(lines))
         in_wall |= walled.all(axis=1).any(axis=0)
         both_in_wall &= in_wall
     both_in_wall |= length <= MAX_DOOR_M * units_per_m
@@ -257,7 +257,7 @@ def _one_of_each(lines: I64, units_per_m: float) -> list[int]:
     chosen: list[int] = []
     shapes = np.asarray(shapely.linestrings(lines.reshape(-1, 2, 2).astype(np.float64)))
     middle = (lines[:, :2] + lines[:, 2:]) / 2
-    apart2 = (APART_M * units_per_m) ** 2
+    apart2 = (MIN_APART_M * units_per_m) ** 2
     for i in range(len(lines)):
         if chosen:
             gap = middle[chosen] - middle[i]

@@ -16,7 +16,7 @@ from fleet2d.floorplan.objects import Point
 # How far beyond the end of a door line its wall may be [m].
 REACH_M = 0.3
 # A line that meets a wall within this distance of a corner ends at the corner [lattice].
-AT_CORNER = 8
+CORNER_DISTANCE = 8
 # Distances from a door line at which the rooms on its two sides are looked up [m].
 BESIDE_M = (0.1, 0.2, 0.3, 0.45, 0.6)
 # DE-9IM pattern of a line and an area: the line lies in the area, with its ends on the border.
@@ -173,7 +173,7 @@ def _jamb(
     nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))]
     corners = shapely.get_coordinates(polygon)
     away = np.abs(corners - nearest).max(axis=1)
-    if away.min() <= AT_CORNER:
+    if away.min() <= CORNER_DISTANCE:
         x, y = corners[np.argmin(away)].tolist()
     else:
         x, y = (2 * np.rint(nearest / 2)).tolist()

@@ -21,17 +21,17 @@ I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-OUTLINES = 0.5
+MIN_OUTLINE_OVERLAP = 0.5
 """A box outlines a chamber if the intersection of box and chamber's frame is at least this share
 of their union."""
-REACHES = 0.3
+MIN_REACH_SHARE = 0.3
 """A box also claims a chamber that an opening joins to its own, if it covers this share of it."""
-TOUCHES = 0.15
+MIN_TOUCH_SHARE = 0.15
 """A box only touches a chamber that has less than this share of the box's cells, and of which the
 box covers less than half."""
 NOT_FREE, TOO_SMALL = "covers no free space", "covers too little free space"
 ONLY_TOUCHES = "only touches rooms"
-KEEPS = 0.25
+MIN_KEPT_SHARE = 0.25
 """Where boxes overlap: one that keeps less than this share of its cells is no room of its own."""
 MIN_ROOM_M2, MIN_ROOM_WIDTH_M = 0.5, 0.4
 """Least area and width of a room with a label."""
@@ -127,16 +127,19 @@ def _claims(
             dropped[number] = TOO_SMALL if box.cells else NOT_FREE
             continue
         overlap = _overlaps(box.frame, frames)
-        overlap[counts < OUTLINES * OUTLINES * sizes] = 0
-        best = int(np.argmax(overlap)) if overlap.max() >= OUTLINES else int(np.argmax(counts))
-        if counts[best] < TOUCHES * counts.sum() and counts[best] < OUTLINES * sizes[best]:
+        overlap[counts < MIN_OUTLINE_OVERLAP * MIN_OUTLINE_OVERLAP * sizes] = 0
+        best = int(np.argmax(overlap if overlap.max() >= MIN_OUTLINE_OVERLAP else counts))
+        if (
+            counts[best] < MIN_TOUCH_SHARE * counts.sum()
+            and counts[best] < MIN_OUTLINE_OVERLAP * sizes[best]
+        ):
             dropped[number] = ONLY_TOUCHES
             continue
         claims[number] = {best}
         queue = [best]
         while queue:
             for neighbor in sorted(neighbors[queue.pop()] - claims[number]):
-                if counts[neighbor] >= REACHES * sizes[neighbor]:
+                if counts[neighbor] >= MIN_REACH_SHARE * sizes[neighbor]:
                     claims[number].add(neighbor)
                     queue.append(neighbor)
     return claims, dropped
@@ -239,7 +242,7 @@ def _keep_one_piece(
         labels[own & ~largest] = -1
         own = largest
     cells = int(np.count_nonzero(own))
-    if cells >= KEEPS * np.count_nonzero(whole) and cells * cell**2 >= MIN_ROOM_M2:
+    if cells >= MIN_KEPT_SHARE * np.count_nonzero(whole) and cells * cell**2 >= MIN_ROOM_M2:
         return
     labels[own] = -1
     covering = labels[whole & (labels >= 0)]

@@ -34,8 +34,8 @@ FRONT_DOOR = 19  # 0.95 m
 # Clear space before the front door [units].
 APPROACH = 30
 # Share of homes that are first tried as plain rectangles [%].
-PLAIN = 30
-WORST_ACCESS = 6.0
+PLAIN_PERCENT = 30
+MAX_ACCESS_COST = 6.0
 # Rooms that the front door may lead into, the best first; without an entryway a hallway and the
 # living room are as good.
 _FRONT = ("entryway", "hallway", "living_room", "dining_room", "kitchen")
@@ -101,7 +101,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     decided = settle_wishes(wishes, Choices(seed, "wishes"))
     widths = _style(style, Choices(seed, "style"))
     # A plain outline is only a first try; a requested outline is binding.
-    plain = Choices(seed, "outline").chance(PLAIN)
+    plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
     briefs: list[Brief] = []
     for number in range(TRIES):
@@ -151,7 +151,7 @@ def _judge(
         return None
     walls = inner_walls(layout.boxes)
     access = link_rooms(layout, walls, widths)
-    if access is None or access.cost > WORST_ACCESS:
+    if access is None or access.cost > MAX_ACCESS_COST:
         return None
     outer = outer_walls(layout.boxes, walls)
     light = light_cost(layout, outer)

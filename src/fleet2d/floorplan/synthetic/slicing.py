@@ -17,7 +17,7 @@ from fleet2d.floorplan.synthetic.geometry import PER_M2, WALL, Box
 # Penalty, in slenderness, for a corridor that ends at the wall between two rooms.
 MOUTH_PENALTY = 3.0
 # Least width of a slot: a bathroom at the end of a deep strip gets larger, not narrower [units].
-NARROWEST = 35.0
+MIN_SLOT_WIDTH = 35.0
 
 
 class Leaf(NamedTuple):
@@ -163,7 +163,7 @@ class Strip:
             area = areas[slot[0]]
             if len(slot) > 1:
                 area += areas[slot[1]]
-            widths.append(max(area / (depth + bay), NARROWEST))
+            widths.append(max(area / (depth + bay), MIN_SLOT_WIDTH))
         return widths
 
     def depth(self, areas: Mapping[int, float], length: float) -> int:
