@@ -95,7 +95,7 @@ def in_the_loop() -> float:
             began = time.perf_counter()
             found = super()._look(bodies, end, **stop)
             Timed.seconds += time.perf_counter() - began
-            Timed.steps += (found.end - self.taken) * len(self.others)
+            Timed.steps += (found.end - self.next_step) * len(self.others)
             return found
 
     simulation = Simulation(SCENARIO)

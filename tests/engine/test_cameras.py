@@ -28,14 +28,14 @@ class Glance:
     waits = True
 
     def __init__(self, stops: int) -> None:
-        self.stops, self.taken, self.looked = stops, 0, 0
+        self.stops, self.next_step, self.looked = stops, 0, 0
 
     def limit(self, bodies: object, end: int) -> int:
-        return min(end, self.taken + self.stops)
+        return min(end, self.next_step + self.stops)
 
     def take(self, bodies: object, end: int) -> tuple[()]:
-        self.looked += end - self.taken
-        self.taken = end
+        self.looked += end - self.next_step
+        self.next_step = end
         return ()
 
     def interruptions(self, events: object) -> tuple[()]:
@@ -70,7 +70,7 @@ def observed(cameras: Cameras) -> Any:
     sightings = cameras.collect()
     cameras._sightings = [sightings]
     memory = [array.tolist() for array in cameras.memory]
-    return cameras.taken, memory, cameras.perceived.tolist(), sightings.tolist()
+    return cameras.next_step, memory, cameras.perceived.tolist(), sightings.tolist()
 
 
 def looks() -> dict[str, Any]:

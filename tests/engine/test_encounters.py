@@ -105,7 +105,7 @@ def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
         for row, event in encounters.interruptions(encounters.take(bodies, end)):
             assert 0 == row
             result.append((end - 1, event.event))
-        assert end == encounters.taken
+        assert end == encounters.next_step
         first = end
     moved = np.diff(xs, prepend=xs[0]) != 0
     steps = [

@@ -151,7 +151,7 @@ def test_watchers_that_nobody_waits_for_take_in_many_spans_at_once() -> None:
     simulation = fleet2d.Simulation(content)
     for span, _, state in spans_of(simulation, 3600):
         spans, settled = spans + 1, settled + span.settles
-        assert all(watcher.taken <= span.end for watcher in state.watchers)
+        assert all(watcher.next_step <= span.end for watcher in state.watchers)
     assert spans > 20
     assert 0 == settled
     assert digests(run(content)) == digests(simulation.finish())
@@ -161,5 +161,5 @@ def test_when_a_run_settles_all_watchers_have_taken_in_the_same_steps() -> None:
     simulation = fleet2d.Simulation(everything("20 min"))
     simulation.advance(333)
     simulation._state.settle(simulation.step)
-    assert {333} == {watcher.taken for watcher in simulation._state.watchers}
+    assert {333} == {watcher.next_step for watcher in simulation._state.watchers}
     assert 333 == simulation._state.settled

@@ -74,7 +74,7 @@ class Blocking:
         robots: Sequence[DecidingActor],
         patience: timedelta | None,
     ) -> None:
-        self.taken = 0
+        self.next_step = 0
         self._actors, self._users = [*users, *robots], len(users)
         self._patience_us = 0 if patience is None else micros(patience)
         self._waits = [Wait()] * len(self._actors)
@@ -88,7 +88,7 @@ class Blocking:
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a body has to decide: not the first of the span."""
-        first = self.taken
+        first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
         poses = PoseColumns(block.x, block.y, block.away)
         for row in self.rows:
@@ -99,7 +99,7 @@ class Blocking:
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Advance to a step."""
-        self.taken = end
+        self.next_step = end
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
@@ -168,9 +168,9 @@ class Blocking:
         for other in self._heeded(row):
             if not len(moves):
                 return
-            met = _approach(x, y, row, other, moves, self._reach(row, other))
-            met &= (away[other, moves] | away[other, moves + 1]) == 0
-            for column in moves[met].tolist():
+            overlaps = _approach(x, y, row, other, moves, self._reach(row, other))
+            overlaps &= (away[other, moves] | away[other, moves + 1]) == 0
+            for column in moves[overlaps].tolist():
                 if not self._is_past(row, other, first + column):
                     moves = moves[moves < column]
                     yield column, other
@@ -206,5 +206,5 @@ def _approach(x: I64, y: I64, row: int, other: int, columns: I64, reach: int) ->
     beside = (away_x * vy - away_y * vx).astype(np.float64)
     passes = beside * beside < float(reach * reach) * way.astype(np.float64)
     nearer: Bool = (towards > 0) & (away_x * dx + away_y * dy > 0)
-    met: Bool = nearer & np.where(towards < way, passes, ends)
-    return met
+    overlaps: Bool = nearer & np.where(towards < way, passes, ends)
+    return overlaps

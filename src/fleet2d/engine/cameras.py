@@ -90,7 +90,7 @@ class Cameras:
         perceived: The last perceived place of each identity, (identities, 2); the last row is for
             somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
-        taken: The step before which it has looked.
+        next_step: The first step at which it has not looked.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class Cameras:
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
-        self.taken = 0
+        self.next_step = 0
         # Places of the owner in the last steps, for looks whose detections become known later.
         self._trace = np.zeros((0, 2), np.int64)
         self._sightings: list[I64] = []  # not collected yet
@@ -264,13 +264,13 @@ class Cameras:
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first event that ends the span, `end` if there is none."""
-        if not self.waits or end <= self.taken:
+        if not self.waits or end <= self.next_step:
             return end
         self._ahead = self._look(bodies, end)
         return self._ahead.end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Look in the steps from `taken` to `end` - 1; return the events of seeing and losing.
+        """Look in the steps from `next_step` to `end` - 1; return the events of seeing and losing.
 
         Cameras that looked beyond `end`, before another watcher ended the span, look again.
         """
@@ -284,7 +284,7 @@ class Cameras:
         rows = result.sightings
         if self.drift is not None:
             rows = self._misplace(rows, bodies, end)
-        self.taken = end
+        self.next_step = end
         if len(rows):
             self._sightings.append(rows)
         identity = rows[:, IDENTITY]  # -1, somebody unknown, is the last row
@@ -302,7 +302,7 @@ class Cameras:
         lattice = self.owner.home.plan.lattice
         index = {other.name: i for i, other in enumerate(self.others)}
         for event in events:
-            if event.step == self.taken - 1 and event.event in stops:
+            if event.step == self.next_step - 1 and event.event in stops:
                 place = self.perceived[index.get(event.detail, len(index))]
                 x, y = lattice.to_metres(place).tolist()
                 yield self.row, SightEvent(event.event, event.detail, x, y)
@@ -313,7 +313,7 @@ class Cameras:
         assert drift is not None
         if not len(rows) and not latest:
             return rows
-        block = bodies.block(self.taken, end)
+        block = bodies.block(self.next_step, end)
         now = np.stack([block.x[self.row], block.y[self.row]], axis=1)
         trace = np.concatenate([self._trace, now])
         looks = rows[:, STEP] - self.lenses.latency[rows[:, CAMERA]]
@@ -332,16 +332,18 @@ class Cameras:
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
         old_memory = [array.copy() for array in self.memory] if stop else []
         stop_lost, stop_seen = self.ends if stop else (False, False)
-        home, window, points = self.owner.home, bodies.window(self.taken, end), None
+        home, window, points = self.owner.home, bodies.window(self.next_step, end), None
         if self.method is not None:
-            block = bodies.block(self.taken, end)
+            block = bodies.block(self.next_step, end)
             others = slice(self._first, self._first + len(self.others))
             crowd = UserPoses._make(column[others] for column in block)
             poses = poses_of(block, self.row)
             step_us = self.owner.clock.step_us
-            with blame("sight.method", self.taken):
+            with blame("sight.method", self.next_step):
                 lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
-                points = points_seen(self.method, home, lenses, poses, crowd, self.taken, step_us)
+                points = points_seen(
+                    self.method, home, lenses, poses, crowd, self.next_step, step_us
+                )
                 points[self._dark] = 0
         count, sightings, step, identity, kind = look(
             home.walls,
@@ -356,7 +358,7 @@ class Cameras:
             self.radii,
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
-        return _Look(self.taken + count, sightings, events, old_memory)
+        return _Look(self.next_step + count, sightings, events, old_memory)
 
 
 def _drift_of(owner: Actor) -> Drift | None:

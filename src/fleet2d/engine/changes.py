@@ -77,7 +77,7 @@ class Changes:
         clock: Clock,
     ) -> None:
         self.home, self.clock = home, clock
-        self.doors = {name: thing for name, thing in objects.items() if isinstance(thing, Door)}
+        self.doors = {name: item for name, item in objects.items() if isinstance(item, Door)}
         self.names = list(self.doors)
         self._used_us = [-1] * len(self.names)
         self._queue: list[DueChange] = []

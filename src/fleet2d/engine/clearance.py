@@ -32,7 +32,7 @@ class Clearance:
     """
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
-        self.taken = 0
+        self.next_step = 0
         self._users = users
         self.robots = {
             len(users) + i: robot
@@ -47,7 +47,7 @@ class Clearance:
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a robot has to decide: not the first of the span."""
-        first = self.taken
+        first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
         people = slice(0, len(self._users))
         xs, ys, away = block.x[people], block.y[people], block.away[people]
@@ -80,7 +80,7 @@ class Clearance:
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Advance to a step."""
-        self.taken = end
+        self.next_step = end
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:

@@ -95,7 +95,7 @@ class Steering(Verbs):
     @property
     def outputs(self) -> dict[str, Any]:
         """The latest output of each algorithm, by name, as behaviors read it."""
-        return dict(self._state.learners.readable)
+        return dict(self._state.learners.readable_outputs)
 
     @property
     def algorithms(self) -> dict[str, Algorithm]:

@@ -20,7 +20,11 @@ NOT_EVEN_AT_0 = -1
 
 def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
     """Return the present errors of a camera, by the latest intervention; None: the usual ones."""
-    errs = [each.errs for each in of_camera(disturbances, camera) if each.errs is not None]
+    errs = [
+        disturbance.errs
+        for disturbance in of_camera(disturbances, camera)
+        if disturbance.errs is not None
+    ]
     return errs[-1] if errs else None
 
 
@@ -29,7 +33,7 @@ def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) ->
     return [
         c
         for c, camera in enumerate(cameras)
-        if any(each.dark for each in of_camera(disturbances, camera))
+        if any(disturbance.dark for disturbance in of_camera(disturbances, camera))
     ]
 
 
@@ -37,8 +41,8 @@ def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequenc
     """Change lenses in place: dark cameras see nobody, others notice people less often."""
     lenses.widest[dark_cameras(disturbances, cameras)] = NOT_EVEN_AT_0
     for c, camera in enumerate(cameras):
-        for each in of_camera(disturbances, camera):
-            chance = Fraction(int(lenses.chance[c])) * Fraction(each.detection)
+        for disturbance in of_camera(disturbances, camera):
+            chance = Fraction(int(lenses.chance[c])) * Fraction(disturbance.detection)
             lenses.chance[c] = round(chance)
 
 
@@ -49,11 +53,11 @@ def forced_of(
     index = {name: u for u, name in enumerate(people)} | {"": -1}
     forced = np.zeros((len(cameras), len(people)), np.int64)
     for c, camera in enumerate(cameras):
-        for each in of_camera(disturbances, camera):
-            if each.missed is not None:
-                forced[c, index[each.missed]] = FORCED_MISS
-            if each.mistaken is not None:
-                user, other = each.mistaken
+        for disturbance in of_camera(disturbances, camera):
+            if disturbance.missed is not None:
+                forced[c, index[disturbance.missed]] = FORCED_MISS
+            if disturbance.mistaken is not None:
+                user, other = disturbance.mistaken
                 forced[c, index[user]] = FORCED_IDENTITY + index[other]
     return forced
 
@@ -65,10 +69,15 @@ def injected_by(
     dark = dark_cameras(disturbances, cameras)
     index = {name: u for u, name in enumerate(context.users)} | {"": -1}
     rows = [
-        (c, index[false.user], *context.lattice.to_lattice((false.x, false.y)), false.heading)
+        (
+            c,
+            index[sighting.user],
+            *context.lattice.to_lattice((sighting.x, sighting.y)),
+            sighting.heading,
+        )
         for c, camera in enumerate(cameras)
-        for each in of_camera(disturbances, camera)
-        if (false := each.injected) is not None and c not in dark
+        for disturbance in of_camera(disturbances, camera)
+        if (sighting := disturbance.injected) is not None and c not in dark
     ]
     return np.array(rows, np.int64).reshape(-1, 5)
 

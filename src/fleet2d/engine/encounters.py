@@ -169,7 +169,7 @@ class Encounters:
 
     Attributes:
         pairs: The pairs.
-        taken: The step before which all steps are taken in.
+        next_step: The first step that is not taken in.
     """
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
@@ -180,7 +180,7 @@ class Encounters:
             if user.attention is not None
             for robot_row, robot in self._robots
         ]
-        self.taken = 0
+        self.next_step = 0
         self._calls: list[tuple[int, int, str]] = []  # at the ends of plans: step, row, user
         self._ahead: list[Encounter] = []
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []
@@ -197,7 +197,7 @@ class Encounters:
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first encounter, `end` if there is none."""
-        first, block = self.taken, bodies.block(self.taken, end)
+        first, block = self.next_step, bodies.block(self.next_step, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
         calls = self._calls + [call for row, robot in self._robots for call in _calls(row, robot)]
         self._calls = []
@@ -212,7 +212,7 @@ class Encounters:
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take in the steps up to `end` - 1."""
-        first, self.taken, count = self.taken, end, end - self.taken
+        first, self.next_step, count = self.next_step, end, end - self.next_step
         self._last = []
         if not self.pairs or not count:
             return ()
@@ -229,7 +229,7 @@ class Encounters:
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
         """Yield the encounters of the last step to which the person reacts."""
         for row, user, event in self._last:
-            if user.heeds(event, self.taken - 1):
+            if user.heeds(event, self.next_step - 1):
                 yield row, event
 
 

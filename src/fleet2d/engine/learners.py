@@ -96,7 +96,7 @@ class Learners:
         self.fresh: dict[str, Any] = {}
         self.replaced: dict[str, Any] = {}
         self.all: list[Learner] = []
-        self._known = tuple(algorithms)
+        self._names = tuple(algorithms)
         _check_reads(metrics, algorithms)
         for name in update_order(algorithms):
             self._add(name, f"algorithms.{name}", algorithms[name])
@@ -107,14 +107,14 @@ class Learners:
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 
     @property
-    def readable(self) -> Mapping[str, Any]:
+    def readable_outputs(self) -> Mapping[str, Any]:
         """The outputs for behaviors."""
-        return Outputs(self._as_read(self.outputs), self._known)
+        return Outputs(self._as_read(self.outputs), self._names)
 
     @property
     def known(self) -> tuple[str, ...]:
         """The names of all algorithms."""
-        return self._known
+        return self._names
 
     def _as_read(self, outputs: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return outputs as all but metrics read them."""
@@ -251,7 +251,7 @@ class Learners:
         history = History(log, learner.since, end, step_s, visible, learner.oldest, needs)
         state = Present(
             learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
-            self.users, self.robots, Outputs({**outputs}, self._known), self.seed
+            self.users, self.robots, Outputs({**outputs}, self._names), self.seed
         )  # fmt: skip
         with blame(learner.path, end - 1):
             output = learner.component.update(history, state)

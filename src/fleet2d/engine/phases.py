@@ -65,7 +65,9 @@ def decide(state: State, span: Span) -> None:
             state.bodies.ask_at[row] = step
         due, in_way = bool(state.bodies.ask_at[row] <= step), None
         if due:
-            situation = Situation(actor, step, state.take_pending(row), state.learners.readable)
+            situation = Situation(
+                actor, step, state.take_pending(row), state.learners.readable_outputs
+            )
             due = not actor.goes_on(situation)
         if due:
             state.end_plan(row, step)
@@ -76,7 +78,7 @@ def decide(state: State, span: Span) -> None:
         if in_way is not None:
             if not due:
                 state.end_plan(row, step)
-            situation = Situation(actor, step, (), state.learners.readable)
+            situation = Situation(actor, step, (), state.learners.readable_outputs)
             actor.give_way(situation, in_way.name, clearance.surroundings(actor))
             state.bodies.follow(row, actor.plan)
         begins = due or in_way is not None
@@ -100,7 +102,7 @@ def _mind_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
     other = blocking.in_way(state.bodies, row)
     if other is None:
         return False
-    situation = Situation(actor, step, (), state.learners.readable)
+    situation = Situation(actor, step, (), state.learners.readable_outputs)
     plan = blocking.plan(situation, other)
     if plan is None:
         return False

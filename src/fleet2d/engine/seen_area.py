@@ -33,7 +33,7 @@ class SeenArea:
     Attributes:
         robot: The robot.
         row: Its row among the bodies.
-        taken: The step before which all steps are included.
+        next_step: The first step that is not included.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class SeenArea:
         """
         assert isinstance(robot.entity, Robot)
         self.robot, self.row, self.every, self._patches = robot, row, every, patches
-        self._bodies, self.taken = bodies, 0
+        self._bodies, self.next_step = bodies, 0
         plan = robot.home.plan
         lattice, step_us = plan.lattice, robot.clock.step_us
         lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
@@ -116,14 +116,14 @@ class SeenArea:
         return end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Look from the robot's poses in the steps from `taken` to `end` - 1."""
+        """Look from the robot's poses in the steps from `next_step` to `end` - 1."""
         walls = self.robot.home.walls
         if walls is not self._setup.walls:
             self._settle()
             self._set_walls(walls)
-        while self.taken < end:
-            first, until = self.taken, min(end, self.taken + LONGEST)
-            self.taken = until
+        while self.next_step < end:
+            first, until = self.next_step, min(end, self.next_step + LONGEST)
+            self.next_step = until
             runs = bodies.runs(self.row, first, until)
             watch(self._setup, runs, 0, first, until, self._cache, self._record)
             if self._bin_steps:
@@ -141,7 +141,7 @@ class SeenArea:
     def _collect_bins(self, begin: int) -> None:
         """Collect the bins of the steps from `begin` to the present one."""
         first = begin // self._bin_steps - self._first_bin
-        end = (self.taken - 1) // self._bin_steps + 1 - self._first_bin
+        end = (self.next_step - 1) // self._bin_steps + 1 - self._first_bin
         open_bins = self._bins[first:]  # the last bin, if it has earlier steps
         bins = np.stack([self._record.binned[: end - first], self._record.most[: end - first]], 1)
         if len(open_bins):
@@ -192,6 +192,6 @@ class SeenArea:
     def time_since_seen(self) -> NDArray[np.float64]:
         """Return the time since each cell was in view [s], float64 (rows, columns), NaN: never."""
         last = self.last_seen()
-        steps = np.where(last == NEVER, np.nan, self.taken - 1 - last)
+        steps = np.where(last == NEVER, np.nan, self.next_step - 1 - last)
         elapsed: NDArray[np.float64] = steps * (self.robot.clock.step_us / 1e6)
         return elapsed

@@ -33,7 +33,7 @@ class Sensors:
 
     Attributes:
         names: Their names, in the order of the scenario.
-        taken: The step before which the sensors have been read.
+        next_step: The first step at which the sensors have not been read.
         rooms: The room in the readings of each sensor.
         words: The words of each sensor for its two states, on and off.
         stuck: The faults from outside, by name.
@@ -49,7 +49,7 @@ class Sensors:
         users: Sequence[str],
     ) -> None:
         self.home, self.users = home, len(users)
-        self.taken = 0
+        self.next_step = 0
         self.stuck: dict[str, SensorFault] = {}
         self.awaited = False
         self._rows: list[SensorRow] = []
@@ -66,7 +66,7 @@ class Sensors:
         self.rooms = [sensor.room or sensor.place(home) for sensor in self.sensors]
         self.words = [sensor.words for sensor in self.sensors]
         self._states = [SensorState(sensor.hold_us() // clock.step_us) for sensor in self.sensors]
-        self._before: tuple[np.ndarray, ...] | None = None  # the poses of the last step
+        self._last_poses: tuple[np.ndarray, ...] | None = None
         self._activities: dict[str, list[tuple[int, str]]] = {user: [] for user in users}
 
     @property
@@ -81,10 +81,10 @@ class Sensors:
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first in which a sensor reports something."""
-        first, before = self.taken, self._before
+        first, last_poses = self.next_step, self._last_poses
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
-            self._before = before
+            self._last_poses = last_poses
             for number, state in enumerate(self._states):
                 readings = self._read(number, copy(state), view, end)
                 end = min([end, *(reading.step + 1 for reading in readings)])
@@ -92,7 +92,7 @@ class Sensors:
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Read the sensors; `collect` returns the readings."""
-        first, self.taken = self.taken, end
+        first, self.next_step = self.next_step, end
         if not self.sensors or first == end:
             return ()
         with blame("objects", first):
@@ -146,9 +146,11 @@ class Sensors:
 
     def _view(self, block: PoseBlock, first: int) -> SensorView:
         arrays = (block.x, block.y, block.away == 0)
-        before = self._before or tuple(array[:, :1] for array in arrays)
-        self._before = tuple(array[:, -1:].copy() for array in arrays)
-        x, y, present = (np.concatenate(pair, axis=1) for pair in zip(before, arrays, strict=True))
+        last_poses = self._last_poses or tuple(array[:, :1] for array in arrays)
+        self._last_poses = tuple(array[:, -1:].copy() for array in arrays)
+        x, y, present = (
+            np.concatenate(pair, axis=1) for pair in zip(last_poses, arrays, strict=True)
+        )
         return SensorView(first, x, y, present, self.users)
 
     def _activity(self, user: int, step: int) -> str:

@@ -97,7 +97,7 @@ class InViewGauge(Gauge):
         super().__init__()
         actors, users = state.actors, state.bodies.users
         self._cameras = PerfectCameras(cameras.row, actors, users, cameras.method, cameras.radii)
-        self._cameras.taken = state.settled
+        self._cameras.next_step = state.settled
         self._body, self._is_seen = body, False
 
     def _measure(self, block: Block) -> Trace:

@@ -175,7 +175,7 @@ class State:
 
     def take(self, watcher: Watcher, end: int) -> Sequence[Event]:
         """Let a watcher take in the steps up to `end` - 1; return its events."""
-        if watcher.taken >= end:
+        if watcher.next_step >= end:
             return ()
         events = watcher.take(self.bodies, end)
         self.events.emit(events)

@@ -15,10 +15,10 @@ class Watcher(Protocol):
     `limit`; all others take in many spans at once.
 
     Attributes:
-        taken: The step before which it has taken in all steps.
+        next_step: The first step that it has not taken in.
     """
 
-    taken: int
+    next_step: int
 
     @property
     def waits(self) -> bool:
@@ -28,7 +28,7 @@ class Watcher(Protocol):
         """Return the step before which the present span ends at the latest, `end` or earlier."""
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps from `taken` to `end` - 1; return their events."""
+        """Take in the steps from `next_step` to `end` - 1; return their events."""
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
         """Return the bodies, by row, whose plans an event of the last step ends, and the event.

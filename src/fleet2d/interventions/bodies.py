@@ -63,9 +63,9 @@ class Put(BodyIntervention):
         world.move(actor, Pose(x, y, actor.state.heading if heading is None else heading, 0), part)
 
     def _place(self, actor: Actor, world: World) -> tuple[int, int]:
-        thing = None if is_point(self.to) else furniture_of(actor, self.to)
-        if thing is not None:
-            return actor.place_at(thing, 0).approach
+        item = None if is_point(self.to) else furniture_of(actor, self.to)
+        if item is not None:
+            return actor.place_at(item, 0).approach
         return actor.find_anywhere(self.to, world.step * world.clock.step_us, "put")
 
 

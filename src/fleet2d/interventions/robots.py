@@ -285,4 +285,4 @@ def disturb(world: World, name: str) -> None:
     """Apply the disturbances of all active interventions to the cameras of a robot."""
     acts = (act for act in world.lasting if getattr(act, "entity", None) == name)
     disturbances = (getattr(act, "disturbance", None) for act in acts)
-    world.disturb(name, [each for each in disturbances if each is not None])
+    world.disturb(name, [item for item in disturbances if item is not None])
