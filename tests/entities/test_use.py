@@ -62,7 +62,7 @@ def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path: Any) -> N
     assert where(sim) == pytest.approx((4, 2.2), abs=1e-3)
     assert sim.state["ana"]["heading"] == pytest.approx(np.pi, abs=0.002)
     plan = sim.actors["ana"].plan
-    assert [0, 2] == plan.posture_at(np.array([0, 30_000_000])).tolist()
+    assert [0, 2] == [plan.posture_at(time_us) for time_us in (0, 30_000_000)]
 
 
 def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path: Any) -> None:

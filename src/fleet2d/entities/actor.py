@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fleet2d.blame import blame
 from fleet2d.entities.battery import Charge
 from fleet2d.entities.body import NEVER, Body
@@ -80,7 +78,7 @@ class Actor(Body):
         plan: Plan | None = getattr(self, "plan", None)  # none yet while the first one is made
         if plan is None or not (plan.postures or plan.posture != "stand"):
             return 0
-        return int(plan.posture_at(np.array([time_us]))[0])
+        return plan.posture_at(time_us)
 
     def _first_pose(self) -> Pose:
         """Return the pose at step 0."""

@@ -65,7 +65,6 @@ class Plan:
         self._posture_before = body.posture_code(self.time_us)
         self.posture: Posture = POSTURES[self._posture_before]
         self.postures: list[tuple[int, int]] = []
-        self._posture_begins, self._posture_codes = np.empty(0, np.int64), np.empty(0, np.int8)
         self._mark()
 
     @property
@@ -145,7 +144,7 @@ class Plan:
         if self.away or (self.x, self.y) != (at.x, at.y):
             self.go_to_point(*at.approach)
             self._step_to(at.x, at.y)
-        self.turn_by(turn_between(self.heading, at.heading) / TURN)
+        self._turn(turn_between(self.heading, at.heading))
         self.take(at.posture)
         return self.note("uses", at.name)
 
@@ -156,18 +155,10 @@ class Plan:
             self.posture = posture
         return self
 
-    def posture_at(self, times_us: I64) -> NDArray[np.int8]:
-        """Return the posture at ascending moments within the plan, by number in POSTURES, int8."""
-        if len(self._posture_codes) <= len(self.postures):  # out of date
-            self._posture_begins = np.array([time for time, _ in self.postures], np.int64)
-            codes = [code for _, code in self.postures]
-            self._posture_codes = np.array([self._posture_before, *codes], np.int8)
-        begins, known_codes = self._posture_begins, self._posture_codes
-        first, last = (int(begins.searchsorted(t, "right")) for t in (times_us[0], times_us[-1]))
-        if first == last:  # the usual case: no change in between
-            return np.full(len(times_us), known_codes[first])
-        at_times: NDArray[np.int8] = known_codes[np.searchsorted(begins, times_us, side="right")]
-        return at_times
+    def posture_at(self, time_us: int) -> int:
+        """Return the posture at a moment within the plan, by number in POSTURES."""
+        changes = reversed(self.postures)
+        return next((code for time, code in changes if time <= time_us), self._posture_before)
 
     def posture_times(self) -> tuple[I64, NDArray[np.int8]]:
         """Return when the posture changes [us], int64 (n,), and the postures, int8 (n + 1,)."""
@@ -226,11 +217,15 @@ class Plan:
 
     def turn_by(self, turns: float) -> Self:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
-        self._check_goes_on()
-        now = self.time_us, self.x, self.y, self.heading, self.away
-        after = self._legs.turn(*now, round(turns * TURN), self._body.turn_rate)
-        self.time_us, self.heading = after[0], after[3]
+        self._turn(round(turns * TURN))
         return self
+
+    def _turn(self, headings: int) -> None:
+        self._check_goes_on()
+        if headings:
+            now = self.time_us, self.x, self.y, self.heading, self.away
+            after = self._legs.turn(*now, headings, self._body.turn_rate)
+            self.time_us, self.heading = after[0], after[3]
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
         """Stay for a duration, or until a local time; without either, for good.

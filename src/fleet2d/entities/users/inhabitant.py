@@ -18,6 +18,7 @@ from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.random import Bits
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import KNOTS, Law, exponential
+from fleet2d.routines.occupancy import ANY_ROOM
 from fleet2d.routines.planner import NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
 
@@ -220,6 +221,8 @@ class Inhabitant(Behavior):
     def _at_present(self, setting: Setting) -> Setting:
         """Return the setting of an activity, without the rooms that shut doors block at present."""
         rooms = self.spots.reachable(setting.rooms)
+        if rooms is setting.rooms:  # no door is shut
+            return setting
         if len(rooms) < len(setting.rooms):
             activity = setting.activity
             seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
@@ -229,6 +232,8 @@ class Inhabitant(Behavior):
     def _in_its_room(self, doing: Doing) -> Setting:
         """Return the setting of a doing, in the room that its household chose for it, if any."""
         setting = self.settings[doing.activity]
+        if doing.room == ANY_ROOM:
+            return setting
         room = next((room for room in self.reachable_rooms if room.index == doing.room), None)
         return setting if room is None else self._within(setting, room)
 
@@ -244,7 +249,7 @@ class Inhabitant(Behavior):
         if choose == "here":
             return self._stay_in_the_room(plan, setting, draws)
         if choose == "nearest" and len(setting.rooms) > 1:
-            setting = self._within(setting, self._nearest(plan, setting.rooms))
+            setting = self._within(setting, self.spots.nearest(setting.rooms, plan.x, plan.y))
         room = draws.choice(setting.rooms)
         if choose == "each_time":
             setting = self._within(setting, room)
@@ -262,16 +267,6 @@ class Inhabitant(Behavior):
         place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
         settle_at(plan, setting, place)
         return place
-
-    def _nearest(self, plan: Plan, rooms: list["Room"]) -> "Room":
-        """Return the room whose middle is nearest, in a straight line."""
-        x, y = self.spots.in_metres(plan.x, plan.y)
-
-        def distance(room: "Room") -> float:
-            across, along = room.anchor_xy[0] - x, room.anchor_xy[1] - y
-            return across * across + along * along
-
-        return min(rooms, key=distance)
 
     def _move_about(
         self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws

@@ -1,7 +1,7 @@
 """Spots: points in rooms where people stand, distinct for the members of a household."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence, Set
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from fleet2d.streams import Draws
@@ -62,7 +62,12 @@ class Spots:
         self.members = members
         self._actor = actor
         self._of_room: dict[int, list[Spot]] = {}
+        self._at_furniture: dict[Hashable, list[Seat]] = {}
         self._version = -1  # of the home, when the spots were chosen
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out what is found again."""
+        return {**self.__dict__, "_of_room": {}, "_at_furniture": {}}
 
     def reachable(self, rooms: list["Room"]) -> list["Room"]:
         """Return those of some rooms that the body can get to at present: doors may be locked."""
@@ -79,11 +84,19 @@ class Spots:
         """Return the room that holds a lattice point."""
         return self._actor.home.plan.room_at(*self.in_metres(x, y))
 
+    def nearest(self, rooms: list["Room"], x: int, y: int) -> "Room":
+        """Return the room whose middle is nearest to a lattice point, in a straight line."""
+        x_m, y_m = self.in_metres(x, y)
+
+        def distance(room: "Room") -> float:
+            across, along = room.anchor_xy[0] - x_m, room.anchor_xy[1] - y_m
+            return across * across + along * along
+
+        return min(rooms, key=distance)
+
     def in_room(self, room: "Room") -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""
-        if self._version != self._actor.home.version:  # furniture was moved, a door was shut
-            self._version = self._actor.home.version
-            self._of_room.clear()
+        self._check_version()
         if room.index not in self._of_room:
             space, part = self._actor.space, self._actor.part
             grid = self._actor.home.cached(
@@ -112,8 +125,25 @@ class Spots:
             posture: If a piece has places for this posture, only those of its places are used.
             share: Rank of the body, and number of bodies that share; None: as in its household.
         """
-        home, indices = self._actor.home, {room.index for room in rooms}
-        rank, members = share or (self.rank, self.members)
+        self._check_version()
+        indices = frozenset(room.index for room in rooms)
+        key = (tuple(kinds), indices, posture, share, self._actor.part)
+        if key not in self._at_furniture:
+            share = share or (self.rank, self.members)
+            self._at_furniture[key] = self._find_seats(kinds, indices, posture, share)
+        return self._at_furniture[key]
+
+    def _check_version(self) -> None:
+        """Forget the places of an earlier arrangement of doors and furniture."""
+        if self._version != self._actor.home.version:
+            self._version = self._actor.home.version
+            self._of_room.clear()
+            self._at_furniture.clear()
+
+    def _find_seats(
+        self, kinds: Sequence[str], indices: Set[int], posture: str, share: tuple[int, int]
+    ) -> list[Seat]:
+        home, (rank, members) = self._actor.home, share
         seats: list[Seat] = []
         for kind in kinds:
             for thing in (thing for thing in home.objects if thing.type == kind):

@@ -302,6 +302,7 @@ def _even_at_least(value: float) -> int:
     return 2 * int(np.ceil(value / 2))
 
 
+@lru_cache(CACHED_ROUTES)
 def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:
     """Return the straight route, int64 (2, 2), read-only as those of `Space.route` are."""
     return read_only(np.array([begin, end], np.int64))
