@@ -4,8 +4,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -19,6 +20,17 @@ _ROOT = Path(__file__).parents[1]
 # No property fails by how long an example takes.
 hypothesis.settings.register_profile("fleet2d", max_examples=examples(100), deadline=None)
 hypothesis.settings.load_profile("fleet2d")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(parent: pytest.Collector) -> Generator[None, Any, Any]:
+    """Look for no doctests in tests: there are none, and it takes as long as to import them."""
+    option = parent.config.option
+    option.doctestmodules, before = False, option.doctestmodules
+    try:
+        return (yield)
+    finally:
+        option.doctestmodules = before
 
 
 @pytest.fixture(scope="session")

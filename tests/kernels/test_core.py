@@ -91,12 +91,12 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
-def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody(path: Path) -> None:
-    names = imported(path)
-    assert not {name for name in names if name.partition(".")[0] == "numba"}
-    if path.parent != PACKAGE / "kernels":
-        assert "fleet2d._core" not in names
+def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody() -> None:
+    for path in SOURCES:
+        names = imported(path)
+        assert not {name for name in names if name.partition(".")[0] == "numba"}, path
+        if path.parent != PACKAGE / "kernels":
+            assert "fleet2d._core" not in names, path
 
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "kernels").glob("*.py")), ids=lambda p: p.stem)
@@ -515,37 +515,42 @@ ARRAYS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), np
 INTEGERS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), (int, np.integer))]
 
 
-def ids(case: Any) -> str:
-    name, at = case
-    return f"{name}-{'.'.join(map(str, at))}"
+def each(cases: list[tuple[str, Path_]]) -> pytest.MarkDecorator:
+    """Parametrize a test by the name of a call, with all places in its arguments."""
+    places: dict[str, list[Path_]] = {}
+    for name, at in cases:
+        places.setdefault(name, []).append(at)
+    return pytest.mark.parametrize(("name", "places"), places.items(), ids=places)
 
 
-@pytest.mark.parametrize("case", ARRAYS, ids=ids)
-def test_arrays_of_another_type_are_refused(case: tuple[str, Path_]) -> None:
-    name, at = case
-    array = leaf(CALLS[name](), at)
-    other = np.int32 if array.dtype != np.int32 else np.int64
-    wrong: list[Any] = [
-        array.astype(other),
-        array.astype(np.float32),
-        array.astype(array.dtype.newbyteorder()) if array.itemsize > 1 else object(),
-        array[None],
-        array.ravel() if array.ndim > 1 else array.reshape(-1, 1),
-        array.tolist(),
-        object() if name == "look" and at in ((8,), (9,)) else None,  # there, it may be left out
-        memoryview(array),
-    ]
-    for value in wrong:
-        with pytest.raises(TypeError, match="incompatible function arguments"):
-            named(name)(*put(CALLS[name](), at, value))
+@each(ARRAYS)
+def test_arrays_of_another_type_are_refused(name: str, places: list[Path_]) -> None:
+    for at in places:
+        array = leaf(CALLS[name](), at)
+        other = np.int32 if array.dtype != np.int32 else np.int64
+        wrong: list[Any] = [
+            array.astype(other),
+            array.astype(np.float32),
+            array.astype(array.dtype.newbyteorder()) if array.itemsize > 1 else object(),
+            array[None],
+            array.ravel() if array.ndim > 1 else array.reshape(-1, 1),
+            array.tolist(),
+            object()
+            if name == "look" and at in ((8,), (9,))
+            else None,  # there, it may be left out
+            memoryview(array),
+        ]
+        for value in wrong:
+            with pytest.raises(TypeError, match="incompatible function arguments"):
+                named(name)(*put(CALLS[name](), at, value))
 
 
-@pytest.mark.parametrize("case", INTEGERS, ids=ids)
-def test_numbers_that_are_none_or_too_large_are_refused(case: tuple[str, Path_]) -> None:
-    name, at = case
-    for value in ("1", None, 2**64, -(2**63) - 1, 1.5):
-        with pytest.raises(TypeError, match="incompatible function arguments"):
-            named(name)(*put(CALLS[name](), at, value))
+@each(INTEGERS)
+def test_numbers_that_are_none_or_too_large_are_refused(name: str, places: list[Path_]) -> None:
+    for at in places:
+        for value in ("1", None, 2**64, -(2**63) - 1, 1.5):
+            with pytest.raises(TypeError, match="incompatible function arguments"):
+                named(name)(*put(CALLS[name](), at, value))
 
 
 @pytest.mark.parametrize(
@@ -562,17 +567,17 @@ def test_too_few_and_too_many_arguments_are_refused(name: str) -> None:
 TUPLES = sorted({(name, at[:-1]) for name, at in [*ARRAYS, *INTEGERS] if len(at) > 1})
 
 
-@pytest.mark.parametrize("case", TUPLES, ids=ids)
-def test_named_tuples_of_another_length_are_refused(case: tuple[str, Path_]) -> None:
-    name, at = case
-    value = leaf(CALLS[name](), at)
-    parts_ = tuple(value)
-    longer_and_shorter: list[Any] = [(), parts_[:-1], (*parts_, parts_[0])]
-    if hasattr(value, "_fields") and name != "points_in_reach":
-        longer_and_shorter.append(list(value))
-    for wrong in longer_and_shorter:
-        with pytest.raises(TypeError, match="incompatible function arguments"):
-            named(name)(*put(CALLS[name](), at, wrong))
+@each(TUPLES)
+def test_named_tuples_of_another_length_are_refused(name: str, places: list[Path_]) -> None:
+    for at in places:
+        value = leaf(CALLS[name](), at)
+        parts_ = tuple(value)
+        longer_and_shorter: list[Any] = [(), parts_[:-1], (*parts_, parts_[0])]
+        if hasattr(value, "_fields") and name != "points_in_reach":
+            longer_and_shorter.append(list(value))
+        for wrong in longer_and_shorter:
+            with pytest.raises(TypeError, match="incompatible function arguments"):
+                named(name)(*put(CALLS[name](), at, wrong))
 
 
 WRITTEN = {
@@ -589,18 +594,18 @@ WRITTEN = {
 """The arrays that are written to, by function."""
 
 
-@pytest.mark.parametrize(
-    "case", [(n, at) for n, places in WRITTEN.items() for at in places], ids=ids
-)
-def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(case: tuple[str, Path_]) -> None:
-    name, at = case
-    array = leaf(CALLS[name](), at)
-    fixed, apart = array.copy(), np.repeat(array, 2, axis=-1)[..., ::2]
-    fixed.setflags(write=False)
-    assert array.shape == apart.shape
-    for wrong in (fixed, apart) if array.shape[-1] > 1 else (fixed,):
-        with pytest.raises(TypeError, match="incompatible function arguments"):
-            named(name)(*put(CALLS[name](), at, wrong))
+@each([(n, at) for n, places in WRITTEN.items() for at in places])
+def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(
+    name: str, places: list[Path_]
+) -> None:
+    for at in places:
+        array = leaf(CALLS[name](), at)
+        fixed, apart = array.copy(), np.repeat(array, 2, axis=-1)[..., ::2]
+        fixed.setflags(write=False)
+        assert array.shape == apart.shape
+        for wrong in (fixed, apart) if array.shape[-1] > 1 else (fixed,):
+            with pytest.raises(TypeError, match="incompatible function arguments"):
+                named(name)(*put(CALLS[name](), at, wrong))
 
 
 def answer(name: str, args: tuple[Any, ...]) -> Any:
@@ -622,26 +627,28 @@ def same(one: Any, other: Any) -> bool:
 READ = [(name, at) for name, at in ARRAYS if at not in WRITTEN.get(name, ())]
 
 
-@pytest.mark.parametrize("case", READ, ids=ids)
-def test_arrays_that_are_read_may_lie_in_memory_as_they_like(case: tuple[str, Path_]) -> None:
-    name, at = case
-    expected = answer(name, CALLS[name]())
-    array = leaf(CALLS[name](), at)
-    fixed = array.copy()
-    fixed.setflags(write=False)
-    bytes_ = np.zeros(array.nbytes + 1, np.uint8)
-    bytes_[1:] = array.ravel().view(np.uint8)
-    unaligned = np.frombuffer(bytes_.data, array.dtype, array.size, 1).reshape(array.shape)
-    for other in (
-        fixed,
-        np.asfortranarray(array),
-        np.repeat(array, 2, axis=-1)[..., ::2],
-        np.repeat(array, 3, axis=0)[::3],
-        array[::-1].copy()[::-1],
-        unaligned,
-    ):
-        assert np.array_equal(array, other)
-        assert same(expected, answer(name, put(CALLS[name](), at, other))), other.flags
+@each(READ)
+def test_arrays_that_are_read_may_lie_in_memory_as_they_like(
+    name: str, places: list[Path_]
+) -> None:
+    for at in places:
+        expected = answer(name, CALLS[name]())
+        array = leaf(CALLS[name](), at)
+        fixed = array.copy()
+        fixed.setflags(write=False)
+        bytes_ = np.zeros(array.nbytes + 1, np.uint8)
+        bytes_[1:] = array.ravel().view(np.uint8)
+        unaligned = np.frombuffer(bytes_.data, array.dtype, array.size, 1).reshape(array.shape)
+        for other in (
+            fixed,
+            np.asfortranarray(array),
+            np.repeat(array, 2, axis=-1)[..., ::2],
+            np.repeat(array, 3, axis=0)[::3],
+            array[::-1].copy()[::-1],
+            unaligned,
+        ):
+            assert np.array_equal(array, other)
+            assert same(expected, answer(name, put(CALLS[name](), at, other))), other.flags
 
 
 EXTREME = [-(2**63), -(2**62), -(2**31), -2, -1, 0, 1, 2, 3, 1000, 2**31, 2**40, 2**62, 2**63 - 1]

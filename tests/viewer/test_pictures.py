@@ -1,10 +1,9 @@
 """Pictures of moments and stretches, films, reports: written completely, in the requested format."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.scenes import Cli
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -119,8 +118,9 @@ def test_report_escapes_what_a_scenario_names(run_dir: Path) -> None:
         (["--fov", "1,1,0"], "for a floor plan"),
     ],
 )
-def test_show_refuses_what_is_no_picture(run_dir: Path, words: list[str], message: str) -> None:
-    command = [sys.executable, "-m", "fleet2d.cli", "show", str(run_dir), *words]
-    process = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert 2 == process.returncode
-    assert message in process.stderr
+def test_show_refuses_what_is_no_picture(
+    fleet2d: Cli, run_dir: Path, words: list[str], message: str
+) -> None:
+    code, _, err = fleet2d("show", run_dir, *words)
+    assert 2 == code
+    assert message in err
