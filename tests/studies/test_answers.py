@@ -108,8 +108,10 @@ def test_shares_of_the_variance_name_what_matters() -> None:
 def test_the_ratio_of_variances_is_that_of_unpaired_to_paired() -> None:
     generator = np.random.default_rng(2)
     life = generator.normal(0, 1, 4000)
-    old, new = (life + generator.normal(0, 0.5, 4000) for _ in range(2))
-    assert 5.0 == pytest.approx(variance_ratio(new, old), rel=0.1)  # 2 × 1.25 / (2 × 0.25)
+    method_a, method_b = (life + generator.normal(0, 0.5, 4000) for _ in range(2))
+    assert 5.0 == pytest.approx(
+        variance_ratio(method_b, method_a), rel=0.1
+    )  # 2 × 1.25 / (2 × 0.25)
 
 
 def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path: Path) -> None:

@@ -79,11 +79,11 @@ def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
         "print(fleet2d.map_runs(seed, [fleet2d.load_scenario('simulation.duration=1 min', seed=s)"
         " for s in (3, 5)], workers=1))\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=120,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
     )  # fmt: skip
-    assert ("[3, 5]\n", 0) == (done.stdout, done.returncode), done.stderr
+    assert ("[3, 5]\n", 0) == (process.stdout, process.returncode), process.stderr
 
 
 def test_a_worker_that_holds_too_much_memory_is_replaced() -> None:

@@ -59,7 +59,7 @@ class CollectingObserver(driver.Observer):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def undisturbed_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study that ran without disturbance."""
     folder = tmp_path_factory.mktemp("studies") / "whole"
     run(small(**ROWS), folder)
@@ -67,13 +67,15 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def copied(whole: Path, tmp_path: Path) -> Path:
+def copied(undisturbed_dir: Path, tmp_path: Path) -> Path:
     """The same, to be disturbed."""
-    return shutil.copytree(whole, tmp_path / "copied")
+    return shutil.copytree(undisturbed_dir, tmp_path / "copied")
 
 
-def test_a_study_is_one_data_set_and_few_files(whole: Path) -> None:
-    files = sorted(p.relative_to(whole).as_posix() for p in whole.rglob("*") if p.is_file())
+def test_a_study_is_one_data_set_and_few_files(undisturbed_dir: Path) -> None:
+    files = sorted(
+        p.relative_to(undisturbed_dir).as_posix() for p in undisturbed_dir.rglob("*") if p.is_file()
+    )
     assert [
         "lock", "parts/000001.json", "plan.parquet", "results/000001.parquet", "scenarios.parquet",
         "study.json", "tables/room_share/000001.parquet", "variants.parquet",
@@ -87,7 +89,9 @@ def test_run_again_it_runs_nothing(copied: Path) -> None:
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_it_goes_on_where_it_was_interrupted(whole: Path, tmp_path: Path, backwards: bool) -> None:
+def test_it_goes_on_where_it_was_interrupted(
+    undisturbed_dir: Path, tmp_path: Path, backwards: bool
+) -> None:
     folder = tmp_path / "study"
     ran = []
     for most in (2, 1, 0, 9):
@@ -96,7 +100,7 @@ def test_it_goes_on_where_it_was_interrupted(whole: Path, tmp_path: Path, backwa
             _, study = run(small(**ROWS), folder, executor)
         ran += executor.ran
     assert sorted(ran) == list(range(6))  # nothing twice
-    _, undisturbed = run(small(**ROWS), whole)
+    _, undisturbed = run(small(**ROWS), undisturbed_dir)
     assert digests(undisturbed) == digests(study)
     assert undisturbed.arrow("room_share").to_table() == study.arrow("room_share").to_table()
 
@@ -111,7 +115,9 @@ def test_an_interrupted_study_can_be_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("file", ["results/000001.parquet", "tables/room_share/000001.parquet"])
 @pytest.mark.parametrize("harm", ["cut", "gone", "changed"])
-def test_what_is_damaged_is_run_again(copied: Path, whole: Path, file: str, harm: str) -> None:
+def test_what_is_damaged_is_run_again(
+    copied: Path, undisturbed_dir: Path, file: str, harm: str
+) -> None:
     path = copied / file
     if harm == "gone":
         path.unlink()
@@ -123,7 +129,7 @@ def test_what_is_damaged_is_run_again(copied: Path, whole: Path, file: str, harm
     counts, study = run(small(**ROWS), copied, executor, observer=observer)
     assert (6, 6) == (counts.complete, len(executor.ran))
     assert file in observer.notes[0]
-    assert digests(open_study(whole)) == digests(study)
+    assert digests(open_study(undisturbed_dir)) == digests(study)
 
 
 @pytest.mark.parametrize("file", ["variants.parquet", "lock"])
@@ -148,18 +154,18 @@ def test_a_crash_between_commit_and_removal_of_the_journal_counts_nothing_twice(
 
 
 def test_a_journal_that_grows_large_becomes_a_part(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
 ) -> None:
     monkeypatch.setattr(driver, "PART_BYTES", 2500)
     _, study = run(small(**ROWS), tmp_path / "study")
     assert len(list((tmp_path / "study/parts").iterdir())) > 1
-    assert digests(open_study(whole)) == digests(study)
+    assert digests(open_study(undisturbed_dir)) == digests(study)
     rows = study.polars("room_share").collect()
     assert 6 == rows["variant"].n_unique()
 
 
 def test_a_full_disk_ends_it_and_the_same_command_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
 ) -> None:
     write = os.pwrite
 
@@ -175,7 +181,7 @@ def test_a_full_disk_ends_it_and_the_same_command_goes_on(
     executor = CountingExecutor()
     _, study = run(small(**ROWS), tmp_path / "study", executor)
     assert 0 < len(executor.ran) < 6
-    assert digests(open_study(whole)) == digests(study)
+    assert digests(open_study(undisturbed_dir)) == digests(study)
 
 
 def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path) -> None:
@@ -189,11 +195,11 @@ def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path)
 
 
 def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path) -> None:
-    other = small(base=base("3 min"), **ROWS)
+    longer = small(base=base("3 min"), **ROWS)
     with pytest.raises(RunDirectoryError, match=r"6 of scenarios.*no longer has.*--changed redo"):
-        run(other, copied)
+        run(longer, copied)
     executor = CountingExecutor()
-    counts, study = run(other, copied, executor, changed="redo")
+    counts, study = run(longer, copied, executor, changed="redo")
     assert (6, 6) == (counts.complete, len(executor.ran))
     assert {180.0} == set(study.variants["simulated_s"])
 
@@ -286,10 +292,10 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
 
 @pytest.mark.parametrize("workers", some([2, 1, 4], 3))
 def test_results_are_the_same_with_any_number_of_workers(
-    whole: Path, tmp_path: Path, workers: int
+    undisturbed_dir: Path, tmp_path: Path, workers: int
 ) -> None:
     counts, study = run(small(**ROWS), tmp_path / "study", LocalExecutor(workers))
     assert 6 == counts.complete
-    assert digests(open_study(whole)) == digests(study)
-    undisturbed = open_study(whole)
+    assert digests(open_study(undisturbed_dir)) == digests(study)
+    undisturbed = open_study(undisturbed_dir)
     assert undisturbed.arrow("room_share").to_table() == study.arrow("room_share").to_table()

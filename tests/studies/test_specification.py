@@ -10,28 +10,28 @@ from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.specification import Specification, read_specification
 
 
-def read(text: str, folder: Path) -> Specification:
+def read_text(text: str, folder: Path) -> Specification:
     file = folder / "study.yaml"
     file.write_text(text)
     return read_specification(file)
 
 
 def test_a_file_is_called_by_its_name(tmp_path: Path) -> None:
-    assert "study" == read("replicates: 2\n", tmp_path).name
-    assert "speeds" == read("name: speeds\n", tmp_path).name
+    assert "study" == read_text("replicates: 2\n", tmp_path).name
+    assert "speeds" == read_text("name: speeds\n", tmp_path).name
 
 
 def test_the_bundled_scenario_is_the_base_of_those_without(tmp_path: Path) -> None:
-    assert "bundled" == read("replicates: 2\n", tmp_path).base.data["floorplan"]["type"]
+    assert "bundled" == read_text("replicates: 2\n", tmp_path).base.data["floorplan"]["type"]
 
 
 def test_a_base_is_found_beside_the_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "home.yaml").write_text("extends: bundled:base\nsimulation: {duration: 3 h}\n")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    assert "3 h" == read("base: home.yaml\n", tmp_path).base.data["simulation"]["duration"]
+    assert "3 h" == read_text("base: home.yaml\n", tmp_path).base.data["simulation"]["duration"]
     inline = "base: {extends: home.yaml, simulation: {step: 2 s}}\n"
-    simulation = read(inline, tmp_path).base.data["simulation"]
+    simulation = read_text(inline, tmp_path).base.data["simulation"]
     assert ("3 h", "2 s") == (simulation["duration"], simulation["step"])
 
 
@@ -42,13 +42,13 @@ def test_a_base_can_be_a_scenario_in_python() -> None:
 
 
 def test_a_bare_list_is_an_axis_called_by_its_key(tmp_path: Path) -> None:
-    specification = read(f"axes: {{{SPEED}: [0.3, 0.6]}}\n", tmp_path)
+    specification = read_text(f"axes: {{{SPEED}: [0.3, 0.6]}}\n", tmp_path)
     assert (SPEED,) == specification.file.columns
 
 
 def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
     text = "axes:\n  home: {synthetic: 3}\n  speed: {key: robots.astro.speed, values: [1]}\n"
-    assert ("home", "seed") == read(text, tmp_path).file.populations
+    assert ("home", "seed") == read_text(text, tmp_path).file.populations
 
 
 @pytest.mark.parametrize(
@@ -72,4 +72,4 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
 )
 def test_wrong_files_are_refused_with_their_line(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        read(text, tmp_path)
+        read_text(text, tmp_path)

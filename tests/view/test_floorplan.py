@@ -86,11 +86,11 @@ def words(plan: FloorPlan, **options: bool) -> list[str]:
 
 
 def test_words_name_the_plan_its_rooms_the_scale_and_the_entrance(home: FloorPlan) -> None:
-    found = words(home)
+    texts = words(home)
 
-    assert "family_home\n186.1 m² · 14 rooms" in found
-    assert {f"{room.name}\n{room.area_m2:.1f} m²" for room in home.rooms} <= set(found)
-    assert {"0", "2.5", "5 m", "entrance"} <= set(found)
+    assert "family_home\n186.1 m² · 14 rooms" in texts
+    assert {f"{room.name}\n{room.area_m2:.1f} m²" for room in home.rooms} <= set(texts)
+    assert {"0", "2.5", "5 m", "entrance"} <= set(texts)
     assert {"0", "2.5", "5 m", "entrance"} == set(words(home, names=False, title=False))
 
 
@@ -99,10 +99,10 @@ def test_rooms_too_small_for_their_name_show_their_number() -> None:
         LabelledRegion(("storage",), shapely.box(0.8 * k, 0, 0.8 * k + 0.8, 0.8)) for k in range(60)
     ]
 
-    found = words(FloorPlan.build("row", shapely.box(0, 0, 48, 0.8), closets))
+    texts = words(FloorPlan.build("row", shapely.box(0, 0, 48, 0.8), closets))
 
-    assert "59" in found
-    assert not any("storage" in text for text in found)
+    assert "59" in texts
+    assert not any("storage" in text for text in texts)
 
 
 @pytest.mark.parametrize("start", ["13f8", "1bb5", "2953", "69c2", "f1ac"])
@@ -136,10 +136,10 @@ def test_a_place_that_cannot_be_written_is_refused(home: FloorPlan, tmp_path: Pa
 def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.__import__
 
-    def without(name: str, *rest: Any, **named: Any) -> Any:
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
         if name.partition(".")[0] == "matplotlib":
             raise ModuleNotFoundError(name)
-        return real(name, *rest, **named)
+        return real(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without)
     for module in [name for name in sys.modules if name.startswith("fleet2d.view")]:

@@ -20,8 +20,8 @@ from fleet2d.view.objects import FILL_COLORS, SYMBOLS
 BOX = shapely.box(0, 0, 8, 6)
 
 
-def home(**given: object) -> FloorPlan:
-    return FloorPlan.build("home", BOX, [LabelledRegion(("bedroom",), BOX)], **given)  # type: ignore[arg-type]
+def home(**parts: object) -> FloorPlan:
+    return FloorPlan.build("home", BOX, [LabelledRegion(("bedroom",), BOX)], **parts)  # type: ignore[arg-type]
 
 
 def test_furniture_is_filled_by_what_it_blocks() -> None:
@@ -36,9 +36,9 @@ def test_furniture_is_filled_by_what_it_blocks() -> None:
 
 
 def test_what_blocks_nothing_is_seen_through() -> None:
-    plain, rug = home(), home(objects=[stand_furniture("rug", (2.0, 4.0))])
+    empty, rug = home(), home(objects=[stand_furniture("rug", (2.0, 4.0))])
 
-    assert pixels(plain, (2.0, 4.0), names=False) == pixels(rug, (2.0, 4.0), names=False)
+    assert pixels(empty, (2.0, 4.0), names=False) == pixels(rug, (2.0, 4.0), names=False)
 
 
 def test_door_is_drawn_at_its_line_and_its_swing() -> None:

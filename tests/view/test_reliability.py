@@ -12,7 +12,7 @@ from fleet2d.view.reliability import draw_reliability, forecasts_of
 
 
 @pytest.fixture(scope="module")
-def stored() -> Any:
+def forecast_run() -> Any:
     users = {
         "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},
         "ben": {"type": "meander"},
@@ -29,28 +29,31 @@ def stored() -> Any:
     )
 
 
-def test_forecasts_are_those_stored_and_the_truth_where_users_were(stored: Any) -> None:
-    belief, truth = forecasts_of(stored, "rtp")
-    rooms = [room.name for room in stored.plan.rooms]
+def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run: Any) -> None:
+    belief, truth = forecasts_of(forecast_run, "rtp")
+    rooms = [room.name for room in forecast_run.plan.rooms]
     assert (72, len(rooms) + 1) == belief.shape
     assert np.abs(belief.sum(axis=1) - 1).max() < 1e-9
     for number, user in enumerate(("ana", "ben")):
-        rows, lived = table(stored, "rtp", user=user), table(stored, "trajectories", entity=user)
+        rows, trajectory = (
+            table(forecast_run, "rtp", user=user),
+            table(forecast_run, "trajectories", entity=user),
+        )
         for k, step in enumerate(range(299, 10800, 300)):
-            at = rows["step"] == step
-            share = dict(zip(rows["room"][at], rows["share"][at], strict=True))
+            at_step = rows["step"] == step
+            share = dict(zip(rows["room"][at_step], rows["share"][at_step], strict=True))
             row = belief[36 * number + k]
             assert share["away"] == pytest.approx(row[-1])
             assert share["kitchen_0"] * (1 - share["away"]) == pytest.approx(
                 row[rooms.index("kitchen_0")]
             )
-            where = "away" if lived["away"][step] else lived["room"][step]
-            assert where == [*rooms, "away"][truth[36 * number + k]]
+            place = "away" if trajectory["away"][step] else trajectory["room"][step]
+            assert place == [*rooms, "away"][truth[36 * number + k]]
 
 
-def test_the_diagram_is_drawn_the_same_each_time(stored: Any, tmp_path: Path) -> None:
+def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Path) -> None:
     for name in ("one.png", "two.png", "three.svg"):
-        draw_reliability(stored, "rtp", tmp_path / name)
+        draw_reliability(forecast_run, "rtp", tmp_path / name)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert (tmp_path / "one.png").stat().st_size > 10_000
     assert "likeliest place" in (tmp_path / "three.svg").read_text()
@@ -65,12 +68,14 @@ def test_the_diagram_is_drawn_the_same_each_time(stored: Any, tmp_path: Path) ->
         ("key_frames", "no presence"),
     ],
 )
-def test_what_is_no_presence_is_refused(stored: Any, name: str, why: str, tmp_path: Path) -> None:
+def test_what_is_no_presence_is_refused(
+    forecast_run: Any, name: str, why: str, tmp_path: Path
+) -> None:
     with pytest.raises(ArtifactError, match=why):
-        draw_reliability(stored, name, tmp_path / "x.png")
+        draw_reliability(forecast_run, name, tmp_path / "x.png")
     assert not (tmp_path / "x.png").exists()
 
 
-def test_another_ending_is_refused(stored: Any, tmp_path: Path) -> None:
+def test_another_ending_is_refused(forecast_run: Any, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
-        draw_reliability(stored, "rtp", tmp_path / "x.gif")
+        draw_reliability(forecast_run, "rtp", tmp_path / "x.gif")

@@ -133,9 +133,9 @@ def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page: Any) -> None:
     page.keyboard.press("Space")
     page.keyboard.press("End")
     assert 9 * 3600 - 1 == moment(page)
-    before = page.get_attribute("html", "data-theme")
+    theme = page.get_attribute("html", "data-theme")
     page.keyboard.press("t")
-    assert before != page.get_attribute("html", "data-theme")
+    assert theme != page.get_attribute("html", "data-theme")
 
 
 def test_tab_reaches_every_control_and_focus_can_be_seen(page: Any) -> None:
@@ -168,11 +168,11 @@ def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
     page.keyboard.press("+")
     until(page, lambda: "panel=layers" in page.url)
     page.wait_for_timeout(400)
-    with page_at(browser, page.url) as other:
-        assert 5 * 3600 == moment(other)
-        assert "true" == other.get_attribute("#tab-layers", "aria-selected")
-        assert not other.is_checked("input[name=ways]")
-        assert other.url.split("#")[1] == page.url.split("#")[1]
+    with page_at(browser, page.url) as second_page:
+        assert 5 * 3600 == moment(second_page)
+        assert "true" == second_page.get_attribute("#tab-layers", "aria-selected")
+        assert not second_page.is_checked("input[name=ways]")
+        assert second_page.url.split("#")[1] == page.url.split("#")[1]
 
 
 def test_layers_and_switches_change_the_plan(page: Any) -> None:
@@ -219,8 +219,8 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
         page.keyboard.press("End")
         shows_step(page, 3 * 3600 - 1)
         path = run.path("ana", timedelta(seconds=1))
-        shown = float(page.get_attribute("tr[data-body=ana]", "data-x"))
-        assert path.x[3 * 3600 - 1] == pytest.approx(shown, abs=1e-9)
+        x = float(page.get_attribute("tr[data-body=ana]", "data-x"))
+        assert path.x[3 * 3600 - 1] == pytest.approx(x, abs=1e-9)
         page.keyboard.press("Home")
         shows_step(page, 3600)
 

@@ -185,19 +185,19 @@ def test_what_is_no_order_is_refused(body: bytes) -> None:
 def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
     client = TestClient(page_app(ServedRuns([]), "token", PORT, live), base_url=OWN)
     body = json.dumps(order("step", value=1))
-    own = {"Origin": OWN, "Content-Type": "application/json"}
+    own_headers = {"Origin": OWN, "Content-Type": "application/json"}
     for wrong in (
         {"Content-Type": "application/json"},
         {"Origin": "http://evil.example", "Content-Type": "application/json"},
-        {**own, "Host": "evil.example"},
-        {**own, "Sec-Fetch-Site": "cross-site"},
+        {**own_headers, "Host": "evil.example"},
+        {**own_headers, "Sec-Fetch-Site": "cross-site"},
     ):
         assert 403 == client.post("/token/live/order", content=body, headers=wrong).status_code
     form = {"Origin": OWN, "Content-Type": "text/plain"}
     assert 415 == client.post("/token/live/order", content=body, headers=form).status_code
-    assert 403 == client.post("/wrong/live/order", content=body, headers=own).status_code
+    assert 403 == client.post("/wrong/live/order", content=body, headers=own_headers).status_code
     assert 0 == live.engine.step
-    assert 200 == client.post("/token/live/order", content=body, headers=own).status_code
+    assert 200 == client.post("/token/live/order", content=body, headers=own_headers).status_code
     assert 1 == live.engine.step
 
 

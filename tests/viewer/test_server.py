@@ -172,7 +172,7 @@ def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: 
     for name in ("key_frames", "events", "observations"):
         answer = client.get(f"run/0/tables/{name}.parquet")
         assert 200 == answer.status_code
-        whole = pq.read_table(out / f"{name}.parquet")["step"].to_pylist()
+        complete = pq.read_table(out / f"{name}.parquet")["step"].to_pylist()
         steps = pq.read_table(io.BytesIO(answer.content))["step"].to_pylist()
-        assert 0 < len(steps) <= len(whole)
-        assert whole[: len(steps)] == steps or "key_frames" == name
+        assert 0 < len(steps) <= len(complete)
+        assert complete[: len(steps)] == steps or "key_frames" == name

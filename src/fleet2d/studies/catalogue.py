@@ -84,15 +84,15 @@ def reconcile(
         RunDirectoryError: There are such results, and `changed` is None.
     """
     try:
-        stored = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
+        stored_rows = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
     except FileNotFoundError:
         return Reconciled(plan, len(plan.variants), 0)
-    numbers = {row["identity"]: row[VARIANT] for row in stored}
+    numbers = {row["identity"]: row[VARIANT] for row in stored_rows}
     present = {variant.identity for variant in plan.variants}
     with_results = set(finished)
     stale = {
         row["scenario"]: row
-        for row in stored
+        for row in stored_rows
         if row["identity"] not in present and row[VARIANT] in with_results
     }
     recomputed = [v for v in plan.variants if v.identity not in numbers and v.scenario in stale]
@@ -111,8 +111,8 @@ def reconcile(
         else:
             variants.append(replace(variant, number=next_number))
             next_number += 1
-    new = sum(variant.identity not in numbers for variant in variants)
-    return Reconciled(StudyPlan(plan.design, tuple(variants)), new, len(stale) - reused)
+    new_variants = sum(variant.identity not in numbers for variant in variants)
+    return Reconciled(StudyPlan(plan.design, tuple(variants)), new_variants, len(stale) - reused)
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:

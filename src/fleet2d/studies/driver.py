@@ -114,14 +114,14 @@ def run_study(
         check_setups(checked.plan, executor, options.observer.on_check)
     with directory.locked():
         parts = _intact_parts(directory, options.observer)
-        ended = statuses(directory, parts)
-        reconciled = reconcile(checked.plan, directory, ended, options.changed)
+        status_of = statuses(directory, parts)
+        reconciled = reconcile(checked.plan, directory, status_of, options.changed)
         variants = reconciled.plan.variants
         _write_plan(directory, checked, reconciled.plan)
         tasks = [
             WorkerTask(v.number, v.index, v.identity, v.home_key)
             for v in variants
-            if ended.get(v.number) != "complete"
+            if status_of.get(v.number) != "complete"
         ]
         _describe(reconciled, directory, options.observer)
         journal = directory.open_journal(parts)

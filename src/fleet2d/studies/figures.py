@@ -39,11 +39,11 @@ def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, metric: st
         axes.plot(row["difference"], y, "o", color=color, ms=6)
     axes.axvline(0, color=DARK, lw=0.8)
     statistics = {"mean", "reference", "difference", "low", "high", "pairs", "verdict"}
-    others = [
+    inner_axes = [
         column for column in table.columns
         if column not in {axis, *statistics} and not column.startswith(("n_", "variance_"))
     ]  # fmt: skip
-    labels = [", ".join([str(row[axis]), *(f"{c} {row[c]}" for c in others)]) for row in rows]
+    labels = [", ".join([str(row[axis]), *(f"{c} {row[c]}" for c in inner_axes)]) for row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.set_xlabel(f"{metric}: difference to {axis} = {reference}")

@@ -90,14 +90,14 @@ class MeanEstimate:
         is enough are missing. The power is 80 %.
         """
         counts: dict[str, int] = {}
-        for level, now in self.spread.units.items():
+        for level, current in self.spread.units.items():
 
             def is_enough(count: int, level: str = level) -> bool:
                 return self.spread.shows(self.mean, {**self.spread.units, level: count})
 
-            if now >= 2 and is_enough(MOST_NEEDED):
+            if current >= 2 and is_enough(MOST_NEEDED):
                 count = bisect_left(range(MOST_NEEDED), True, lo=2, key=is_enough)
-                counts[level] = max(count, now + 1)
+                counts[level] = max(count, current + 1)
         return counts
 
 
@@ -162,9 +162,9 @@ def _analyse(data: F64, codes: Mapping[str, NDArray[np.int64]]) -> tuple[Spread,
         ((name, numbers),) = codes.items()
         means = _unit_means(data, numbers)
         variance = float(means.var(ddof=1)) / len(means)
-        within = float(((data - means[numbers]) ** 2).sum()) / max(count - len(means), 1)
-        between = max(0.0, float(means.var(ddof=1)) - within * len(means) / count)
-        return Spread(units, {name: between}, within, count), variance, len(means) - 1.0
+        within_units = float(((data - means[numbers]) ** 2).sum()) / max(count - len(means), 1)
+        between_units = max(0.0, float(means.var(ddof=1)) - within_units * len(means) / count)
+        return Spread(units, {name: between_units}, within_units, count), variance, len(means) - 1.0
     residuals, squares = data - data.mean(), {}
     for name, numbers in codes.items():
         means = _unit_means(data, numbers)

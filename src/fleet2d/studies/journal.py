@@ -59,9 +59,9 @@ class Journal:
         data = record.encode()
         frame = _FRAME.pack(_MARK, len(data), zlib.crc32(data)) + data
         try:
-            done = 0
-            while done < len(frame):
-                done += os.pwrite(self._file, frame[done:], self.size + done)
+            count = 0
+            while count < len(frame):
+                count += os.pwrite(self._file, frame[count:], self.size + count)
             if time.monotonic() - self._sync_time > SYNC_EVERY_S:
                 os.fsync(self._file)
                 self._sync_time = time.monotonic()

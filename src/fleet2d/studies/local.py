@@ -169,8 +169,8 @@ class LocalExecutor:
                 raise InputError(
                     f"workers end before they are ready (exit code {code}): see their output"
                 )
-        running, *waiting = worker.tasks or [None]
-        for task in reversed(waiting):
+        running, *pending = worker.tasks or [None]
+        for task in reversed(pending):
             if task is not None:
                 tasks.put_back(task)
         if running is not None:

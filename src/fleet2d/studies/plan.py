@@ -177,9 +177,11 @@ def _planned(
     template = content_hash({**content, "simulation": {**simulation, "seed": None}})
     for i, seed in enumerate(design.seeds):
         simulation["seed"] = seed
-        whole, scenario = identity(content, inputs)
+        variant_identity, scenario = identity(content, inputs)
         simulated_s = (duration // step * step).total_seconds()
-        yield PlannedVariant(first + i, first + i, whole, scenario, template, home, simulated_s)
+        yield PlannedVariant(
+            first + i, first + i, variant_identity, scenario, template, home, simulated_s
+        )
 
 
 def _sensor_tables(scenario: Scenario) -> list[str]:
@@ -198,12 +200,12 @@ def _check_tables(tables: Sequence[str], known: set[str]) -> None:
 
 def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> None:
     """Refuse two variants with the same scenario, of which one axis has no effect."""
-    known: dict[str, PlannedVariant] = {}
+    by_identity: dict[str, PlannedVariant] = {}
     for variant in variants:
-        other = known.setdefault(variant.identity, variant)
-        if other is not variant:
+        equal = by_identity.setdefault(variant.identity, variant)
+        if equal is not variant:
             raise ScenarioError(
-                f"{design.describe(other.index)} and {design.describe(variant.index)} are the same"
+                f"{design.describe(equal.index)} and {design.describe(variant.index)} are the same"
                 " scenario: an axis sets what another axis or a rule overrides, or has a value"
                 " twice"
             )

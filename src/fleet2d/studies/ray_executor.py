@@ -80,10 +80,10 @@ class RayExecutor:
             InputError: Workers can't be set up.
         """
         attempts: dict[int, int] = {}
-        shared = self._ray.put(job)
+        job_reference = self._ray.put(job)
         try:
             while tasks or any(actor.tasks for actor in self._crew):
-                self._fill(shared, tasks)
+                self._fill(job_reference, tasks)
                 awaited = {
                     actor.tasks[0][1] if actor.is_ready else actor.start: actor
                     for actor in self._crew
@@ -99,7 +99,7 @@ class RayExecutor:
         finally:
             self._stop()
 
-    def _fill(self, shared: Any, tasks: TaskSchedule) -> None:
+    def _fill(self, job_reference: Any, tasks: TaskSchedule) -> None:
         """Start workers for free cores, and hand tasks to those that are ready."""
         cores = self.workers
         for actor in [actor for actor in self._crew if not actor.is_ready]:
@@ -107,7 +107,7 @@ class RayExecutor:
                 self._ray.kill(actor.handle)
                 self._crew.remove(actor)
         for _ in range(min(cores, len(self._crew) + len(tasks)) - len(self._crew)):
-            handle = _worker_class(self._ray).remote([shared])
+            handle = _worker_class(self._ray).remote([job_reference])
             self._crew.append(_Actor(handle, handle.is_up.remote()))
         for actor in self._crew:
             while actor.is_ready and len(actor.tasks) < AHEAD:
@@ -166,12 +166,12 @@ class RayExecutor:
             self._ray.shutdown()
 
 
-class Worker:
+class RayWorker:
     """A worker on the cluster: it calls a job for each task."""
 
-    def __init__(self, shared: list[Any]) -> None:
+    def __init__(self, job_reference: list[Any]) -> None:
         """Fetch the job."""
-        self._job: WorkerJob = _ray().get(shared[0])
+        self._job: WorkerJob = _ray().get(job_reference[0])
 
     def is_up(self) -> bool:
         """Return True; Ray calls it once the worker is set up."""
@@ -184,7 +184,7 @@ class Worker:
 
 def _worker_class(ray: Any) -> Any:
     """Return the class of workers; Ray never restarts them, as the driver retries their tasks."""
-    return ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(Worker)
+    return ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(RayWorker)
 
 
 def _join(ray: Any, address: str | None) -> None:

@@ -48,21 +48,21 @@ class Counts:
 def statuses(directory: StudyDirectory, parts: Iterable[Part]) -> dict[int, str]:
     """Return the status of each variant with results, by number; the newest result counts."""
     parts = tuple(parts)
-    ended: dict[int, str] = {}
+    status_of: dict[int, str] = {}
     for table in read_results(directory.storage, parts):
-        ended |= zip(
+        status_of |= zip(
             table.column(VARIANT).to_pylist(), table.column("status").to_pylist(), strict=True
         )
     for record in read_journal(directory.journal_path(parts)):
-        ended[record.number] = record.header["status"]
-    return ended
+        status_of[record.number] = record.header["status"]
+    return status_of
 
 
 def count(directory: StudyDirectory) -> Counts:
     """Return how far a study is."""
     numbers = directory.read_table(PLAN, [VARIANT]).column(VARIANT).to_pylist()
-    ended = statuses(directory, directory.parts())
-    return Counts.of([ended.get(number) for number in numbers])
+    status_of = statuses(directory, directory.parts())
+    return Counts.of([status_of.get(number) for number in numbers])
 
 
 def assemble(directory: StudyDirectory) -> "pa.Table":

@@ -151,17 +151,17 @@ class TrialSchedule(TaskSchedule):
         self._variants, self._stages = variants, stages
         self._new_trials = trials
         self._running: dict[int, _RunningTrial] = {}
-        self._waiting: deque[TrialTask] = deque()
+        self._tasks: deque[TrialTask] = deque()
         self._holders: dict[tuple[int, int], Hashable] = {}
         self._task_count = 0
 
     def __len__(self) -> int:
         """Return the largest number of tasks that workers can take now."""
-        return len(self._waiting) + self._new_trials * len(self._variants)
+        return len(self._tasks) + self._new_trials * len(self._variants)
 
     def __bool__(self) -> bool:
         """Return whether there are more tasks or trials."""
-        return bool(self._waiting or self._new_trials)
+        return bool(self._tasks or self._new_trials)
 
     def take(self, worker: Hashable) -> WorkerTask | None:
         """Return the next task: of a run that the worker holds, a new run or trial, or any task."""
@@ -173,18 +173,18 @@ class TrialSchedule(TaskSchedule):
             self._running[trial.number] = running = _RunningTrial(trial, settings)
             self._start_stage(running)
             task = self._waiting_for(worker)
-        task = task or (self._waiting[0] if self._waiting else None)
+        task = task or (self._tasks[0] if self._tasks else None)
         if task is not None:
-            self._waiting.remove(task)
+            self._tasks.remove(task)
             self._holders[task.trial, task.index] = worker
         return task
 
     def _waiting_for(self, worker: Hashable) -> TrialTask | None:
         """Return the first task of a run that the worker holds, else of one that nobody holds."""
-        holders = [self._holders.get((task.trial, task.index)) for task in self._waiting]
+        holders = [self._holders.get((task.trial, task.index)) for task in self._tasks]
         for holder in (worker, None):
             if holder in holders:
-                return self._waiting[holders.index(holder)]
+                return self._tasks[holders.index(holder)]
         return None
 
     def leave(self, worker: Hashable) -> None:
@@ -194,7 +194,7 @@ class TrialSchedule(TaskSchedule):
     def put_back(self, task: WorkerTask) -> None:
         """Return a task to the front of the schedule."""
         assert isinstance(task, TrialTask)
-        self._waiting.appendleft(task)
+        self._tasks.appendleft(task)
 
     def finish(self, task: TrialTask, objectives: list[float] | None, error: str | None) -> bool:
         """Record the result of a task; return whether its trial is over."""
@@ -220,7 +220,7 @@ class TrialSchedule(TaskSchedule):
         running.objectives, running.unfinished = [], len(self._variants)
         for index, home in self._variants:
             self._task_count += 1
-            self._waiting.append(
+            self._tasks.append(
                 TrialTask(
                     self._task_count,
                     index,

@@ -118,11 +118,11 @@ def _search(
     from optuna.trial import TrialState
 
     states = (TrialState.COMPLETE, TrialState.PRUNED)
-    over = len(study.get_trials(deepcopy=False, states=states))
+    finished = len(study.get_trials(deepcopy=False, states=states))
     stages = (*(time.total_seconds() for time in settings.prune_at), None)
-    if over >= settings.trials:
+    if finished >= settings.trials:
         return
-    schedule = TrialSchedule(study, settings.search, training, stages, settings.trials - over)
+    schedule = TrialSchedule(study, settings.search, training, stages, settings.trials - finished)
     events = executor.run(job, schedule)
     try:
         for event in events:
@@ -134,9 +134,9 @@ def _search(
                 objectives, error = pickle.loads(event.payload)  # noqa: S301 - from our own workers
             if not schedule.finish(task, objectives, error):
                 continue
-            over += 1
+            finished += 1
             if observer is not None:
-                observer(over, settings.trials, _best_values(study))
+                observer(finished, settings.trials, _best_values(study))
     finally:
         events.close()
 

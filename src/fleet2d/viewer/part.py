@@ -58,10 +58,10 @@ def key_frame_rows(table: Any, first: int, end: int) -> NDArray[np.int64]:
     selected = np.zeros(len(step), np.bool_)
     for code in range(len(names)):
         rows = np.flatnonzero(entity == code)
-        before = rows[(step[rows] <= first) & reached[rows]]
-        after = rows[step[rows] >= end]
-        low = before[-1] if len(before) else rows[0]
-        high = after[0] if len(after) else rows[-1]
+        rows_before = rows[(step[rows] <= first) & reached[rows]]
+        rows_after = rows[step[rows] >= end]
+        low = rows_before[-1] if len(rows_before) else rows[0]
+        high = rows_after[0] if len(rows_after) else rows[-1]
         selected[rows[(rows >= low) & (rows <= high)]] = True
     return np.flatnonzero(selected)
 
@@ -100,9 +100,9 @@ def expand_walks(run: Run) -> Any:
     walkers = list(dict.fromkeys(entity[kind == "walk"].tolist()))
     if not walkers:
         return table
-    every = timedelta(microseconds=run.manifest["step_us"])
+    interval = timedelta(microseconds=run.manifest["step_us"])
     parts = [table.take(np.flatnonzero(~np.isin(entity, walkers)))]
-    parts += [positions(run, name, every) for name in walkers]
+    parts += [positions(run, name, interval) for name in walkers]
     return pa.concat_tables([part.cast(plain_schema(table)) for part in parts])
 
 
@@ -114,7 +114,7 @@ def plain_schema(table: Any) -> Any:
     return pa.schema([(field.name, texts.get(field.name, field.type)) for field in table.schema])
 
 
-def positions(run: Run, name: str, every: timedelta) -> Any:
+def positions(run: Run, name: str, interval: timedelta) -> Any:
     """Return the positions of a body at equal intervals, in the columns of key_frames.
 
     Raises:
@@ -124,7 +124,7 @@ def positions(run: Run, name: str, every: timedelta) -> Any:
 
     if KEY_FRAMES not in run.tables:
         raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
-    path = run.path(name, every)
+    path = run.path(name, interval)
     count = len(path.step)
     return pa.table(
         {
