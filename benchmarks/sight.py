@@ -88,7 +88,7 @@ def jagged(plan: Any) -> Any:
 
     import fleet2d
 
-    free = shapely.union_all([shapely.transform(p, plan.lattice.to_metres) for p in plan.polygons])
+    free = plan.free_space
     free = shapely.affinity.rotate(free, 0.5, use_radians=True)
     x0, y0, x1, y1 = (math.floor(edge / 0.05) for edge in free.bounds)
     x, y = np.meshgrid(np.arange(x0, x1 + 2) * 0.05, np.arange(y0, y1 + 2) * 0.05)
@@ -132,7 +132,7 @@ def measure(name: str, plan: Any, peers: str | None) -> Row:
     from fleet2d.kernels.mesh import rasterize_cells
     from fleet2d.kernels.region import regions_of_cells
 
-    bare = Home(FloorPlan.build(name, _free(plan), cell=plan.lattice.cell))  # walls, no furniture
+    bare = Home(FloorPlan.build(name, plan.free_space, cell=plan.lattice.cell))  # no furniture
     mesh, lattice, rng = bare.walls, bare.plan.lattice, np.random.default_rng(1)
     triangles = rasterize_cells(mesh, lattice.rows, lattice.columns)
     cells = np.argwhere(triangles >= 0)
@@ -214,12 +214,6 @@ def reach_in(home: Any) -> Any:
     from fleet2d.kernels.seen import Reach
 
     return Reach(0, round(RANGE_M * home.plan.lattice.units_per_m) ** 2, HALF_ANGLE)
-
-
-def _free(plan: Any) -> Any:
-    import shapely
-
-    return shapely.union_all([shapely.transform(p, plan.lattice.to_metres) for p in plan.polygons])
 
 
 def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:

@@ -39,11 +39,6 @@ def plan_paths(shared_data: Path) -> list[Path]:
     return paths
 
 
-def free_space(plan: FloorPlan) -> shapely.Geometry:
-    """The space between the walls [m]."""
-    return shapely.union_all([shapely.transform(p, plan.lattice.to_metres) for p in plan.polygons])
-
-
 def some_free_points(plan: FloorPlan, count: int, seed: int = 1) -> list[tuple[float, float]]:
     """Centres of free cells [m]."""
     cells = np.argwhere(plan.free)
@@ -54,7 +49,7 @@ def some_free_points(plan: FloorPlan, count: int, seed: int = 1) -> list[tuple[f
 
 def area_by_rays(plan: FloorPlan, x: float, y: float) -> float:
     """The area that is visible from a place, by shapely: a triangle between every two corners' bearings."""
-    walls = shapely.boundary(free_space(plan))
+    walls = shapely.boundary(plan.free_space)
     corners = shapely.get_coordinates(walls)
     bearings = np.unique(np.arctan2(corners[:, 1] - y, corners[:, 0] - x))
     area = 0.0
@@ -124,7 +119,7 @@ def test_known_failure_01_areas_and_verdicts_are_those_of_shapely(at: tuple[floa
     x, y = plan.lattice.to_metres(plan.lattice.to_lattice(at)).tolist()
     region = VisibleRegion(plan, x, y)
     assert region.area_m2 == pytest.approx(area_by_rays(plan, x, y), rel=1e-6)
-    space = free_space(plan)
+    space = plan.free_space
     points = some_free_points(plan, 400)
     for point, inside in zip(points, region.contains(points), strict=True):
         line = shapely.LineString([(x, y), point])
@@ -194,7 +189,7 @@ def test_known_failure_03_every_observation_has_a_clear_line() -> None:
     )
     stored = run(content)
     robot, user = path(stored, "astro"), path(stored, "ana")
-    space = free_space(stored.plan)
+    space = stored.plan.free_space
     lines = shapely.linestrings(
         np.stack([np.stack([robot.x, robot.y], 1), np.stack([user.x, user.y], 1)], axis=1)
     )
@@ -517,7 +512,7 @@ def test_known_failure_08_no_move_crosses_a_wall(speed: float, step: str) -> Non
     xy = np.stack([poses.x, poses.y], axis=-1)
     moved = (xy[1:] != xy[:-1]).any(axis=1)
     lines = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[moved])
-    space = free_space(stored.plan)
+    space = stored.plan.free_space
     assert shapely.contains_properly(space, lines).all()
     if moved.any():
         assert shapely.distance(shapely.boundary(space), lines).min() > 0.19
@@ -546,7 +541,7 @@ def test_known_failure_08_walks_go_round_walls_at_any_speed_and_step(step: str) 
         )
     )
     assert len(lines) > 100
-    assert shapely.distance(shapely.boundary(free_space(stored.plan)), lines).min() >= 0.15 - 1e-3
+    assert shapely.distance(shapely.boundary(stored.plan.free_space), lines).min() >= 0.15 - 1e-3
 
 
 # --- 9 -----------------------------------------------------------------------------------------
@@ -653,7 +648,7 @@ def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell() -> N
         )
         robot = plan.lattice.to_metres(plan.lattice.to_lattice((4.0 + dx, 2.8))).tolist()
         line = shapely.LineString([robot, (6.0, 2.3)])
-        clear = bool(shapely.contains_properly(free_space(plan), line))
+        clear = bool(shapely.contains_properly(plan.free_space, line))
         seen = len(table(run(content), "observations")["step"]) == 1
         assert clear == seen, dx
         verdicts.add(seen)
@@ -661,7 +656,7 @@ def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell() -> N
         place = (4.0 + dx, 2.8)
         robot = plan.lattice.to_metres(plan.lattice.to_lattice(place)).tolist()
         line = shapely.LineString([robot, (6.0, 2.3)])
-        clear = bool(shapely.contains_properly(free_space(plan), line))
+        clear = bool(shapely.contains_properly(plan.free_space, line))
         inside = bool(VisibleRegion(plan, *robot).contains([(6.0, 2.3)])[0])
         verdicts.add(inside)
         assert clear == inside, dx

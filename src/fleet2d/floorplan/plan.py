@@ -200,6 +200,11 @@ class FloorPlan:
         return float(units2) / self.lattice.units_per_m**2
 
     @cached_property
+    def free_space(self) -> MultiPolygon:
+        """The free space between the walls [m], in parts as `polygons`."""
+        return shapely.transform(MultiPolygon(self.polygons), self.lattice.to_metres)
+
+    @cached_property
     def room_of_place(self) -> NDArray[np.int16]:
         """Index of the room of a place in each cell, int16 (rows, columns), -1 inside walls.
 

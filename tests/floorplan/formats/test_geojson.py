@@ -54,11 +54,6 @@ def read(folder: Path, *features: Any, **options: Any) -> FloorPlan:
     return read_geojson(write(folder, *features), **options)
 
 
-def space(plan: FloorPlan) -> shapely.Geometry:
-    """The free space in metres."""
-    return shapely.union_all([shapely.transform(p, plan.lattice.to_metres) for p in plan.polygons])
-
-
 def areas(plan: FloorPlan) -> dict[str, float]:
     return {room.name: round(room.area_m2, 2) for room in plan.rooms}
 
@@ -71,7 +66,7 @@ def test_rooms_that_touch_have_a_wall_between_them_and_doors_lead_through(tmp_pa
 
     wall = shapely.difference(shapely.box(3.95, 0, 4.05, 3), shapely.box(3.95, 1, 4.05, 1.9))
     expected = shapely.difference(shapely.box(0, 0, 9, 3), wall)
-    assert shapely.symmetric_difference(expected, space(plan)).area < 1e-6
+    assert shapely.symmetric_difference(expected, plan.free_space).area < 1e-6
     assert [("Kitchen", "kitchen"), ("Master Bedroom", "bedroom")] == [
         (room.name, room.type) for room in plan.rooms
     ]

@@ -85,15 +85,9 @@ def refusal(folder: Path, content: object) -> str:
     return str(caught.value)
 
 
-def whole(plan: FloorPlan) -> shapely.MultiPolygon:
-    """The free space in metres."""
-    parts = [shapely.transform(polygon, plan.lattice.to_metres) for polygon in plan.polygons]
-    return shapely.MultiPolygon(parts)
-
-
 def assert_box(expected: tuple[float, float, float, float], plan: FloorPlan) -> None:
     assert pytest.approx(expected) == plan.bounds
-    assert shapely.box(*expected).symmetric_difference(whole(plan)).area < 1e-9
+    assert shapely.box(*expected).symmetric_difference(plan.free_space).area < 1e-9
 
 
 # --- The real maps ------------------------------------------------------------------------------
@@ -207,10 +201,10 @@ def test_real_no_go_area_can_be_a_wall(shared_data: Path) -> None:
 
     open_plan, plan = read_valetudo(path, no_go="ignore"), read_valetudo(path, no_go="wall")
 
-    lost = whole(open_plan).intersection(area).area
+    lost = open_plan.free_space.intersection(area).area
     assert lost > 1.5
     assert pytest.approx(lost) == open_plan.area_m2 - plan.area_m2
-    assert whole(plan).intersection(area).area < 1e-9
+    assert plan.free_space.intersection(area).area < 1e-9
 
 
 @pytest.mark.parametrize("name", MAPS)
@@ -354,7 +348,7 @@ def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) 
 
     plan = home_with_walls(tmp_path, area)
 
-    (hole,) = (shapely.Polygon(hole) for hole in whole(plan).geoms[0].interiors)
+    (hole,) = (shapely.Polygon(hole) for hole in plan.free_space.geoms[0].interiors)
     assert pytest.approx((1.0, -1.5, 1.15, -1.0)) == hole.bounds
     assert any("no-go areas in the map: 1, obstacles on 0.08 m2" in n for n in plan.notes)
 
@@ -460,7 +454,7 @@ def test_real_charger_is_an_object_with_a_place_to_stand_in_front_of_it(
     assert read_valetudo_charger(shared_data / "valetudo" / f"{name}.json") == pytest.approx(
         (at.x, at.y)
     )
-    assert whole(plan).contains(shapely.Point(place.x, place.y).buffer(0.17))
+    assert plan.free_space.contains(shapely.Point(place.x, place.y).buffer(0.17))
     to_x, to_y = at.x - place.x, at.y - place.y
     assert math.hypot(to_x, to_y) < 0.6
     assert (math.cos(place.heading), math.sin(place.heading)) == pytest.approx(

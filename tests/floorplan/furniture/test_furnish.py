@@ -28,17 +28,12 @@ from fleet2d.floorplan.rooms.vocabulary import PRIORITY
 POCKET_M2 = 0.1
 
 
-def free_space(plan: FloorPlan) -> shapely.Geometry:
-    """The space between the walls [m]."""
-    return shapely.transform(shapely.union_all(plan.polygons), plan.lattice.to_metres)
-
-
 def footprints(plan: FloorPlan) -> list[Polygon]:
     return [thing.footprint for thing in plan.objects]
 
 
 def check_stands_free(empty: FloorPlan, plan: FloorPlan) -> None:
-    free = free_space(plan).buffer(1e-6)
+    free = plan.free_space.buffer(1e-6)
     added = plan.objects[len(empty.objects) :]
     assert all(shapely.covers(free, thing.footprint) for thing in added)
     overlaps = [
@@ -124,7 +119,7 @@ def test_furniture_never_disconnects_a_home(polygons: list[Polygon], kind: str, 
 
 def test_same_seed_gives_the_same_furniture_and_another_one_other() -> None:
     plan = load_floorplan()
-    bare = FloorPlan.build("bare", free_space(plan), plan.regions)
+    bare = FloorPlan.build("bare", plan.free_space, plan.regions)
 
     assert furnish(bare, 3) == furnish(bare, 3)
     assert furnish(bare, 3).digest != furnish(bare, 4).digest

@@ -95,13 +95,12 @@ def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
     middle = thing.footprint.centroid
     at = f"the {thing.type} at ({middle.x:g}, {middle.y:g}) m"
     x0, y0, x1, y1 = plan.bounds
-    free = shapely.transform(shapely.union_all(plan.polygons), plan.lattice.to_metres)
-    if not free.intersects(middle):
+    if not plan.free_space.intersects(middle):
         raise FloorPlanError(
             f"{where}: {at} is not inside {plan.name}, whose free space lies from"
             f" ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m"
         )
-    lost = shapely.difference(thing.footprint.buffer(-WALL_TOLERANCE_M), free).area
+    lost = shapely.difference(thing.footprint.buffer(-WALL_TOLERANCE_M), plan.free_space).area
     if lost > 0:
         x0, y0, x1, y1 = thing.footprint.bounds
         raise FloorPlanError(

@@ -1,7 +1,5 @@
 """A home while furniture is put into it: its free cells, and the routes that must stay open."""
 
-from functools import cached_property
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -55,6 +53,7 @@ class Interior:
                 self.standing[window] &= ~covered
         for thing in plan.objects:
             self._record(thing)
+        shapely.prepare(plan.free_space)
 
     def place(
         self, room: Room, group: FurnitureGroup, draws: Draws, score: Score | None = None
@@ -85,7 +84,7 @@ class Interior:
     def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
         """Add objects if they stand in free space, are usable and cut no route; return whether."""
         for thing in things:
-            if not shapely.covers(self._inside, thing.footprint):
+            if not shapely.covers(self.plan.free_space, thing.footprint):
                 return False
         before = self.standing[view.window].copy()
         grown = []
@@ -151,14 +150,6 @@ class Interior:
             if use.approach is not None:
                 row, column = lattice.cell_of(*lattice.point_at(use.approach))
                 self._approached[row, column] = bool(self.standing[row, column])
-
-    @cached_property
-    def _inside(self) -> shapely.Geometry:
-        """The free space [m], prepared."""
-        lattice = self.plan.lattice
-        inside = shapely.transform(shapely.union_all(self.plan.polygons), lattice.to_metres)
-        shapely.prepare(inside)
-        return inside
 
 
 def _hull(slices: list[slice], start: int) -> slice:

@@ -134,7 +134,7 @@ def _guess(area: float) -> str:
 
 
 def _parts(plan: FloorPlan) -> Iterator[Finding]:
-    parts = sorted(shapely.get_parts(_free(plan)).tolist(), key=lambda part: -part.area)[1:]
+    parts = sorted(shapely.get_parts(plan.free_space).tolist(), key=lambda part: -part.area)[1:]
     for part in parts:
         if part.area >= PART_M2:
             at = part.representative_point()
@@ -152,7 +152,7 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
 
 
 def _specks(plan: FloorPlan) -> Iterator[Finding]:
-    holes = [hole for part in shapely.get_parts(_free(plan)) for hole in part.interiors]
+    holes = [hole for part in shapely.get_parts(plan.free_space) for hole in part.interiors]
     specks = [s for s in map(shapely.Polygon, holes) if s.area < SPECK_M2]
     if specks:
         at = specks[0].representative_point()
@@ -198,7 +198,7 @@ def _by_shape(plan: FloorPlan) -> list[LabelledRegion]:
 
 
 def _outside(plan: FloorPlan, regions: list[LabelledRegion]) -> Iterator[Finding]:
-    filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(_free(plan))]
+    filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(plan.free_space)]
     reach = shapely.union_all(filled).buffer(MAX_OVER_WALLS_M, join_style="mitre")
     for region in regions:
         outside = shapely.difference(region.shape, reach)
@@ -340,7 +340,7 @@ def _corner(
 
 
 def _standing_in_walls(plan: FloorPlan) -> Iterator[Finding]:
-    free = _free(plan)
+    free = plan.free_space
     for thing in plan.objects:
         inside = shapely.intersection(thing.footprint, free).area
         if thing.blocks == "nothing" and shapely.distance(thing.footprint, free) < BESIDE_M:
@@ -377,11 +377,6 @@ def _uses(plan: FloorPlan) -> Iterator[Finding]:
         if not reached:
             text = f"nobody can get to {thing.name}: there is no free place to use it from"
             yield Finding("object", "wrong", text, _centre(thing), thing.footprint)
-
-
-def _free(plan: FloorPlan) -> BaseGeometry:
-    """Return the free space [m]."""
-    return shapely.transform(shapely.MultiPolygon(plan.polygons), plan.lattice.to_metres)
 
 
 def _place(at: shapely.Point) -> str:
