@@ -5,7 +5,7 @@ it, and they would overlap before the next step. The body that moves decides at 
 moves, so the result doesn't depend on spans.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import timedelta
 from typing import NamedTuple
 
@@ -77,6 +77,7 @@ class Blocking:
         self.next_step = 0
         self._actors, self._users = [*users, *robots], len(users)
         self._patience_us = 0 if patience is None else micros(patience)
+        self._radii = np.array([actor.entity.radius for actor in self._actors])
         self._waits = [Wait()] * len(self._actors)
         self._passes = [Pass()] * len(self._actors)
         self.rows = range(0 if patience is None else len(self._actors))
@@ -92,9 +93,8 @@ class Blocking:
         block = bodies.block(first, end + 1)  # a move leads to the step after
         poses = PoseColumns(block.x, block.y, block.away)
         for row in self.rows:
-            columns = np.arange(1, end - first)
-            for column, _ in self._meetings(poses, row, first, columns):
-                end = first + column
+            meeting = self._first_meeting(poses, row, first, np.arange(1, end - first))
+            end = end if meeting is None else first + meeting[0]
         return end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
@@ -117,18 +117,17 @@ class Blocking:
             np.stack([y, next_y], axis=1),
             np.stack([away, next_away], axis=1),
         )
-        return next((other for _, other in self._meetings(poses, row, step, np.array([0]))), None)
+        meeting = self._first_meeting(poses, row, step, np.array([0]))
+        return None if meeting is None else meeting[1]
 
     def plan(self, now: Situation, other: int) -> Plan | None:
         """Return a plan to wait for another body, or to go round it; None to squeeze past."""
         row, lattice = now.actor.row, now.actor.home.plan.lattice
         actor = self._actors[row]
-        around = [
-            (a.state.x, a.state.y, int(self._reach(row, r) + lattice.cell * lattice.units_per_m))
-            for r, a in enumerate(self._actors)
-            if r != row and not a.state.away
-        ]
-        clear = np.array(around, np.int64)
+        others = [a for a in self._actors if a.row != row and not a.state.away]
+        reach = self._reach(row, np.array([a.row for a in others], np.int64))
+        here = np.array([a.state[:2] for a in others], np.int64).reshape(-1, 2)
+        clear = np.column_stack([here, reach + int(lattice.cell * lattice.units_per_m)])
         step, step_us, wait = now.step, actor.clock.step_us, self._waits[row]
         since = wait.since if wait.until == step else step
         # Of two who wait for each other, the later one in the scenario waits twice as long.
@@ -154,57 +153,61 @@ class Blocking:
         pairs = (self._waits[row], self._passes[row])
         return any(pair.blocker == other and pair.until > step for pair in pairs)
 
-    def _meetings(
+    def _first_meeting(
         self, poses: PoseColumns, row: int, first: int, columns: I64
-    ) -> Iterator[tuple[int, int]]:
-        """Yield for each other body the first column at which it blocks a body, and its row.
-
-        Only columns earlier than all before are yielded.
-        """
+    ) -> tuple[int, int] | None:
+        """Return the first of some columns at which another body blocks one, and its row."""
         x, y, away = poses
-        dx, dy = (c[row, columns + 1] - c[row, columns] for c in (x, y))
-        home = (away[row, columns] | away[row, columns + 1]) == 0
-        moves = columns[((dx != 0) | (dy != 0)) & home]
-        for other in self._heeded(row):
-            if not len(moves):
-                return
-            overlaps = _approach(x, y, row, other, moves, self._reach(row, other))
-            overlaps &= (away[other, moves] | away[other, moves + 1]) == 0
-            for column in moves[overlaps].tolist():
-                if not self._is_past(row, other, first + column):
-                    moves = moves[moves < column]
-                    yield column, other
-                    break
-
-    def _heeded(self, row: int) -> Iterable[int]:
-        """Return the rows that a body waits for; a robot with `gives_way` skips people."""
+        moved = (x[row, columns + 1] != x[row, columns]) | (y[row, columns + 1] != y[row, columns])
+        moves = columns[moved & ((away[row, columns] | away[row, columns + 1]) == 0)]
+        # A robot with `gives_way` keeps clear of people by that option.
         polite = getattr(self._actors[row].entity, "gives_way", None) is not None
-        return (r for r in range(self._users if polite else 0, len(self._actors)) if r != row)
+        others = np.arange(self._users if polite else 0, len(self._actors))
+        others = others[others != row]
+        if not len(moves) or not len(others):
+            return None
+        met = _approach(x, y, row, others[:, None], moves, self._reach(row, others)[:, None])
+        met &= (away[others[:, None], moves] | away[others[:, None], moves + 1]) == 0
+        passed = self._passes[row]
+        met &= (others != passed.blocker)[:, None] | (first + moves >= passed.until)
+        blocked = met.any(axis=0)
+        if not blocked.any():
+            return None
+        at = int(blocked.argmax())
+        return int(moves[at]), int(others[met[:, at].argmax()])
 
-    def _reach(self, row: int, other: int) -> int:
-        """Return the distance at which two bodies touch [lattice units]."""
-        radii = (self._actors[r].entity.radius for r in (row, other))
-        return int(sum(radii) * self._actors[row].home.plan.lattice.units_per_m)
-
-    def _is_past(self, row: int, other: int, step: int) -> bool:
-        """Whether a body passes another one at a step."""
-        return self._passes[row].blocker == other and step < self._passes[row].until
+    def _reach(self, row: int, others: I64) -> I64:
+        """Return the distances at which a body touches others [lattice units], int64 (n,)."""
+        units_per_m = self._actors[row].home.plan.lattice.units_per_m
+        reach: I64 = ((self._radii[row] + self._radii[others]) * units_per_m).astype(np.int64)
+        return reach
 
 
-def _approach(x: I64, y: I64, row: int, other: int, columns: I64, reach: int) -> Bool:
-    """Return in which columns a body moves towards another one so that they would overlap.
+def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -> Bool:
+    """Return in which columns a body moves towards others so that they would overlap.
 
-    Both move straight from one step to the next. Sums and products of integers are exact if no body
+    All move straight from one step to the next. Sums and products of integers are exact if no body
     moves farther than about 100 m in a step.
+
+    Args:
+        x: int64 (bodies, steps).
+        y: int64 (bodies, steps).
+        row: Of the body.
+        others: Rows of the others, int64 (n, 1).
+        columns: int64 (m,).
+        reach: Distances at which it touches them, int64 (n, 1).
+
+    Returns:
+        bool (n, m).
     """
     dx, dy = (c[row, columns + 1] - c[row, columns] for c in (x, y))
-    other_dx, other_dy = (c[other, columns + 1] - c[other, columns] for c in (x, y))
-    away_x, away_y = (c[other, columns] - c[row, columns] for c in (x, y))
+    other_dx, other_dy = (c[others, columns + 1] - c[others, columns] for c in (x, y))
+    away_x, away_y = (c[others, columns] - c[row, columns] for c in (x, y))
     vx, vy = dx - other_dx, dy - other_dy
-    way, towards = (vx * vx + vy * vy), (away_x * vx + away_y * vy)
-    ends = (away_x - vx) ** 2 + (away_y - vy) ** 2 < reach * reach
+    way, towards, near = (vx * vx + vy * vy), (away_x * vx + away_y * vy), reach * reach
+    ends = (away_x - vx) ** 2 + (away_y - vy) ** 2 < near
     beside = (away_x * vy - away_y * vx).astype(np.float64)
-    passes = beside * beside < float(reach * reach) * way.astype(np.float64)
+    passes = beside * beside < near.astype(np.float64) * way.astype(np.float64)
     nearer: Bool = (towards > 0) & (away_x * dx + away_y * dy > 0)
     overlaps: Bool = nearer & np.where(towards < way, passes, ends)
     return overlaps
