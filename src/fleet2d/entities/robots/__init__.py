@@ -1,1 +1,1 @@
-"""Behaviors of robots, one a module."""
+"""Behaviors of robots, one per module."""

@@ -1,1 +1,1 @@
-"""Behaviors of users, one a module."""
+"""Behaviors of users, one per module."""

@@ -51,8 +51,8 @@ class Reactions(Behavior):
 
     def attention(self, actor: "Actor") -> Attention:
         """Determine the manners, which may be those of a persona, and return their distances."""
-        personas = (getattr(behavior, "who", None) for behavior in actor.behaviors)
-        persona = next((who for who in personas if who is not None), None)
+        personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
+        persona = next((p for p in personas if p is not None), None)
         self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
         self.laws = {
             "looks": self.used_manners.looks.table(),

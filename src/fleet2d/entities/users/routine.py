@@ -71,7 +71,7 @@ class Routine(Inhabitant):
         self.name = actor.name
         spots, sleeps_in, side = Spots(actor), None, (0, 1)
         if self.household is None:
-            self.life = Life(self.who, actor.seed, actor.path)
+            self.life = Life(self.resolved_persona, actor.seed, actor.path)
         else:
             members = list(self.household.members)
             if actor.name not in members:
@@ -85,11 +85,11 @@ class Routine(Inhabitant):
             spots = Spots(actor, members.index(actor.name), len(members))
             sleeps_in = self.household.bedrooms()[actor.name]
             side = self.household.side_of_bed(actor.name)
-        actor.speed *= self.who.pace
+        actor.speed *= self.resolved_persona.pace
         self.settle(actor, self._activities(), spots, sleeps_in, side)
 
     @property
-    def who(self) -> Persona:
+    def resolved_persona(self) -> Persona:
         """The persona, of its own or of the household's member."""
         if self.household is not None:
             members = self.household.members
@@ -97,16 +97,16 @@ class Routine(Inhabitant):
         return self.persona or bundled_persona("works_outside")
 
     def _activities(self) -> dict[str, Activity]:
-        used = {**self.who.used_activities, AWAY: catalogue()[AWAY]}
+        used = {**self.resolved_persona.used_activities, AWAY: catalogue()[AWAY]}
         if self.household is not None:
             joint = self.household.together
             names = [fields.activity or name for name, fields in joint.items()]
-            used |= {name: self.who.activity(name) for name in (*names, WELCOME)}
+            used |= {name: self.resolved_persona.activity(name) for name in (*names, WELCOME)}
         return used
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
         """Return the rooms of a likely activity at that time."""
-        likely_day, today = Life(self.who, 0, "").day, time.toordinal()
+        likely_day, today = Life(self.resolved_persona, 0, "").day, time.toordinal()
         time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
         if time_s < likely_day(today)[0].begin:
             today, time_s = today - 1, time_s + DAY_S
