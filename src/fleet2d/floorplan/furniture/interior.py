@@ -8,9 +8,9 @@ from fleet2d.floorplan.furniture.room_view import (
     FurnitureGroup,
     RoomView,
     Score,
+    cells_after,
     count_cells,
     largest_part,
-    near,
 )
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.space import Space
@@ -210,7 +210,9 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
         crossed[1:] &= can_stand[1:] & can_stand[:-1]
-        seeds = border & (crossed | near(crossed, beside, 1) | near(crossed, -beside, 1))
+        seeds = border & (
+            crossed | cells_after(crossed, beside, 1) | cells_after(crossed, -beside, 1)
+        )
         seeds |= np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn)
         for _ in range(reach):
             zone |= seeds

@@ -101,9 +101,9 @@ class RoomView:
         self._from_doors = squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1]
         reach = max(1, count_cells(lattice.cell, WALL_REACH))
         solid = [np.rot90(~self._whole, turn) for turn in range(4)]
-        self._behind = [_sums(near(mask, reach, 0)) for mask in solid]
-        self._right = [_sums(near(mask, reach, 1)) for mask in solid]
-        self._left = [_sums(near(mask, -reach, 1)) for mask in solid]
+        self._behind = [_sums(cells_after(mask, reach, 0)) for mask in solid]
+        self._right = [_sums(cells_after(mask, reach, 1)) for mask in solid]
+        self._left = [_sums(cells_after(mask, -reach, 1)) for mask in solid]
 
     def places(
         self, group: FurnitureGroup, occupied: Bool, draws: Draws, score: Score | None = None
@@ -291,7 +291,7 @@ def _count(mask: Bool, high: int, wide: int) -> Int:
     return out
 
 
-def near(mask: Bool, reach: int, axis: int) -> Bool:
+def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
     """Return the cells that follow a cell of the mask within `reach`, or precede it if negative."""
     out = np.zeros_like(mask)
     size = mask.shape[axis]

@@ -1,1 +1,1 @@
-"""The lattice that everything lies on, the triangle mesh between walls, and gates in it."""
+"""The lattice of all positions, the triangle mesh between walls, and gates in the mesh."""

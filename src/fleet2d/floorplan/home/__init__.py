@@ -1,1 +1,1 @@
-"""A floor plan in use: what stands in it now, and where bodies have space and routes."""
+"""A floor plan during a run: its present objects and doors, and the space and routes of bodies."""

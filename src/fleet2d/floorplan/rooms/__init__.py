@@ -1,1 +1,1 @@
-"""Rooms: the passages between them, the chambers these cut out, and what each room is called."""
+"""Rooms: the passages between them, the chambers that these cut out, and names and types."""

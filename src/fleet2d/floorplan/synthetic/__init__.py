@@ -1,1 +1,1 @@
-"""Homes that no one has built: generated from a seed."""
+"""Synthetic homes, generated from a seed."""
