@@ -64,7 +64,7 @@ def decode(encoded: Encoded, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
         head = dtype.itemsize * (encoding == RAMPS)
         middle = head + runs * dtype.itemsize
         lengths = np.frombuffer(content[middle:], "<u4")
-        # Before anything is repeated: a few bytes must not ask for all memory.
+        # Before anything is repeated: a few bytes must not request all memory.
         if len(lengths) != runs or int(lengths.sum(dtype=np.int64)) != rows - (encoding == RAMPS):
             raise ValueError(f"{runs} runs don't make {rows} values")
         values = np.repeat(np.frombuffer(content[head:middle], little_endian), lengths)

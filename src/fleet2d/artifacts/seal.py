@@ -94,7 +94,7 @@ def verify_run(directory: Path | str) -> Verification:
     if manifest.digest is None:
         raise ArtifactError(
             f"{root} has no digest, for its status is {manifest.status}: there is nothing to"
-            " compare with; `fleet2d resume` goes on with it"
+            " compare with; `fleet2d resume` continues the run"
         )
     if manifest.seal is None:
         return _without_seal(root, manifest)

@@ -56,6 +56,6 @@ class ArtifactSettings(Settings):
     ] = Field(
         default="auto",
         description="Write the state of the run this often in simulated time, so that `fleet2d "
-        "resume` can go on from there, or at the first decision of anyone after that; `auto`: "
+        "resume` can continue from there, or at the first decision after that; `auto`: "
         "after every 10 s or more of computing; or not at all (`off`).",
     )

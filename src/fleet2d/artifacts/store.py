@@ -363,8 +363,8 @@ class RunStore:
             if is_disk_full(error):
                 reason = f"the disk is full: {what} can't be written"
                 advice = (
-                    f"Free some space and go on by `fleet2d resume {self.directory}`, or store less"
-                    " (`artifacts:` in the scenario) and run again with another --out"
+                    f"Free some space and continue by `fleet2d resume {self.directory}`, or store"
+                    " less (`artifacts:` in the scenario) and run again with another --out"
                 )
             is_marked = self._mark_failed(reason, entry)
             self._failure = ArtifactError(

@@ -138,7 +138,7 @@ def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
     except KeyboardInterrupt:
         typer.echo(
             f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
-            f" {simulation.directory}: go on by `fleet2d resume {simulation.directory}`",
+            f" {simulation.directory}: continue it by `fleet2d resume {simulation.directory}`",
             err=True,
         )
         raise typer.Exit(130) from None

@@ -193,7 +193,7 @@ class Changes:
         return self._turn(door, True, due, step, actors)
 
     def _close_unused(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
-        """Shut a door that nobody has used for its `closes_after`."""
+        """Shut a door that has not been used for its `closes_after`."""
         after = self.doors[self.names[due.door]].closes_after
         if after is None or due.door in self.home.shut:
             return []

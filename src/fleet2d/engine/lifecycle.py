@@ -22,7 +22,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.run import FLOORPLAN_NAME
 from fleet2d.scenario.model import Scenario
 
-SLOW = "simulation.speedup asked for"
+SLOW = "simulation.speedup is"
 """Beginning of the note that a run was slower than its speedup."""
 
 # The messages of Ctrl-C, and of the signal that systemd, Docker and Slurm send before they kill.
@@ -69,8 +69,8 @@ def describe_end(
     speedup = pace.speedup_until(manifest.simulated_s) if pace else 0.0
     if pace and speedup < 0.98 * pace.speedup:
         manifest.notes.append(
-            f"{SLOW} {pace.speedup:g} times real time;"
-            f" {speedup:.0f} was reached, because computing took longer"
+            f"{SLOW} {pace.speedup:g}, but only {speedup:.0f} times real time was reached, because"
+            " computing took longer"
         )
 
 

@@ -90,11 +90,11 @@ def decide(state: State, span: Span) -> None:
 
 
 def _mind_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
-    """Let a body wait for another one in its way, or go round it; tell whether it does.
+    """Let a body wait for another one in its way, or go round it; return whether it does.
 
     Args:
         state: The state.
-        row: Of the body.
+        row: The row of the body.
         step: The present step.
         begins: Whether it begins with a plan just now.
     """

@@ -70,7 +70,7 @@ def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
     manifest = Manifest.read(root)
     if manifest.status == "complete":
         remove_leftovers(root)
-        raise RunDirectoryError(f"{root} holds a complete run: there is nothing to go on with")
+        raise RunDirectoryError(f"{root} holds a complete run: there is nothing to resume")
     if not manifest.scenario:
         raise RunDirectoryError(f"{root}/{FILE_NAME} has no scenario: run the scenario again")
     if paths := changed_inputs(manifest):

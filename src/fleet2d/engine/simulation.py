@@ -205,8 +205,8 @@ class Simulation(Judging):
         """
         if self.directory is not None:
             raise ArtifactError(
-                f"the simulation stores in {self.directory}: set artifacts.checkpoint, and go on"
-                " by `fleet2d resume`"
+                f"the simulation stores in {self.directory}: set artifacts.checkpoint, and"
+                " continue by `fleet2d resume`"
             )
         self._check_not_over()
         write_snapshot(path, self._state, self._constants, self._header())

@@ -192,7 +192,7 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     if header["fleet2d"] != __version__:
         raise ArtifactError(
             f"{path} was written by Fleet2D {header['fleet2d']}, and this is {__version__}: only"
-            " the same version can go on with it"
+            " the same version can load it"
         )
     return header, io.BytesIO(body)
 

@@ -341,7 +341,7 @@ def _open_prefix(root: Path, manifest: Manifest, prefix: Prefix) -> Run:
     }
     note = (
         f"{root} {states.get(manifest.status, 'is unfinished')}; everything before step"
-        f" {prefix.commit.step} can be read, and `fleet2d resume {root}` goes on with it"
+        f" {prefix.commit.step} can be read, and `fleet2d resume {root}` continues the run"
     )
     return Run(root, manifest, prefix.names, prefix.read, [note])
 

@@ -108,8 +108,8 @@ class SimulationSettings(Settings):
     )
     people_block: PositiveDuration | None = Field(
         default=None,
-        description="How long somebody, or a robot, waits for another body in the way before going"
-        " round it; null: bodies are air to each other.",
+        description="How long a person or robot waits for another body in its way before going"
+        " round it; null: bodies don't block each other.",
         examples=["3 s"],
     )
     speedup: float | None = Field(
