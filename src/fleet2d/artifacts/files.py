@@ -13,7 +13,7 @@ PARTIAL = ".partial"
 """Suffix of a file's name until the file is complete."""
 
 
-def write_all(handle: int, content: bytes) -> None:
+def write_all(handle: int, content: bytes | memoryview) -> None:
     """Write all bytes to an open file.
 
     Raises:
@@ -49,7 +49,7 @@ def replace(path: Path, new: Path) -> None:
     new.replace(path)
 
 
-def write_atomically(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes | memoryview) -> None:
     """Write a file atomically: after a crash it has the old content or the new one.
 
     Raises:

@@ -103,7 +103,7 @@ class Ledger:
             self._synced = now
         return commit
 
-    def keep_checkpoint(self, content: bytes) -> None:
+    def keep_checkpoint(self, content: bytes | memoryview) -> None:
         """Replace the checkpoint atomically; the rows that it refers to must be synced before.
 
         Raises:

@@ -151,7 +151,7 @@ class RunStore:
         with self._writing(name):
             write_atomically(self._root / name, content.encode())
 
-    def keep_checkpoint(self, content: bytes) -> None:
+    def keep_checkpoint(self, content: bytes | memoryview) -> None:
         """Replace the checkpoint of the run.
 
         Raises:

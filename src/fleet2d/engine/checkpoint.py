@@ -175,7 +175,7 @@ class CheckpointWriter:
                     f"no checkpoint from step {state.bodies.step} on: {error}"
                 )
             else:
-                self._store.keep_checkpoint(content.getvalue())
+                self._store.keep_checkpoint(content.getbuffer())
         state.recorder.wall_s += time.perf_counter() - began
         now = time.process_time()
         self._next_checkpoint = (

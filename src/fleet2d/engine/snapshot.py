@@ -154,14 +154,17 @@ def write_snapshot(
     body = io.BytesIO()
     write_state(state, constants, body)
     first = json.dumps({"fleet2d": __version__, **plain(header)}).encode()
-    digest = hashlib.sha256(first + body.getvalue()).hexdigest().encode()
-    content = b"\n".join((MAGIC, digest, first, body.getvalue()))
+    digest = hashlib.sha256(first)
+    digest.update(body.getbuffer())
+    # In parts: a state may be large, and a copy of it for each step of this as well.
+    parts = (b"%s\n%s\n%s\n" % (MAGIC, digest.hexdigest().encode(), first), body.getbuffer())
     if not isinstance(path, str | Path):
-        path.write(content)
+        path.writelines(parts)
         return
     partial = Path(f"{path}.partial")
     try:
-        partial.write_bytes(content)
+        with partial.open("wb") as file:
+            file.writelines(parts)
         partial.replace(path)
     except OSError as error:
         raise ArtifactError(f"{path} can't be written: {error.strerror or error}") from error

@@ -71,8 +71,8 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
         every: Time between two poses, a multiple of the step.
 
     Raises:
-        ArtifactError: The run stored no key frames, there is no such body, or `every` is no
-            multiple of the step.
+        ArtifactError: The run stored no key frames or damaged ones, there is no such body, or
+            `every` is no multiple of the step.
     """
     manifest = run.manifest
     clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
@@ -86,9 +86,18 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     keys = _keys_of(run, plan, entity, clock)
     steps = np.arange(0, clock.steps, stride, dtype=np.int64)
     out = empty_poses(len(steps))
+    out.x[:] = -1  # outside of the plan: what damaged key frames leave out
     _trace(run, plan, entity, clock, keys, stride, out)
+    rows, columns = plan.room_of_place.shape
+    cells = out.y // SUB, out.x // SUB
+    inside = (0 <= cells[0]) & (cells[0] < rows) & (0 <= cells[1]) & (cells[1] < columns)
+    if not inside.all():
+        raise ArtifactError(
+            f"key_frames.parquet has poses of {entity} outside of the floor plan: it is damaged;"
+            " `fleet2d verify` says which files have changed"
+        )
     xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
-    room = np.where(out.away, -1, plan.room_of_place[out.y // SUB, out.x // SUB])
+    room = np.where(out.away, -1, plan.room_of_place[cells])
     return Trajectory(
         steps,
         clock.times(steps),
