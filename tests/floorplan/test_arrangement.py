@@ -34,18 +34,18 @@ def test_two_objects_of_one_name_are_refused() -> None:
 
 
 def test_quarter_turn_is_exact() -> None:
-    there = move_object(SOFA, LATTICE, (5, 5), 90)
-    assert (4.5, 4, 5.5, 6) == there.footprint.bounds
-    (use,) = there.uses
+    sofa = move_object(SOFA, LATTICE, (5, 5), 90)
+    assert (4.5, 4, 5.5, 6) == sofa.footprint.bounds
+    (use,) = sofa.uses
     assert (5, 5) == (use.x, use.y)
     assert math.pi == pytest.approx(use.heading)
 
 
 @given(st.floats(-360, 360), st.floats(1, 9), st.floats(1, 9))
 def test_moved_object_keeps_its_size_to_the_lattice(turn: float, x: float, y: float) -> None:
-    there = move_object(SOFA, LATTICE, (x, y), turn)
-    assert there.footprint.area == pytest.approx(2, abs=0.01)
-    assert there.footprint.centroid.x == pytest.approx(x, abs=0.002)
+    sofa = move_object(SOFA, LATTICE, (x, y), turn)
+    assert sofa.footprint.area == pytest.approx(2, abs=0.01)
+    assert sofa.footprint.centroid.x == pytest.approx(x, abs=0.002)
 
 
 def test_object_moved_back_is_where_it_was() -> None:

@@ -80,8 +80,8 @@ def test_every_box_of_every_plan_is_a_room_or_a_note(sample: list[Path]) -> None
     """Count and place the rooms against the boxes of the files."""
     for path in sample:
         boxes: dict[tuple[float, ...], set[str]] = {}
-        for category, found in json.loads(path.read_text())["room_category"].items():
-            for box in found:
+        for category, category_boxes in json.loads(path.read_text())["room_category"].items():
+            for box in category_boxes:
                 boxes.setdefault(tuple(box), set()).add(category.lower())
         plan = read_houseexpo(path)
         labelled = [room for room in plan.rooms if room.labels]
@@ -263,10 +263,10 @@ def test_outline_that_runs_over_itself_stays_free_there(tmp_path: Path) -> None:
     plan = home(tmp_path, verts=twice)
 
     # Even-odd would make walls of the two squares that the outline goes round twice.
-    once = shapely.make_valid(shapely.Polygon(twice), method="structure")
-    assert shapely.Point(3.5, 1.5).within(once)
+    valid = shapely.make_valid(shapely.Polygon(twice), method="structure")
+    assert shapely.Point(3.5, 1.5).within(valid)
     assert plan.room_at(3.5, 1.5) is not None
-    assert once.area == pytest.approx(plan.area_m2, abs=0.01)
+    assert valid.area == pytest.approx(plan.area_m2, abs=0.01)
 
 
 def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path: Path) -> None:

@@ -51,13 +51,13 @@ def check_ways(empty: FloorPlan, plan: FloorPlan) -> None:
     cell = plan.lattice.cell
     for part in range(before.parts):
         was = before.part_of_cell == part
-        left = after.part_of_cell[was & (after.part_of_cell >= 0)]
-        sizes = sorted(Counter(left.tolist()).values())
+        rest = after.part_of_cell[was & (after.part_of_cell >= 0)]
+        sizes = sorted(Counter(rest.tolist()).values())
         assert not [size for size in sizes[:-1] if size * cell**2 >= POCKET_M2]
     for room in empty.rooms:
-        here = empty.room_of_cell == room.index
-        if (here & (before.part_of_cell >= 0)).any():
-            assert (here & (after.part_of_cell >= 0)).any()
+        in_room = empty.room_of_cell == room.index
+        if (in_room & (before.part_of_cell >= 0)).any():
+            assert (in_room & (after.part_of_cell >= 0)).any()
 
 
 def check_uses(plan: FloorPlan) -> None:

@@ -16,10 +16,10 @@ def test_same_walls_in_another_order_are_the_same_free_space() -> None:
 
 
 def test_free_space_that_is_there_already_is_not_moved() -> None:
-    lattice, once = free_on_lattice("flat", shapely.box(0.013, 0.02, 3.333, 2.071), 0.05)
-    back = shapely.transform(once[0], lattice.to_metres)
+    lattice, polygons = free_on_lattice("flat", shapely.box(0.013, 0.02, 3.333, 2.071), 0.05)
+    back = shapely.transform(polygons[0], lattice.to_metres)
     again = free_on_lattice("flat", back, 0.05)
-    assert (lattice, [p.wkt for p in once]) == (again[0], [p.wkt for p in again[1]])
+    assert (lattice, [p.wkt for p in polygons]) == (again[0], [p.wkt for p in again[1]])
 
 
 @pytest.mark.parametrize(

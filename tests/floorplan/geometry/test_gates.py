@@ -109,8 +109,8 @@ def test_regions_follow_doors_as_single_sight_lines_do(
     points = awkward_points(home, rng, 60)
     x, y = eye.tolist()
     pieces = visible_region(mesh, x, y)
-    found = [region_contains(mesh, x, y, *pieces, *p) for p in points.tolist()]
-    assert found == truth(home, segments, eye, points).tolist()
+    inside = [region_contains(mesh, x, y, *pieces, *p) for p in points.tolist()]
+    assert inside == truth(home, segments, eye, points).tolist()
 
 
 def test_all_doors_open_is_the_home_without_doors() -> None:

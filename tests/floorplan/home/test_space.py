@@ -197,8 +197,8 @@ def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(
         if upright:
             free = shapely.transform(free, lambda xy: xy[:, ::-1])
         space = Space(build_plan(free), radius)
-        here, there = ((1.0, 0.6), (3.0, 2.4)) if not upright else ((0.6, 1.0), (2.4, 3.0))
-        start, goal = (space.plan.lattice.to_lattice(at).tolist() for at in (here, there))
+        first, second = ((1.0, 0.6), (3.0, 2.4)) if not upright else ((0.6, 1.0), (2.4, 3.0))
+        start, goal = (space.plan.lattice.to_lattice(at).tolist() for at in (first, second))
 
         path = space.route(tuple(start), tuple(goal))
 
@@ -227,18 +227,18 @@ def moves(plan: FloorPlan) -> list[npt.NDArray[np.float64]]:
 
 def check_symmetry(plan: FloorPlan, radius: float, slip: float) -> None:
     """Check that the space of the moved home is the moved space, up to `slip` lattice units."""
-    here = region(Space(plan, radius))
+    original = region(Space(plan, radius))
     for move in moves(plan):
 
-        def moved(shape: shapely.Geometry, move: npt.NDArray[np.float64] = move) -> Polygon:
+        def transform(shape: shapely.Geometry, move: npt.NDArray[np.float64] = move) -> Polygon:
             return shapely.transform(shape, lambda xy: xy @ move[:, :2].T + move[:, 2])
 
-        walls = shapely.union_all([moved(polygon) for polygon in plan.polygons])
+        walls = shapely.union_all([transform(polygon) for polygon in plan.polygons])
         other = build_plan(shapely.transform(walls, lambda xy: xy / UNITS_PER_M))
         shift = other.lattice.to_lattice((0.0, 0.0))
-        there = shapely.transform(moved(here), lambda xy, shift=shift: xy + shift)
+        expected = shapely.transform(transform(original), lambda xy, shift=shift: xy + shift)
 
-        assert shapely.hausdorff_distance(there, region(Space(other, radius))) <= slip
+        assert shapely.hausdorff_distance(expected, region(Space(other, radius))) <= slip
 
 
 @pytest.mark.parametrize("radius", [0.2, 0.217])

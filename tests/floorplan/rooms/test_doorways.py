@@ -111,12 +111,12 @@ def check_fitted(polygons: list[shapely.Polygon], columns: int, rows: int, seed:
     walls, segments, notes = fit_lines(lattice, polygons, lines)
     free = shapely.MultiPolygon(walls)
     assert free.is_valid
-    kept = [shapely.LineString(segment) for segment in segments if segment is not None]
-    for line in kept:
+    fitted_lines = [shapely.LineString(segment) for segment in segments if segment is not None]
+    for line in fitted_lines:
         assert shapely.relate_pattern(line, free, "1FFF0F***")
         assert (np.asarray(line.coords) % 2 == 0).all()
-    assert len(lines) == len(kept) + len(notes)
-    return len(kept)
+    assert len(lines) == len(fitted_lines) + len(notes)
+    return len(fitted_lines)
 
 
 @given(homes(), seeds())

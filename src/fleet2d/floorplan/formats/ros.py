@@ -31,7 +31,6 @@ from fleet2d.units import Length
 
 # The grey that map savers write for unknown; above this free_thresh it would count as free.
 UNKNOWN_GREY = 205 / 255
-MAX_RESOLUTION_M = MAX_CELL_M
 
 _KEYS = {
     "image": "image: map.pgm",
@@ -145,10 +144,10 @@ def _settings(content: dict[str, Any]) -> _MapSettings:
             f"image is {shown_value(image)}: the name of a PGM or PNG file is expected"
         )
     resolution = _number(content["resolution"], "resolution")
-    if not 0 < resolution <= MAX_RESOLUTION_M:
+    if not 0 < resolution <= MAX_CELL_M:
         raise FloorPlanError(
             f"resolution is {resolution:g} m per pixel: above 0 and at most"
-            f" {MAX_RESOLUTION_M:g} m is expected (0.05 is usual)"
+            f" {MAX_CELL_M:g} m is expected (0.05 is usual)"
         )
     free, occupied = (_threshold(content, key) for key in ("free_thresh", "occupied_thresh"))
     if free > occupied:
@@ -196,8 +195,9 @@ def _origin(value: object) -> tuple[float, float, float]:
         raise FloorPlanError(f"origin is {shown_value(value)}: a list [x, y, yaw] is expected")
     x, y, yaw = (_number(v, f"origin[{k}]") for k, v in enumerate(value))
     if max(abs(x), abs(y)) > MAX_COORDINATE_M:
-        found = shown_value(value)
-        raise FloorPlanError(f"origin is {found}: too far out for coordinates in metres")
+        raise FloorPlanError(
+            f"origin is {shown_value(value)}: too far out for coordinates in metres"
+        )
     return x, y, yaw
 
 
