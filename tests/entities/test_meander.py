@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tests.scenes import OWN, path, run, scenario
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.motion import Walk
+from fleet2d.entities.motion import RandomWalk
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.objects import POSTURES
 
@@ -128,4 +128,4 @@ def test_who_sat_stands_for_as_long_as_it_walks() -> None:
         ana_now = now._state.actors[0]
         postures.append(POSTURES[ana_now.posture_code(minute * 60 * 10**6)])
     assert ["sit", "stand"] == postures
-    assert isinstance(ana_now.motion, Walk)
+    assert isinstance(ana_now.motion, RandomWalk)

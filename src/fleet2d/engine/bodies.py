@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.body import NEVER
-from fleet2d.entities.motion import Pose, Walk
+from fleet2d.entities.motion import Pose, RandomWalk
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.motion import Breakpoints, Poses
 from fleet2d.kernels.timelines import Timelines, Window
@@ -80,7 +80,7 @@ class Bodies:
     def follow(self, row: int, plan: Plan) -> None:
         """Let a body follow a plan from the present step on."""
         motion = plan.finish()
-        if isinstance(motion, Walk):
+        if isinstance(motion, RandomWalk):
             x, y, heading, _ = plan.began[1]
             self._timelines.walk(
                 row, self.step, motion.walls, motion.space, motion.rule, (x, y, heading)

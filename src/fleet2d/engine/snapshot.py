@@ -19,7 +19,7 @@ from fleet2d.artifacts.manifest import plain
 from fleet2d.engine import arrays
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
-from fleet2d.entities.motion import Track, Walk
+from fleet2d.entities.motion import RandomWalk, Track
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.costmap import CostedSpace
 from fleet2d.floorplan.home.space import Space
@@ -34,7 +34,7 @@ _HASH = type(hashlib.sha256())
 
 # Types of objects that never change: copies in one process share them.
 _SHARED = frozenset(
-    {CostedSpace, FloorPlan, FunctionType, Mesh, Persona, Space, Track, Walk, ColumnChunk}
+    {CostedSpace, FloorPlan, FunctionType, Mesh, Persona, Space, Track, RandomWalk, ColumnChunk}
 )
 
 # Names that a file may refer to besides classes of Fleet2D and of the scenario's own modules.

@@ -147,24 +147,24 @@ class DecidingActor(Actor):
         """
         step, just = now.step, self._just_waited
         since = self._waited[0] if step <= self._waited[1] else step
-        waits = Wait(self.plan, step, since, self.arbiter.own, surroundings)
+        wait = Wait(self.plan, step, since, self.arbiter.own, surroundings)
         people = surroundings.people
         self._waited, self.passes_until = (since, step + just), step
         gives_way: GivesWay = self.entity.gives_way  # type: ignore[attr-defined]
         waited, plan = (step - since) * self.clock.step_us, None
         where = self.state, self.plan.root, people.tobytes()
         if waited >= micros(gives_way.patience) and where != self._no_way_round:
-            plan = waits.go_round(now, people, gives_way.distance)
+            plan = wait.go_round(now, people, gives_way.distance)
             self.passes_until = step + just if plan is not None else step
             self._no_way_round = where
         if plan is None and waited >= micros(max(gives_way.patience, gives_way.gives_up)):
-            plan, self._waited = waits.leave_out(now, person), (0, -1)
+            plan, self._waited = wait.leave_out(now, person), (0, -1)
             if plan is None:
-                plan = waits.give_up(now, person)
+                plan = wait.give_up(now, person)
                 if self.order is None:
                     self.arbiter.give_up(now)
         if plan is None:
-            plan, self._waiting = waits.wait(now, person, gives_way), waits
+            plan, self._waiting = wait.stand_still(now, person, gives_way), wait
         self.follow_instead(plan, now)
 
     def follow_instead(self, plan: Plan, now: Situation) -> None:

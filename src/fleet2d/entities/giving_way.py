@@ -117,7 +117,7 @@ class Wait:
         """Return how long it has waited at a step [us]."""
         return (step - self.since) * self._step_us
 
-    def wait(self, now: "Situation", person: str, gives_way: GivesWay) -> Plan:
+    def stand_still(self, now: "Situation", person: str, gives_way: GivesWay) -> Plan:
         """Stand still until it goes round or gives up, if nobody moves."""
         plan, look, patience = now.plan(), self._look_after(now.step), micros(gives_way.patience)
         if now.step == self.since:

@@ -32,7 +32,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Walk:
+class RandomWalk:
     """A random walk, drawn step by step."""
 
     walls: Mesh
@@ -40,4 +40,4 @@ class Walk:
     rule: WalkRule
 
 
-Motion = Track | Walk
+Motion = Track | RandomWalk

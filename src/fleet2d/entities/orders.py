@@ -23,7 +23,7 @@ class Order(Protocol):
         """Return what to do from now on; None: it is over."""
 
 
-class Hold:
+class StandStill:
     """Stand still, wherever it is.
 
     Args:

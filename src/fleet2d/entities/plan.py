@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.entities.furniture import seat_at
-from fleet2d.entities.motion import Motion, Track, Walk
+from fleet2d.entities.motion import Motion, RandomWalk, Track
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import straight_way
@@ -284,7 +284,7 @@ class Plan:
         self.take("stand")
         home, body = self._body.home, self._body
         # A random walk doesn't open doors: a shut one is a wall.
-        self._motion = Walk(home.walls, home.space(body.entity.radius).mesh, rule)
+        self._motion = RandomWalk(home.walls, home.space(body.entity.radius).mesh, rule)
         self.endless = True
         return self
 
@@ -357,7 +357,7 @@ class Plan:
     def data(self) -> dict[str, Any]:
         """Return the plan as numbers and texts, from which `of` makes the same plan again."""
         motion = self.finish()
-        walk: list[Any] | None = list(motion.rule) if isinstance(motion, Walk) else None
+        walk: list[Any] | None = list(motion.rule) if isinstance(motion, RandomWalk) else None
         return {
             "rows": self._legs.rows().tolist(),
             "walk": None if walk is None else [int(number) for number in walk],

@@ -105,7 +105,7 @@ class HoldStill(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        body(world, self.entity).obey(orders.Hold(self.duration), world.step)
+        body(world, self.entity).obey(orders.StandStill(self.duration), world.step)
 
 
 @register("intervention", "release")
