@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from tests.calibrate.logs import TRUE, Float64, shares, simulated
+from tests.thorough import some
 
 from fleet2d.calibrate.factors import Constant, Falling, Orientation
 from fleet2d.calibrate.likelihood import ProductLikelihood, wilson
@@ -71,9 +72,11 @@ def test_large_logs_give_the_true_parameters() -> None:
     )
 
 
-@pytest.mark.parametrize(("rows", "repeats"), [(600, 250)])
-def test_intervals_cover_the_truth_as_often_as_they_claim(rows: int, repeats: int) -> None:
-    """Of 250 logs, 95 % intervals miss the truth in 12.5 +- 3.4; 3.7 deviations are allowed."""
+@pytest.mark.parametrize(("rows", "repeats", "most"), some([(600, 100, 13), (600, 250, 25)], 2))
+def test_intervals_cover_the_truth_as_often_as_they_claim(
+    rows: int, repeats: int, most: int
+) -> None:
+    """Of 100 logs, 95 % intervals miss the truth in 5 +- 2.2; 3.7 deviations are allowed."""
     missed = dict.fromkeys(("top", "distance midpoint", "distance width"), 0)
     for seed in range(repeats):
         log = simulated(100 + seed, rows)
@@ -85,7 +88,7 @@ def test_intervals_cover_the_truth_as_often_as_they_claim(rows: int, repeats: in
             assert low <= estimate.value <= high
             missed[name] += not low <= TRUE[name] <= high
     for name, count in missed.items():
-        assert 1 <= count <= 25, (name, count)
+        assert 1 <= count <= most, (name, count)
 
 
 class Known:
@@ -107,10 +110,10 @@ class Known:
 
 
 def test_intervals_of_bearing_and_orientation_cover_the_truth_as_often_as_they_claim() -> None:
-    """Of 60 logs, 95 % intervals miss in 3 +- 1.7; none of 4 parameters may miss in more than 9."""
+    """Of 30 logs, 95 % intervals miss in 1.5 +- 1.2; none of 4 parameters may miss in more than 5."""
     names = ("bearing midpoint", "bearing width", "side", "back")
     missed = dict.fromkeys(names, 0)
-    for seed in range(60):
+    for seed in range(30):
         log = simulated(900 + seed, 1500, bearing=True, turned=True)
         assert log.bearing is not None
         assert log.orientation is not None
@@ -122,7 +125,7 @@ def test_intervals_of_bearing_and_orientation_cover_the_truth_as_often_as_they_c
             low = -np.inf if estimate.low is None else estimate.low
             high = np.inf if estimate.high is None else estimate.high
             missed[name] += not low <= TRUE[name] <= high
-    assert max(missed.values()) <= 9, missed
+    assert max(missed.values()) <= 5, missed
     assert sum(missed.values()) >= 2, missed
 
 

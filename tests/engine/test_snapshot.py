@@ -33,7 +33,7 @@ HOUSE = {
 }
 
 
-def house(duration: str = "24 min") -> dict[str, Any]:
+def house(duration: str = "20 min") -> dict[str, Any]:
     """Doors that people open, sensors, layers, people who react, robots that give way."""
     content = everything(duration, objects=HOUSE)
     content["changes"] = [

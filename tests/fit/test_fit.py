@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.thorough import some
 
 from fleet2d import cli
 from fleet2d.document import read_document
@@ -133,7 +134,7 @@ def test_a_markov_chain_keeps_the_shares_of_time(life: Timeline) -> None:
     assert np.abs(hours - hours.mean(axis=0)).max() < 0.12  # it knows no clock
 
 
-@pytest.mark.parametrize("name", LOGS)
+@pytest.mark.parametrize("name", some(LOGS, 2))
 def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(
     shared_data: Path, name: str
 ) -> None:
