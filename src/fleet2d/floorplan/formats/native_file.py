@@ -68,7 +68,7 @@ Area = Annotated[
 
 
 def _check_valid(shape: Polygon | MultiPolygon) -> None:
-    """Refuse a shape that crosses itself: our own format has no traced outlines, which may."""
+    """Refuse a shape that crosses itself, as only the traced outlines of other formats may."""
     if not shape.is_valid:
         reason, _, at = shapely.is_valid_reason(shape).partition("[")
         place = f" at ({at.rstrip(']').replace(' ', ', ')}) m" if at else ""

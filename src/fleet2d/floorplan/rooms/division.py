@@ -126,7 +126,7 @@ def select_doorways(
     room_of_cell: NDArray[np.int16],
     passages: Passages,
 ) -> list[tuple[DoorLine, Segment]]:
-    """Return the doorways among passages: those between two rooms that are no openings."""
+    """Return the passages that are doorways: narrow, and between two different rooms."""
     segments = []
     for segment, is_opening in zip(passages.segments, passages.is_opening, strict=True):
         left, right = rooms_beside(lattice, room_of_cell, segment)

@@ -187,7 +187,7 @@ def _shortest_first(lines: I64) -> I64:
 
 
 def _all_free(mesh: Mesh, lines: I64) -> NDArray[np.bool_]:
-    """Return which lines cross free space alone."""
+    """Return which lines cross only free space."""
     middle = (lines[:, :2] + lines[:, 2:]) // 2
     half = np.rint((lines[:, 2:] - lines[:, :2]) * (VISIBLE_SHARE / 2)).astype(np.int64)
     free: NDArray[np.bool_] = pairs_in_sight(mesh, middle, middle + half)

@@ -11,7 +11,7 @@ from fleet2d.floorplan.synthetic.slicing import Cut, Leaf, Tree, choose_squarest
 
 
 def core_trees(groups: Groups, briefs: Sequence[Brief], choices: Choices) -> list[Tree]:
-    """Draw trees of living room, dining room and kitchen; wings are to their high x and y."""
+    """Draw trees of living room, dining room and kitchen; wings join them at high x or high y."""
     room_of = {brief.kind: i for i, brief in enumerate(briefs)}
     living = Leaf(room_of["living_room"])
     trees: list[Tree] = []

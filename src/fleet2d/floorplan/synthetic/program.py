@@ -71,7 +71,7 @@ USUAL_SPREAD = (78, 130)
 
 @dataclass(frozen=True)
 class Brief:
-    """A room that a home is to have.
+    """The brief of a room: its type and size.
 
     Attributes:
         kind: Its type.

@@ -9,7 +9,7 @@ from fleet2d.floorplan.synthetic.program import SIZES, Brief
 
 @dataclass(frozen=True)
 class LayoutRequest:
-    """What is requested of a layout.
+    """The request for a layout.
 
     Attributes:
         briefs: The rooms.
