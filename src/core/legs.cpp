@@ -1,5 +1,6 @@
 #include "legs.hpp"
 
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 
@@ -15,6 +16,21 @@ Moment Legs::turn(Moment now, i64 headings, f64 turn_rate) {
         mark(now);
     }
     return now;
+}
+
+std::pair<Moment, i64> Legs::turn_aside(Moment now, f64 turn_rate, const Aside& aside, i64 next, i64 until,
+                                        const Draw& draw) {
+    const u64 wait_bits = static_cast<u64>(std::bit_width(static_cast<u64>(aside.waits.size())) - 1);
+    while (next < until) {
+        if (next > now.time) {
+            now.time = next;
+            mark(now);
+        }
+        const i64 side = draw(aside.side_bits) - (i64{1} << aside.side_bits) / 2;
+        now = turn(now, turn_between(now.heading, (aside.facing + side) & (TURN - 1)), turn_rate);
+        next = now.time + aside.waits[draw(wait_bits)];
+    }
+    return {now, next};
 }
 
 Moment Legs::walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate) {

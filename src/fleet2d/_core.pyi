@@ -1116,6 +1116,23 @@ class Legs:
             time, x, y, heading and away at the end.
         """
 
+    def turn_aside(self, now: tuple[int, int, int, int, int], turn_rate: float, facing: int, next_until: tuple[int, int], side_bits: int, waits: numpy.typing.NDArray[numpy.int64], bits: Bits) -> tuple[int, int, int]:
+        """
+        Turn aside on the spot at random moments.
+
+        Args:
+            now: Time [us], x, y [lattice], heading [1/4096 turn], away.
+            turn_rate: Headings a second.
+            facing: Heading about which it turns.
+            next_until: When it turns first, and before when [us].
+            side_bits: Headings are within 2**(side_bits - 1) of `facing`.
+            waits: int64 (n,), quantiles of the time between two turns [us]; n is a power of two.
+            bits: Where draws come from.
+
+        Returns:
+            Time and heading at the end, and when the next turn is due.
+        """
+
     def walk(self, time: int, heading: int, route: numpy.typing.NDArray[numpy.int64], speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:
         """
         Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.

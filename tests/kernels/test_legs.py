@@ -7,8 +7,9 @@ from math import ceil
 import numpy as np
 import pytest
 
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Legs, time_route
+from fleet2d.kernels.random import Bits, StepDraws
 
 SPEED, TURN_RATE = 768.0, 1023.7
 
@@ -32,6 +33,16 @@ class InLists:
             heading = (heading + (part if headings > 0 else -part)) % TURN
             self.rows.append([time + ceil(part * 1e6 / TURN_RATE), x, y, heading, away])
 
+    def turn_aside(self, facing: int, next_us: int, until_us: int, waits: list, bits: Bits) -> int:
+        while next_us < until_us:
+            time, *pose = self.now
+            if next_us > time:
+                self.rows.append([next_us, *pose])
+            side = bits.take(10) - 512
+            self.turn(turn_between(self.now[3], (facing + side) % TURN))
+            next_us = self.now[0] + waits[bits.take(3)]
+        return next_us
+
     def walk(self, route: np.ndarray) -> None:
         timed = time_route(route, self.now[0], self.now[3], SPEED, TURN_RATE)
         self.rows += [[*row, 0] for row in timed[1:].tolist()]
@@ -41,7 +52,9 @@ class InLists:
 def test_legs_are_those_of_lists(seed: int) -> None:
     random, legs, twin = np.random.default_rng(seed), Legs(), InLists()
     legs.mark(*twin.now)
-    for what in random.integers(0, 4, 80).tolist():
+    waits = random.integers(0, 10**7, 8)
+    bits, twin_bits = (Bits(StepDraws(7, seed)) for _ in range(2))
+    for what in random.integers(0, 5, 80).tolist():
         time, x, y, heading, away = now = twin.now
         if what == 0:
             twin.rows.append([time + int(random.integers(0, 10**9)), x, y, heading, away])
@@ -54,6 +67,12 @@ def test_legs_are_those_of_lists(seed: int) -> None:
             route = np.concatenate([[[x, y]], random.integers(0, 4000, (3, 2))])
             twin.walk(route)
             assert twin.now == list(legs.walk(time, heading, route, SPEED, TURN_RATE))
+        elif what == 3:
+            facing, begin = int(random.integers(TURN)), time + int(random.integers(-9, 10**7))
+            until = begin + int(random.integers(0, 10**8))
+            next_us = twin.turn_aside(facing, begin, until, waits.tolist(), twin_bits)
+            after = legs.turn_aside(tuple(now), TURN_RATE, facing, (begin, until), 10, waits, bits)
+            assert (*twin.now[::3], next_us) == after
         else:
             block = np.array([[time + 10, 3, 4, 5, 1], [time + 20, 6, 7, 8, 0]])
             legs.add(block)

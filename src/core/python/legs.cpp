@@ -1,7 +1,10 @@
 #include "../legs.hpp"
 
+#include <bit>
+
 #include "arrays.hpp"
 #include "motion.hpp"
+#include "random.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
@@ -54,6 +57,39 @@ void bind_legs(nb::module_& m) {
 
 Returns:
     time, x, y, heading and away at the end.)")
+        .def(
+            "turn_aside",
+            [](Legs& self, Row now, f64 turn_rate, i64 facing, std::pair<i64, i64> next_until, u64 side_bits,
+               View<const i64> waits, OwnedBits& bits) {
+                const auto [next, until] = next_until;
+                const auto [time, x, y, heading, away] = now;
+                require(turn_rate > 0, "turn_rate must be above 0");
+                require(-MOST < facing && facing < MOST, "facing must be within 2**29 of 0");
+                require(0 < side_bits && side_bits <= Bits::MOST, "side_bits must be 1 to 30");
+                require(-LATEST <= next && next <= LATEST && -LATEST <= until && until <= LATEST,
+                        "next and until must be at most 2**61 us");
+                require(std::has_single_bit(static_cast<u64>(waits.size())) && all_in_range(waits, 0, LATEST) &&
+                            std::any_of(waits.begin(), waits.end(), [](i64 wait) { return wait > 0; }),
+                        "waits must be a power of two of times of 0 us or more, not all 0");
+                const auto draw = [&bits](u64 count) { return bits.bits.take(bits.draws, count); };
+                const auto [end, due] = self.turn_aside(checked(time, x, y, heading, away), turn_rate,
+                                                        {facing, side_bits, waits}, next, until, draw);
+                return std::tuple(end.time, end.heading, due);
+            },
+            "now"_a, "turn_rate"_a, "facing"_a, "next_until"_a, "side_bits"_a, "waits"_a, "bits"_a,
+            R"(Turn aside on the spot at random moments.
+
+Args:
+    now: Time [us], x, y [lattice], heading [1/4096 turn], away.
+    turn_rate: Headings a second.
+    facing: Heading about which it turns.
+    next_until: When it turns first, and before when [us].
+    side_bits: Headings are within 2**(side_bits - 1) of `facing`.
+    waits: int64 (n,), quantiles of the time between two turns [us]; n is a power of two.
+    bits: Where draws come from.
+
+Returns:
+    Time and heading at the end, and when the next turn is due.)")
         .def(
             "walk",
             [](Legs& self, i64 time, i64 heading, View<const i64, 2> route, f64 speed, f64 turn_rate) {

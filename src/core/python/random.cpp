@@ -1,19 +1,11 @@
-#include "../random.hpp"
+#include "random.hpp"
 
-#include "arrays.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
 namespace {
 
 constexpr u64 LAST_BOUND = (u64{1} << 31) - 1;
-
-// Bits, and the draws that they come from.
-struct OwnedBits {
-    nb::object owner;
-    StepDraws& draws;
-    Bits bits;
-};
 
 void bind_draws(nb::module_& m) {
     nb::class_<StepDraws>(m, "StepDraws", R"(The draws of one stream at one step, one after the other.

@@ -41,6 +41,7 @@ class Plan:
     Attributes:
         began: The step at which it begins, and the state of the body then.
         time_us: The moment up to which it is planned [us since the start].
+        legs: Its breakpoints so far.
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
         asks_us: When the behavior is asked again at the latest [us since the start]; None: at the
@@ -53,7 +54,7 @@ class Plan:
         state = body.state
         self._body = body
         self.began = (step, state)
-        self._legs = Legs()
+        self.legs = Legs()
         self._motion: Motion | None = None
         self.time_us = step * body.clock.step_us
         self.x, self.y, self.heading, self.away = state
@@ -81,6 +82,11 @@ class Plan:
     def step_us(self) -> int:
         """Length of a step [us]."""
         return self._body.clock.step_us
+
+    @property
+    def turn_rate(self) -> float:
+        """How fast the body turns on the spot [1/4096 turn per second]."""
+        return self._body.turn_rate
 
     @property
     def time(self) -> datetime:
@@ -122,7 +128,7 @@ class Plan:
 
     def _walk(self, route: I64) -> None:
         body = self._body
-        self.time_us, self.x, self.y, self.heading, _ = self._legs.walk(
+        self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(
             self.time_us, self.heading, route, body.speed, body.turn_rate
         )
 
@@ -205,7 +211,7 @@ class Plan:
                     f"{self._body.path}: breakpoints must be in order of time, from"
                     f" {self.time_us} us on"
                 )
-            self._legs.add(breakpoints)
+            self.legs.add(breakpoints)
             self.time_us, self.x, self.y, self.heading, self.away = breakpoints[-1].tolist()
         return self
 
@@ -224,8 +230,7 @@ class Plan:
         self._check_goes_on()
         if headings:
             now = self.time_us, self.x, self.y, self.heading, self.away
-            after = self._legs.turn(*now, headings, self._body.turn_rate)
-            self.time_us, self.heading = after[0], after[3]
+            self.time_us, _, _, self.heading, _ = self.legs.turn(*now, headings, self.turn_rate)
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
         """Stay for a duration, or until a local time; without either, for good.
@@ -279,7 +284,7 @@ class Plan:
         """Walk at random, for good; must be all that the plan does."""
         self.come_home()
         self._check_goes_on()
-        if len(self._legs) > 2 or self.time_us != self.began[0] * self.step_us:
+        if len(self.legs) > 2 or self.time_us != self.began[0] * self.step_us:
             raise ComponentError(f"{self._body.path}: a plan that meanders can do nothing before")
         self.take("stand")
         home, body = self._body.home, self._body
@@ -351,7 +356,7 @@ class Plan:
     def finish(self) -> Motion:
         """Return the motion of the plan."""
         if self._motion is None:
-            self._motion = Track(Breakpoints(*self._legs.track()), self.step_us)
+            self._motion = Track(Breakpoints(*self.legs.track()), self.step_us)
         return self._motion
 
     def data(self) -> dict[str, Any]:
@@ -359,7 +364,7 @@ class Plan:
         motion = self.finish()
         walk: list[Any] | None = list(motion.rule) if isinstance(motion, RandomWalk) else None
         return {
-            "rows": self._legs.rows().tolist(),
+            "rows": self.legs.rows().tolist(),
             "walk": None if walk is None else [int(number) for number in walk],
             "notes": [list(note) for note in self.notes],
             "interrupts": sorted(self.interrupts),
@@ -375,8 +380,8 @@ class Plan:
         if data["walk"] is not None:
             key, *numbers = data["walk"]
             return plan.meander(WalkRule(np.uint64(key), *numbers))
-        plan._legs = Legs()
-        plan._legs.add(np.array(data["rows"], np.int64).reshape(-1, 5))
+        plan.legs = Legs()
+        plan.legs.add(np.array(data["rows"], np.int64).reshape(-1, 5))
         plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
         plan.notes = [Note(*note) for note in data["notes"]]
         plan.interrupts, plan.asks_us = frozenset(data["interrupts"]), data["asks_us"]
@@ -392,4 +397,4 @@ class Plan:
             )
 
     def _mark(self) -> None:
-        self._legs.mark(self.time_us, self.x, self.y, self.heading, self.away)
+        self.legs.mark(self.time_us, self.x, self.y, self.heading, self.away)

@@ -11,13 +11,11 @@ from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import matching_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.setting import Setting, settle_at
+from fleet2d.entities.users.setting import SECOND_US, Setting, settle_at, small_move, turn_aside
 from fleet2d.entities.users.spots import Seat, Spot, Spots
 from fleet2d.errors import PlacementError
-from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.random import Bits
 from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.laws import KNOTS, Law, exponential
 from fleet2d.routines.occupancy import ANY_ROOM
 from fleet2d.routines.planner import NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
     from fleet2d.entities.place import RoomChoice
     from fleet2d.floorplan.plan import Room
 
-SECOND_US = 1_000_000
 # Draws of a doing are addressed by the day's ordinal times this, plus the doing's number. A day has
 # fewer doings than half of it.
 DOINGS_A_DAY = 1024
@@ -38,8 +35,6 @@ AFTER_MIDNIGHT = DOINGS_A_DAY // 2
 NEARLY_OVER_US = 90 * SECOND_US
 # How far ahead people plan who may be interrupted by robots at any time.
 AHEAD_US = 1800 * SECOND_US
-# Random turns on the spot have this many bits, in headings: up to an eighth of a turn to each side.
-SIDEWAYS_BITS = 10
 
 
 @dataclass
@@ -277,25 +272,25 @@ class Inhabitant(Behavior):
             The place of the body at the end.
         """
         bits = Bits(draws)
-        next_us = [plan.time_us + _wait_us(law, bits) for _, law in setting.small_moves]
+        moves = setting.small_moves
+        next_us = [plan.time_us + move.wait_us(bits) for move in moves]
         facing = plan.heading
         end_us -= NEARLY_OVER_US
         while True:
             k = min(range(len(next_us)), key=next_us.__getitem__)
             if next_us[k] >= end_us:
                 return place
-            kind, law = setting.small_moves[k]
+            if moves[k].kind == "shifts":  # the first of the moves, also of those due at once
+                until_us = min([end_us, *(other_us + 1 for other_us in next_us[1:])])
+                next_us[0] = turn_aside(plan, moves[0], bits, facing, next_us[0], until_us)
+                continue
             plan.stay_until(next_us[k])
-            if kind == "shifts":
-                aside = bits.take(SIDEWAYS_BITS) - (1 << SIDEWAYS_BITS) // 2
-                plan.turn_by(turn_between(plan.heading, (facing + aside) % TURN) / TURN)
-            elif kind == "moves":
+            if moves[k].kind == "moves":
                 place = self._go_elsewhere(plan, setting, place, draws)
-                facing = plan.heading
             else:
                 self._fetch(plan, setting, place, end_us, draws)
-                facing = plan.heading
-            next_us[k] = plan.time_us + _wait_us(law, bits)
+            facing = plan.heading
+            next_us[k] = plan.time_us + moves[k].wait_us(bits)
 
     def _go_elsewhere(
         self, plan: Plan, setting: Setting, place: Spot | Seat, draws: Draws
@@ -336,7 +331,7 @@ class Inhabitant(Behavior):
             else self._all_rooms(actor, activity.rooms)
         )
         small_moves = [
-            (kind, exponential(seconds(mean)))
+            small_move(kind, seconds(mean))
             for kind in ("shifts", "moves", "fetches")
             if (mean := getattr(activity, kind)) is not None
         ]
@@ -387,8 +382,3 @@ def rooms_at(doings: Iterable[Doing], time_s: int, activities: dict[str, Activit
             activity = activities[doing.activity]
             return () if activity.away else activity.rooms
     return ("any",)
-
-
-def _wait_us(law: Law, bits: Bits) -> int:
-    """Draw one of a law's quantiles [us], which is fine enough for small moves."""
-    return law.knots[bits.take(KNOTS.bit_length() - 1)] * SECOND_US

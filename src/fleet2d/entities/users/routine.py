@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Self
 from pydantic import Field, model_validator
 
 from fleet2d.component import register
-from fleet2d.entities.users.inhabitant import SECOND_US, Inhabitant, rooms_at
+from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
 from fleet2d.entities.users.private_rooms import private_rooms
+from fleet2d.entities.users.setting import SECOND_US
 from fleet2d.entities.users.spots import Spots
 from fleet2d.errors import PlacementError
 from fleet2d.problems import problem, suggest
