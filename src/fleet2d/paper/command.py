@@ -80,15 +80,12 @@ def _can_draw() -> bool:
 def _progress(name: str, *, show: bool) -> "Iterator[OnProgress]":
     """Yield a function that shows progress as a bar if `show`, else does nothing."""
     from fleet2d.paper.months import ignore_progress
+    from fleet2d.studies.progress import progress_bar
 
-    if not show:
-        yield ignore_progress
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with progress_bar(show=show) as progress:
+        if progress is None:
+            yield ignore_progress
+            return
         task = progress.add_task(name, total=None)
 
         def update(phase: str, done: int, total: int) -> None:

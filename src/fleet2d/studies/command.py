@@ -69,17 +69,10 @@ def run(  # noqa: PLR0913 - options of the command line
             return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    with _terminated_as_interrupted(), restrict_to(trust, trust_dir):
-        try:
-            with observing(show=sys.stderr.isatty() and not quiet) as observer:
-                options = RunOptions(fail_fast, changed, observer)
-                counts = run_study(checked, location, make_executor(executor, workers), options)
-        except KeyboardInterrupt:
-            typer.echo(
-                f"interrupted; what is finished is in {location}: the same command goes on",
-                err=True,
-            )
-            raise typer.Exit(130) from None
+    show = sys.stderr.isatty() and not quiet
+    with _interruptible(location), restrict_to(trust, trust_dir), observing(show=show) as observer:
+        options = RunOptions(fail_fast, changed, observer)
+        counts = run_study(checked, location, make_executor(executor, workers), options)
     if as_json:
         typer.echo(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
     elif not quiet:
@@ -219,8 +212,12 @@ def _number_of(study: "Study", variant: str) -> int:
 
 
 @contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """Treat SIGTERM as Ctrl-C: workers end, and finished variants are kept."""
+def _interruptible(location: str | Path) -> Iterator[None]:
+    """End at SIGTERM as at Ctrl-C: workers end, finished results are kept, and a message says so.
+
+    Raises:
+        Exit: It was interrupted.
+    """
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -228,6 +225,10 @@ def _terminated_as_interrupted() -> Iterator[None]:
     handler = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
+    except KeyboardInterrupt:
+        text = f"interrupted; what is finished is in {location}: the same command goes on"
+        typer.echo(text, err=True)
+        raise typer.Exit(130) from None
     finally:
         signal.signal(signal.SIGTERM, handler)
 
@@ -252,14 +253,9 @@ def tune(
     with restrict_to(trust, trust_dir):
         specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    with _terminated_as_interrupted(), restrict_to(trust, trust_dir):
-        try:
-            with observing_trials(show=sys.stderr.isatty() and not quiet) as observer:
-                result = search(specification, folder, make_executor(executor, workers), observer)
-        except KeyboardInterrupt:
-            typer.echo(f"interrupted; {folder} has what is finished: the same command goes on",
-                       err=True)  # fmt: skip
-            raise typer.Exit(130) from None
+    show = sys.stderr.isatty() and not quiet
+    with _interruptible(folder), restrict_to(trust, trust_dir), observing_trials(show=show) as bar:
+        result = search(specification, folder, make_executor(executor, workers), bar)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())

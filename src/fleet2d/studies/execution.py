@@ -9,7 +9,9 @@ from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
 
+AHEAD = 2  # tasks of a worker: one runs, one waits, so that it is never idle
 MOST_ATTEMPTS = 3  # of a task whose worker dies each time
+MOST_STARTS = 3  # of workers that end before they are ready
 
 
 @dataclass(frozen=True)

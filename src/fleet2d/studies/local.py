@@ -13,16 +13,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
-from fleet2d.studies.execution import Event, Finished, Lost, retry
+from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, Finished, Lost, retry
 from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.pipe import receive, send
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.studies.worker import BROKEN, READY
 
-AHEAD = 2  # tasks of a worker: one runs, one waits, so that it is never idle
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
-MOST_STARTS = 3  # of workers that end before they are ready
 
 _numbers = itertools.count()
 

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fleet2d.studies.driver import Observer
 
@@ -62,10 +62,10 @@ def _rate(per_second: float) -> str:
 
 
 @contextmanager
-def observing(*, show: bool) -> Iterator[Observer]:
-    """Yield an observer of a study; it shows a bar if `show`, else nothing."""
+def progress_bar(*, show: bool) -> "Iterator[Progress | None]":
+    """Yield a progress bar on stderr with counts and time left; None unless `show`."""
     if not show:
-        yield Observer()
+        yield None
         return
     from rich.console import Console
     from rich.progress import (
@@ -76,12 +76,17 @@ def observing(*, show: bool) -> Iterator[Observer]:
         TimeRemainingColumn,
     )
 
-    columns: tuple[Any, ...] = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )  # fmt: skip
+    text = TextColumn("{task.description}")
+    columns = (text, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        yield BarObserver(progress)
+        yield progress
+
+
+@contextmanager
+def observing(*, show: bool) -> Iterator[Observer]:
+    """Yield an observer of a study; it shows a bar if `show`, else nothing."""
+    with progress_bar(show=show) as progress:
+        yield BarObserver(progress) if progress else Observer()
 
 
 def in_words(time_span: timedelta) -> str:
@@ -103,14 +108,10 @@ def in_words(time_span: timedelta) -> str:
 @contextmanager
 def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
     """Yield an observer of a search; it shows a bar if `show`, else nothing."""
-    if not show:
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with progress_bar(show=show) as progress:
+        if progress is None:
+            yield None
+            return
         task = progress.add_task("trials", total=None)
 
         def update(done: int, trials: int, best: list[float] | None) -> None:

@@ -10,14 +10,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
-from fleet2d.studies.execution import Event, Finished, Lost, retry
+from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, Finished, Lost, retry
 from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
 
-AHEAD = 2  # tasks of a worker: one runs, one waits, so that it is never idle
 LOOK_EVERY_S = 5.0  # for new and lost nodes
-MOST_STARTS = 3  # of workers that end before they are ready
 
 _numbers = itertools.count()
 

@@ -8,22 +8,13 @@ from types import MappingProxyType
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.home.checkup import Finding
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
-from fleet2d.view.floorplan import (
-    DPI,
-    check_picture,
-    drawing_style,
-    figure_size,
-    floorplan_axes,
-    save_figure,
-)
+from fleet2d.view.floorplan import check_picture, figure_size, floorplan_axes, picture
 
 COLORS = MappingProxyType({"unlivable": "#8b1a1a", "wrong": "#c8452f", "odd": "#d08a1d"})
 LINE_IN = 0.17
@@ -42,12 +33,10 @@ def draw_checkup(plan: FloorPlan, findings: Sequence[Finding], path: Path) -> No
         InputError: The file name has another suffix, or the file can't be written.
     """
     check_picture(path)
-    with drawing_style():
-        width, height = figure_size(plan)
-        lines = _lines(findings, int(width * LETTERS_PER_IN))
-        below = LINE_IN * (len(lines) + 2)
-        figure = Figure(figsize=(width, height + below), dpi=DPI)
-        FigureCanvasAgg(figure)
+    width, height = figure_size(plan)
+    lines = _lines(findings, int(width * LETTERS_PER_IN))
+    below = LINE_IN * (len(lines) + 2)
+    with picture(path, width, height + below) as figure:
         axes = figure.add_axes((0, below / (height + below), 1, height / (height + below)))
         floorplan_axes(plan, axes)
         for number, finding in enumerate(findings, start=1):
@@ -55,7 +44,6 @@ def draw_checkup(plan: FloorPlan, findings: Sequence[Finding], path: Path) -> No
         for row, (text, color) in enumerate(lines):
             y = (below - LINE_IN * (row + 1)) / (height + below)
             figure.text(0.03, y, text, fontsize=8, color=color, va="center")
-        save_figure(figure, path)
 
 
 def _lines(findings: Sequence[Finding], letters: int) -> list[tuple[str, str]]:

@@ -2,8 +2,8 @@
 
 import io
 import re
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -66,11 +66,21 @@ def draw_floorplan(plan: FloorPlan, path: Path) -> None:
         InputError: The file name has another suffix, or the file can't be written.
     """
     check_picture(path)
+    with picture(path, *figure_size(plan)) as figure:
+        floorplan_axes(plan, figure.add_axes((0, 0, 1, 1)))
+
+
+@contextmanager
+def picture(path: Path, width: float, height: float) -> Iterator[Figure]:
+    """Yield a figure of a size [in] to draw on; it is written to a file when the block ends.
+
+    Raises:
+        InputError: The file can't be written.
+    """
     with drawing_style():
-        figure = Figure(figsize=figure_size(plan), dpi=DPI)
+        figure = Figure(figsize=(width, height), dpi=DPI)
         FigureCanvasAgg(figure)
-        axes = figure.add_axes((0, 0, 1, 1))
-        floorplan_axes(plan, axes)
+        yield figure
         save_figure(figure, path)
 
 
@@ -102,10 +112,10 @@ def save_figure(figure: Figure, path: Path) -> None:
         InputError: The file can't be written.
     """
     unstamped = {STAMPS[path.suffix.lower()]: None}
-    picture = io.BytesIO()
-    apply_theme(figure).savefig(picture, format=path.suffix[1:].lower(), metadata=unstamped)
+    content = io.BytesIO()
+    apply_theme(figure).savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
     try:
-        write_atomically(path, picture.getvalue())
+        write_atomically(path, content.getvalue())
     except OSError as error:
         raise InputError(f"can't write the picture {path}: {error.strerror}") from error
 

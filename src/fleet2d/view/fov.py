@@ -6,8 +6,6 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Wedge
 
 from fleet2d.errors import InputError
@@ -19,14 +17,7 @@ from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.region import VisibleRegion
-from fleet2d.view.floorplan import (
-    DPI,
-    check_picture,
-    drawing_style,
-    figure_size,
-    floorplan_axes,
-    save_figure,
-)
+from fleet2d.view.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.view.layers import layer_on_axes
 from fleet2d.view.life import SightWalls, field_of_view
 
@@ -98,15 +89,12 @@ def draw_fov(plan: FloorPlan, pose: CameraPose, path: Path) -> None:
     """
     check_picture(path)
     VisibleRegion(SightWalls.of(Home(plan)), pose.x, pose.y)  # raises PlacementError
-    with drawing_style():
-        width, height = figure_size(plan)
-        figure = Figure(figsize=(2 * width, height), dpi=DPI)
-        FigureCanvasAgg(figure)
+    width, height = figure_size(plan)
+    with picture(path, 2 * width, height) as figure:
         left = figure.add_axes((0, 0, 0.5, 1))
         right = figure.add_axes((0.5, 0, 0.5, 1))
         region_panel(plan, pose, left, "visibility_polygon, line_of_sight")
         cells_panel(plan, pose, right, Flashlight(), "flashlight")
-        save_figure(figure, path)
 
 
 def region_panel(plan: FloorPlan, pose: CameraPose, axes: Axes, title: str) -> None:

@@ -6,10 +6,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.layers import PREFIX
@@ -17,14 +15,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
 from fleet2d.runs.layers import layer_steps, read_layer
 from fleet2d.runs.run import Run
-from fleet2d.view.floorplan import (
-    DPI,
-    check_picture,
-    drawing_style,
-    figure_size,
-    floorplan_axes,
-    save_figure,
-)
+from fleet2d.view.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.view.theme import SCALE
 
 # The brighter part of viridis: names of rooms are written over it.
@@ -53,11 +44,9 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
     field = run.tables[f"{PREFIX}{name}"].schema.field("value")
     unit = (field.metadata or {}).get(b"unit", b"").decode()
     plan = run.plan
-    with drawing_style():
-        width, height = figure_size(plan)
-        beside = 0.0 if values.dtype == np.bool_ else BAR_IN
-        figure = Figure(figsize=(width + beside, height), dpi=DPI)
-        FigureCanvasAgg(figure)
+    width, height = figure_size(plan)
+    beside = 0.0 if values.dtype == np.bool_ else BAR_IN
+    with picture(path, width + beside, height) as figure:
         axes = figure.add_axes((0, 0, width / (width + beside), 1))
         floorplan_axes(plan, axes, title=False)
         colors = layer_on_axes(plan, values, axes)
@@ -67,7 +56,6 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
         if colors is not None:
             bar = figure.add_axes(((width + 0.1) / (width + beside), 0.12, 0.018, 0.76))
             figure.colorbar(colors, cax=bar).ax.tick_params(labelsize=8)
-        save_figure(figure, path)
 
 
 def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMappable | None:

@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.belief import ANYONE
@@ -19,7 +17,7 @@ from fleet2d.metrics.presence.scores import (
 )
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
-from fleet2d.view.floorplan import DPI, check_picture, drawing_style, save_figure
+from fleet2d.view.floorplan import check_picture, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,9 +98,7 @@ def draw_reliability(run: Run, algorithm: str, path: Path) -> None:
     places = np.arange(belief.shape[1])
     highest, is_right = belief.max(axis=1), top_k(belief, truth, 1)
     is_true = (truth[:, None] == places).astype(np.float64)
-    with drawing_style():
-        figure = Figure(figsize=(5.2, 6.4), dpi=DPI)
-        FigureCanvasAgg(figure)
+    with picture(path, 5.2, 6.4) as figure:
         curve, counts = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         curve.plot([0, 1], [0, 1], color="#9a9a9a", linewidth=1, linestyle="--")
         ece, classwise = calibration_error(belief, truth), classwise_error(belief, truth)
@@ -124,7 +120,6 @@ def draw_reliability(run: Run, algorithm: str, path: Path) -> None:
             counts.hist(forecasts, np.linspace(0, 1, 21), weights=weights, color=color, alpha=0.6)
         counts.set(xlabel="forecast probability", ylabel="share")
         figure.tight_layout()
-        save_figure(figure, path)
 
 
 def _points(axes: "Axes", forecasts: F64, outcomes: F64, color: str, label: str) -> None:

@@ -55,7 +55,7 @@ def view(
 
 def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
     from fleet2d.artifacts.manifest import FILE_NAME
-    from fleet2d.viewer.serve import MOST_RUNS, serve
+    from fleet2d.viewer.serve import MOST_RUNS, PageServer
 
     if len(directories) > MOST_RUNS:
         raise InputError(
@@ -64,7 +64,7 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
     for path in directories:
         if not (path / FILE_NAME).exists():
             raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")
-    serve(directories, port=port, open_browser=browser, announce=_announce)
+    PageServer(directories, port=port).show(open_browser=browser, announce=_announce)
 
 
 def _import_code(directories: list[Path]) -> None:

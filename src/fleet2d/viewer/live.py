@@ -289,17 +289,12 @@ def watch_scenario(
     Raises:
         InputError: The scenario is wrong, or the port is in use.
     """
-    import webbrowser
-
     settings: dict[str, Any] = {} if seed is None else {"seed": seed}
     live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
     server = PageServer([], port=port, live=live)
-    announce(server.address)
     live.start()
-    if open_browser:
-        webbrowser.open(server.address)
     try:
-        server.run()
+        server.show(open_browser=open_browser, announce=announce)
     finally:
         live.end()
     if live.failure is not None:

@@ -49,7 +49,7 @@ def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
 def plan_png(plan: FloorPlan) -> bytes | None:
     """Return a PNG of a floor plan; None if matplotlib is not installed."""
     with suppress(Fleet2DError, ImportError):
-        return _png(draw_plan(plan, None))
+        return figure_png(draw_plan(plan, None))
     return None
 
 
@@ -73,13 +73,14 @@ def run_html(run: Run) -> str:
     text = html.escape(" · ".join(facts))
     picture = ""
     with suppress(Fleet2DError, ImportError):  # no matplotlib or no floor plan
-        content = base64.b64encode(_png(draw_run(run, None, None))).decode()
+        content = base64.b64encode(figure_png(draw_run(run, None, None))).decode()
         image = f"data:image/png;base64,{content}"
         picture = f'<img alt="The run in its home" style="max-width:100%" src="{image}">'
     return f"<div><b>{html.escape(run_title(run))}</b><p>{text}</p>{picture}</div>"
 
 
-def _png(figure: Any) -> bytes:
+def figure_png(figure: Any, dpi: float | str = NOTEBOOK_DPI) -> bytes:
+    """Return a figure as a PNG, without the version of matplotlib."""
     picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
+    figure.savefig(picture, format="png", dpi=dpi, metadata={"Software": None})
     return picture.getvalue()

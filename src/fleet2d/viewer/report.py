@@ -2,7 +2,6 @@
 
 import base64
 import html
-import io
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import timedelta
@@ -18,6 +17,7 @@ from fleet2d.units import format_duration
 from fleet2d.viewer.export import POLICY, embedded_run, html_of
 from fleet2d.viewer.files import write_file
 from fleet2d.viewer.moments import clock_of
+from fleet2d.viewer.notebook import figure_png
 from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.run_facts import run_title
 
@@ -158,9 +158,8 @@ def _both_themes(figure: Any, caption: str) -> str:
 
 
 def _png(figure: Any) -> str:
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", metadata={"Software": None})
-    return f"data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}"
+    """Return a figure as the address of an image."""
+    return f"data:image/png;base64,{base64.b64encode(figure_png(figure, 'figure')).decode()}"
 
 
 def _timeline(run: Run) -> str:

@@ -66,6 +66,13 @@ class PageServer:
         )
         self._server = uvicorn.Server(config)
 
+    def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
+        """Announce the address of the page, open it in a browser if wanted, serve until Ctrl-C."""
+        announce(self.address)
+        if open_browser:
+            webbrowser.open(self.address)
+        self.run()
+
     def run(self) -> None:
         """Serve until Ctrl-C."""
         threading.Thread(target=self._runs.preload, daemon=True, name="fleet2d-preload").start()
@@ -85,30 +92,3 @@ class PageServer:
             thread.join(timeout=5)
 
         return stop
-
-
-def serve(
-    sources: Sequence[Path | PageData],
-    *,
-    port: int = 0,
-    live: LiveRoutes | None = None,
-    open_browser: bool = True,
-    announce: Callable[[str], None] = print,
-) -> None:
-    """Serve runs until Ctrl-C.
-
-    Args:
-        sources: Run directories, or data of runs.
-        port: The port; 0: a free one.
-        live: A running simulation.
-        open_browser: Whether to open the page.
-        announce: Called with the address of the page.
-
-    Raises:
-        InputError: The port is in use.
-    """
-    server = PageServer(sources, port=port, live=live)
-    announce(server.address)
-    if open_browser:
-        webbrowser.open(server.address)
-    server.run()
