@@ -1,7 +1,7 @@
 """One history, many futures: where should the robot wait to see Ana most this evening?
 
-The simulation is copied as it stands, random streams included. In each copy the robot is sent to
-another room and the evening runs to its end; the history before is computed once.
+The simulation is copied with its random streams. In each copy the robot is sent to another room
+until the end of the evening; the history before is computed only once.
 
     python examples/branching.py
 """
@@ -13,13 +13,13 @@ from fleet2d import Behavior, Plan, Simulation, Situation
 
 
 class Errand(Behavior):
-    """Wait where the script says."""
+    """Wait in the room that the script sets."""
 
     room: str = "entryway"
 
     def start(self, actor: object) -> None:
         """Begin with the room of the configuration."""
-        self.goal = self.room  # not a field, so it is run state, and may change
+        self.goal = self.room  # not a field, so it is state of the run and may change
 
     def decide(self, now: Situation) -> Plan:
         """Go there and stay for good."""

@@ -1,7 +1,7 @@
-"""Paired comparison: the same home and the same lives, once with one robot, once with two.
+"""Paired comparison: the same home and the same people, once with one robot, once with two.
 
-Every component draws from random streams of its own, so adding a robot leaves Ana's life identical,
-step by step. What differs between the two runs of a seed is then due to the robot alone.
+Every component has its own random streams, so adding a robot doesn't change what Ana does at any
+step. All differences between the two runs of a seed are then due to the robot.
 
     python examples/compare_seeds.py [SEEDS]
 """

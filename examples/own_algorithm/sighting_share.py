@@ -20,7 +20,7 @@ from fleet2d import (
 
 
 class SightingShare(Algorithm):
-    """Share of sightings per room, where what is long past counts less."""
+    """Share of sightings per room; older sightings count less."""
 
     forget: Duration = Field(
         default=timedelta(days=14), description="about how long a sighting counts"
@@ -31,7 +31,7 @@ class SightingShare(Algorithm):
         self.counts = np.zeros(len(home.rooms))
 
     def update(self, history: History, state: Present) -> RoomDistribution:
-        """Let the past fade, add the sightings since the last update."""
+        """Reduce the weight of old sightings, and add those since the last update."""
         self.counts *= max(0.0, 1 - self.period / self.forget)
         room = history.observations.room
         self.counts += np.bincount(room[room >= 0], minlength=len(self.counts))
@@ -39,7 +39,7 @@ class SightingShare(Algorithm):
 
 
 class VisitMostSeen(Behavior):
-    """Every other time wait where people were seen most, according to an algorithm."""
+    """Every other time wait in the room where an algorithm says that people were seen most."""
 
     records = frozenset({"visit"})
 
@@ -47,11 +47,11 @@ class VisitMostSeen(Behavior):
     dwell: Duration = Field(default=timedelta(hours=1), description="how long it waits")
 
     def start(self, actor: Any) -> None:
-        """Begin with a turn of the next behavior."""
+        """Let the next behavior act first."""
         self.came_last = True
 
     def decide(self, now: Situation) -> Plan | None:
-        """Go to the likeliest room; None leaves it to the next behavior."""
+        """Go to the likeliest room, or return None, so that the next behavior decides."""
         output: Any = now.outputs.get(self.of)
         self.came_last = not self.came_last
         if output is None or not self.came_last:

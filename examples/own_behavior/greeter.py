@@ -1,4 +1,4 @@
-"""A behavior of one's own: make rounds, and keep whoever comes into view company for a while."""
+"""A behavior of one's own: make rounds, and keep people company who come into view."""
 
 from datetime import timedelta
 from math import sqrt
@@ -25,12 +25,12 @@ class Greeter(Behavior):
     distance: Length = Field(default=1.0, gt=0, description="how near it goes to a user [m]")
 
     def start(self, actor: Any) -> None:
-        """Remember the rooms that the robot can enter; what isn't a field is run state."""
+        """Find the rooms that the robot can enter; attributes that aren't fields are state of the run."""
         self.rooms = [room.name for room in actor.reachable_rooms()]
         self.round = 0
 
     def decide(self, now: Situation) -> Plan:
-        """Say what to do from now on; asked when a plan is over, or interrupted."""
+        """Return the next plan; called when a plan is over or interrupted."""
         for seen in now.events:
             plan = now.plan().note("greeting", seen.user)
             return plan.go_to(self._beside(seen, now)).stay(self.company)

@@ -1,4 +1,4 @@
-"""A new long-term presence in one file, beside the built-in ones, over some synthetic homes.
+"""A new estimator of long-term presence in one file, compared with the built-in ones in some homes.
 
 python examples/own_presence/compare.py [HOMES]
 """
@@ -11,16 +11,16 @@ import fleet2d
 
 
 class LastWeek(fleet2d.Algorithm):
-    """Share of the minutes watched in which somebody was seen, of the last seven days only."""
+    """Share of watched minutes in which somebody was seen, over the last seven days."""
 
     needs = frozenset({"evidence"})
 
     def start(self, home):
-        """Begin with seven empty days: of each room, minutes seen and minutes watched."""
+        """Begin with seven empty days: for each room, minutes seen and minutes watched."""
         self.days = np.zeros((7, 2, len(home.rooms)))
 
     def update(self, history, state):
-        """Add an hour; a day of a week ago is forgotten when it comes again."""
+        """Add an hour; each day replaces the one a week ago."""
         evidence, day = history.evidence, state.time.weekday()
         if state.time.hour == 0:
             self.days[day] = 0
@@ -31,7 +31,7 @@ class LastWeek(fleet2d.Algorithm):
 
 
 def errors(home: int) -> dict[str, float]:
-    """Return the total variation from the truth of each algorithm, after a week in a home."""
+    """Return each algorithm's total variation distance to the truth, after a week in a home."""
     ours = {"naive": "sighting_share", "weighed": "exposure_ratio", "likely": "likelihood"}
     algorithms = {name: {"type": "ltp", "estimator": estimator} for name, estimator in ours.items()}
     algorithms["mine"] = {"type": f"{__file__}:LastWeek"}

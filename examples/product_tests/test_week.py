@@ -1,10 +1,10 @@
-"""Twelve tests of a home robot: what its QA engineers would walk through by hand.
+"""Twelve tests of a home robot, which QA engineers would otherwise do by hand.
 
     pytest examples/product_tests
     pytest examples/product_tests -k quiet --fleet2d-set 'robots.astro.behaviors.3.when=[]'
 
-The second makes the robot worse on purpose: each test has such a change in worse.toml, with which
-it fails.
+The second command makes the robot worse on purpose: worse.toml has such a change for each test, with
+which the test fails.
 """
 
 from fleet2d.expectations import (
@@ -50,7 +50,7 @@ def test_keeps_off_who_it_has_found(trial: Trial) -> None:
 
 @trial(HOME)
 def test_never_stands_in_a_doorway_for_long(trial: Trial) -> None:
-    """Nor on its rounds: at most a minute at a time."""
+    """On its rounds it stands in a doorway for at most a minute at a time."""
     for doorway in trial.home.plan.doorways:
         (x0, y0), (x1, y1) = doorway.start, doorway.end
         there = distance("astro", ((x0 + x1) / 2, (y0 + y1) / 2)) < 0.4
@@ -59,7 +59,7 @@ def test_never_stands_in_a_doorway_for_long(trial: Trial) -> None:
 
 @trial(HOME, "robots.astro.battery.charge=22 %", "simulation.duration=3 h")
 def test_docks_before_it_is_empty(trial: Trial) -> None:
-    """It begins nearly empty, and is to charge in time."""
+    """It begins with a nearly empty battery, and must charge in time."""
     trial.expect(always(battery("astro") > "10 %"), name="never empty")
     trial.expect(eventually(events("docks", "astro")), name="docks")
 
@@ -80,13 +80,13 @@ def test_stays_out_of_the_bathroom_while_it_is_occupied(trial: Trial) -> None:
     "robots.astro.behaviors=[{type: patrol, cooldown: 3 h, dwell: 0 s}]",
 )
 def test_learns_the_bedroom_within_ten_days(trial: Trial) -> None:
-    """People are in bed for a third of the day: the robot is to know that by then."""
+    """People are in bed for a third of the day: the robot must have learned that."""
     trial.expect(at_end(probability("ltp", "bedroom_0", "ana") > 0.15))
 
 
 @trial(HOME, seeds=3)
 def test_finds_its_way_when_it_is_carried_off(trial: Trial) -> None:
-    """Kidnapped into the office while it is on its way to the kitchen, it still comes."""
+    """It is carried to the office while it drives to the kitchen, and still comes."""
     trial.call("astro", to="kitchen")
     trial.advance(10)
     trial.put("astro", "office")
@@ -95,7 +95,7 @@ def test_finds_its_way_when_it_is_carried_off(trial: Trial) -> None:
 
 @trial(HOME)
 def test_comes_although_a_door_is_shut_on_its_way(trial: Trial) -> None:
-    """The door of the hallway falls shut: it takes the way through the entryway."""
+    """The door of the hallway falls shut: it goes through the entryway instead."""
     trial.put("astro", "hallway")
     trial.call("astro", to="kitchen")
     trial.advance(2)
@@ -105,7 +105,7 @@ def test_comes_although_a_door_is_shut_on_its_way(trial: Trial) -> None:
 
 @trial(HOME, seeds=5)
 def test_takes_no_guest_for_ana(trial: Trial) -> None:
-    """Ana is out, and Ben sits on the sofa: it is not to take him for her."""
+    """Ana is out, and Ben sits on the sofa: it must not mistake him for her."""
     trial.away("ana")
     trial.put("ben", "sofa")
     trial.hold("ben")
@@ -127,7 +127,7 @@ def test_notices_who_comes_into_the_kitchen(trial: Trial) -> None:
     seeds=3,
 )
 def test_finds_ana_after_an_hour_with_a_dark_camera(trial: Trial) -> None:
-    """It notices nobody from five to six; called after that, it finds her all the same."""
+    """It notices nobody from five to six; called after that, it still finds her."""
     trial.expect(never(perceived("ana", by="astro") & during("17:05-17:55")), name="is dark")
     trial.run_until("18:05")
     trial.call("astro", find="ana")
