@@ -19,7 +19,6 @@ Names = NDArray[np.object_]  # str, or None where no activity is known
 # A row of observations is a row of the sight kernel, followed by the robot's index.
 ROBOT = SIGHTING
 NOTHING = 0  # the code for no known activity
-TOLD = "activity"  # the kind of the events by which plans announce a new activity
 
 
 @dataclass(frozen=True)

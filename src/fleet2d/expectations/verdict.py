@@ -1,7 +1,6 @@
 """Verdicts: whether an expectation holds, by how much, and when it was violated."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Protocol
@@ -224,8 +223,3 @@ def spoken(duration: timedelta) -> str:
         count, remainder = divmod(remainder, timedelta(seconds=length))
         parts += [f"{count} {unit}"] if count else []
     return " ".join(parts + ([format_duration(remainder)] if remainder or not parts else []))
-
-
-def contents(verdicts: Mapping[str, Verdict]) -> dict[str, Any]:
-    """Return verdicts as plain JSON data, by name."""
-    return {name: verdict.content() for name, verdict in verdicts.items()}
