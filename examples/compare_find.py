@@ -1,7 +1,7 @@
 """In which order should a robot look for Ana? Six policies of `find`, compared pair by pair.
 
-The robot learns where she usually is. Four times a day it is called to find her; then the simulation
-is copied, and each copy continues with another policy, so all differences are due to the policy.
+The robot learns where she usually is. Four times a day it is called to find her. Then the
+simulation is copied, and each copy continues with another policy, which explains all differences.
 
     python examples/compare_find.py [DAYS]
 """

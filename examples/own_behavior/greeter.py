@@ -25,7 +25,7 @@ class Greeter(Behavior):
     distance: Length = Field(default=1.0, gt=0, description="how near it goes to a user [m]")
 
     def start(self, actor: Any) -> None:
-        """Find the rooms that the robot can enter; attributes that aren't fields are state of the run."""
+        """Find the rooms that the robot can enter; other attributes than fields are run state."""
         self.rooms = [room.name for room in actor.reachable_rooms()]
         self.round = 0
 

@@ -3,8 +3,8 @@
     pytest examples/product_tests
     pytest examples/product_tests -k quiet --fleet2d-set 'robots.astro.behaviors.3.when=[]'
 
-The second command makes the robot worse on purpose: worse.toml has such a change for each test, with
-which the test fails.
+The second command makes the robot worse on purpose: worse.toml has such a change for each test,
+with which the test fails.
 """
 
 from fleet2d.expectations import (
