@@ -97,8 +97,8 @@ def table(validation: "Validation") -> list[str]:
     from fleet2d.fit.validate import MODELS
 
     lines = [
-        f"{validation.days} days, held back {validation.folds} parts in turn; how far from them are"
-        " days sampled from a model fitted to the others:",
+        f"{validation.days} days in {validation.folds} parts, each held back in turn: distances of"
+        " days sampled from models of the other parts",
         f"{'':30}{'time shares':>12}{'by hour':>10}{'stays KS':>10}{'stays [min]':>12}",
     ]
     for title, distances in (("rooms", validation.rooms), ("activities", validation.activities)):
@@ -108,6 +108,6 @@ def table(validation: "Validation") -> list[str]:
             for name, d in zip(MODELS, distances, strict=True)
         ]
     worse = validation.worse_than_copying()
-    verdict = "; ".join(worse) if worse else "in nothing that is compared of rooms"
-    lines.append(f"the persona is farther off than whole days drawn anew: {verdict}")
+    verdict = "; ".join(worse) or "in no distance of rooms"
+    lines.append(f"the persona is worse than copies of whole days: {verdict}")
     return lines

@@ -13,7 +13,7 @@ from fleet2d.fit.timeline import I16, Timeline
 from fleet2d.logs.log import LogError
 
 MODELS = (
-    "the persona", "whole days drawn anew", "a first-order Markov chain",
+    "the persona", "copies of whole days", "a first-order Markov chain",
     "the days they were fitted on",
 )  # fmt: skip
 # Two distances that differ by less than this count as equal.
