@@ -17,8 +17,13 @@ from fleet2d import cli
 
 _ROOT = Path(__file__).parents[1]
 
-# No property fails by how long an example takes.
-hypothesis.settings.register_profile("fleet2d", max_examples=examples(100), deadline=None)
+# No property fails by how long an example takes, or its making on a busy machine.
+hypothesis.settings.register_profile(
+    "fleet2d",
+    max_examples=examples(100),
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
 hypothesis.settings.load_profile("fleet2d")
 
 

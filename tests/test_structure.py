@@ -94,7 +94,9 @@ def names_in(picture: str) -> list[str]:
 
 def test_files_that_contributing_names_are_there() -> None:
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    page = page[page.index("## How a step is computed") : page.index("## Add a function to the core")]
+    page = page[
+        page.index("## How a step is computed") : page.index("## Add a function to the core")
+    ]
     names = [name for name in re.findall(r"`([\w/]+(?:/|\.py|\.hpp))`", page) if "NAME" not in name]
 
     assert len(names) > 40
