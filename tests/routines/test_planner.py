@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from tests.routines.days import DAY_S, MONDAY, violations
-from tests.thorough import examples
+from tests.thorough import THOROUGH, examples
 
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
@@ -34,11 +34,11 @@ def tasks(day: list[Doing]) -> list[str]:
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_no_day_of_ten_thousand_breaks_a_constraint(name: str) -> None:
+def test_no_day_of_thousands_breaks_a_constraint(name: str) -> None:
     persona = bundled_persona(name)
-    for seed in range(5):
+    for seed in range(5 if THOROUGH else 1):
         lived = life(persona, seed)
-        days = [lived.day(MONDAY + i) for i in range(341)]  # 6 personas x 5 x 340 = 10,200 days
+        days = [lived.day(MONDAY + i) for i in range(341)]  # 6 personas x 340, or 10,200 days
         for i, (day, after) in enumerate(pairwise(days)):
             assert [] == violations(persona, MONDAY + i, day, after)
 
