@@ -10,7 +10,7 @@ from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
 
 if TYPE_CHECKING:
-    from fleet2d.cli.product_tests import ScenarioCase
+    from fleet2d.cli.scenario_case import ScenarioCase
 
 # Characters that XML 1.0 can't contain.
 _ILLEGAL = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

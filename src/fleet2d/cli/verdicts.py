@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fleet2d.cli.product_tests import ScenarioCase
+    from fleet2d.cli.scenario_case import ScenarioCase
     from fleet2d.expectations.verdict import Verdict
 
 
