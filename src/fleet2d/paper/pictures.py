@@ -107,7 +107,7 @@ def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
         )
     axes.set_xticks(range(len(gaps)), gaps)
     axes.set_xlabel("time since the user was last seen")
-    axes.set_ylabel("share told right")
+    axes.set_ylabel("share of right rooms")
     axes.set_ylim(0, 1)
     axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1))
 

@@ -20,7 +20,7 @@ NAME = "rtp-gap"
 TITLE = "Fig. 7 right: accuracy of real-time presence by last-seen gap"
 MODELS = ("routine", "hmm", "semi_markov", "markov", "hour_of_week", "long_term")
 NAIVE = "naive"
-SCORES = {"top_1": "share told right", "log_loss": "log loss [nats], smaller is better"}
+SCORES = {"top_1": "share of right rooms", "log_loss": "log loss [nats], smaller is better"}
 PAPER = (
     "the paper's figure: a model's accuracy above that of the naive guess, the more so the longer"
     " the user was out of sight; its numbers are not printed",
