@@ -138,8 +138,8 @@ def test_run_without_a_costmap_is_the_run_before() -> None:
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        ({"robots": {"astro": {**TOUR, "waypoints": [[3.5, 3], [1, 3]]}}}, "costmap lets no way"),
-        ({"robots": {"astro": {"start": [3.5, 3.0]}}}, "costmap lets no way lead"),
+        ({"robots": {"astro": {**TOUR, "waypoints": [[3.5, 3], [1, 3]]}}}, "costmap lets no route"),
+        ({"robots": {"astro": {"start": [3.5, 3.0]}}}, "costmap lets no route pass"),
     ],
 )
 def test_place_where_no_way_leads_is_an_error_that_says_so(

@@ -86,14 +86,16 @@ class BodyGauge(Gauge):
 class DistanceGauge(BodyGauge):
     """Measures the distance of a body from another, or from a shape [m]."""
 
-    def __init__(self, row: int, other: int | None, shape: Callable[[Home], I64] | None) -> None:
+    def __init__(
+        self, row: int, other_row: int | None, shape: Callable[[Home], I64] | None
+    ) -> None:
         super().__init__(row)
-        self._other, self._shape = other, shape
+        self._other_row, self._shape = other_row, shape
 
     def _measure(self, block: Block) -> Trace:
         window = self._window(block)
-        if self._other is not None:
-            start, value = distances_between(window, self._row, self._other)
+        if self._other_row is not None:
+            start, value = distances_between(window, self._row, self._other_row)
         else:
             assert self._shape is not None
             start, value = distances_to_shape(window, self._row, self._shape(block.home))
@@ -177,7 +179,7 @@ class SeenGauge(SwitchGauge):
 
     def __init__(self, signal: states.CameraCondition, now: bool) -> None:
         super().__init__(float(now))
-        self._body, self._by = signal.body, signal.by
+        self._body, self._owner = signal.body, signal.by
 
     def _changes(self, block: Block) -> list[tuple[int, float]]:
         begins = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
@@ -185,7 +187,7 @@ class SeenGauge(SwitchGauge):
         return [
             (event.step, float(event.event in begins))
             for event in block.events
-            if event.entity == self._by
+            if event.entity == self._owner
             and event.detail == self._body
             and event.event in begins + ends
         ]

@@ -175,7 +175,7 @@ def _speed(signal: quantities.SpeedSignal | states.IsMoving, state: State, step_
     return SpeedGauge(row, last_pose, step_us)
 
 
-def _seen(signal: states.IsSeen, state: State, _: int) -> Gauge:
+def _seen_gauge(signal: states.IsSeen, state: State, _: int) -> Gauge:
     cameras = _cameras_of(state, signal.by)
     return SeenGauge(signal, signal.body in cameras.in_view)
 
@@ -288,7 +288,7 @@ _MAKERS: Mapping[type, Callable[[Any, State, int], Gauge]] = {
     quantities.OutputSignal: _value,
     states.IsPerceived: _perceived,
     states.RoomSignal: lambda signal, state, _: RoomGauge(row_of(state, signal.body), state.home),
-    states.IsSeen: _seen,
+    states.IsSeen: _seen_gauge,
     states.IsOn: lambda signal, state, _: SensorGauge(signal.name, state.sensors.on[signal.name]),
     quantities.SpeedSignal: _speed,
 }
