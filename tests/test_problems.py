@@ -9,7 +9,7 @@ import pytest
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from fleet2d.problems import did_you_mean, problem_at, rewrite, unknown_key
+from fleet2d.problems import did_you_mean, problem_at, rewrite, suggest, unknown_key
 
 
 class Side(Enum):
@@ -76,3 +76,16 @@ def test_unknown_key_names_the_known(key: object, message: str) -> None:
 
 def test_nothing_near_is_not_guessed() -> None:
     assert "." == did_you_mean("xyz", ["speed"])
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "text"),
+    [
+        ("sped", ["speed", "radius"], ": did you mean 'speed'? It has: speed, radius"),
+        ("color", ["speed", "radius"], ". It has: speed, radius"),
+        (7, [70, 80], ": did you mean '70'? It has: 70, 80"),
+        ("speed", [], ". It has: none"),
+    ],
+)
+def test_suggestion_ends_in_all_known_names(name: object, known: list[object], text: str) -> None:
+    assert text == suggest(name, known, "It has")

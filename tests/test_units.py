@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from fleet2d.errors import ScenarioError
 from fleet2d.units import (
     LONGEST_DURATION,
     AngleDeg,
@@ -28,6 +29,7 @@ from fleet2d.units import (
     format_duration,
     micros,
     parse_duration,
+    whole_steps,
 )
 
 
@@ -219,3 +221,13 @@ def test_text_keeps_its_folder_in_copies() -> None:
     text = Text("plan.json", Path("/homes"))
 
     assert Path("/homes") == copy.deepcopy(text).folder == pickle.loads(pickle.dumps(text)).folder
+
+
+@pytest.mark.parametrize("duration", [timedelta(0), timedelta(seconds=3), timedelta(seconds=1)])
+def test_no_multiple_of_the_step_is_refused(duration: timedelta) -> None:
+    with pytest.raises(ScenarioError, match=r"^period is \d s, which is no multiple of .* \(2 s\)"):
+        whole_steps(duration, 2_000_000, "period")
+
+
+def test_multiple_of_the_step_is_counted() -> None:
+    assert 3 == whole_steps(timedelta(seconds=6), 2_000_000, "period")
