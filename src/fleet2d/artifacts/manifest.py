@@ -224,8 +224,13 @@ class Manifest(BaseModel):
             raise _damaged(path, _problems(error)) from None
 
 
-# The fields that a manifest of every version has.
-_REQUIRED = Manifest.model_fields.keys() - {"expectations", "interventions", "resumed", "seal"}
+# The fields of format 1, which every manifest has; those added since may be absent.
+_REQUIRED = frozenset(
+    {
+        "digest", "entities", "format", "inputs", "metrics", "notes", "scenario", "seed",
+        "simulated_s", "start", "status", "step_us", "steps", "tables", "versions", "wall_s",
+    }
+)  # fmt: skip
 
 
 def json_of(path: Path, text: bytes) -> Any:

@@ -31,13 +31,14 @@ def table_specs(
     """Return the tables that a run stores; `cameras` are from camera_names()."""
     entity = Column("entity", "category", categories=(*users, *robots))
     room = Column("room", "category", nullable=True, categories=tuple(rooms))
-    away = Column("away", "bool", description="not at home; x and y are where it left")
     specs = []
     if settings.trajectories != "off":
-        specs.append(TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away)))
+        columns = (STEP, TIME, entity, X, Y, HEADING, room, _away("x, y and room are missing"))
+        specs.append(TableSpec("trajectories", columns))
     if settings.key_frames:
         kind = Column("kind", "category", categories=KEY_KINDS)
-        specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
+        columns = (STEP, TIME, entity, kind, X, Y, HEADING, _away("x and y are where it left"))
+        specs.append(TableSpec("key_frames", columns))
     if settings.observations and users and robots:
         specs.append(_observation_table(users, robots, room, cameras, activities))
     if settings.events:
@@ -53,6 +54,10 @@ def table_specs(
             )
         specs.append(TableSpec("events", (STEP, TIME, entities, event, *user_columns, detail)))
     return specs
+
+
+def _away(text: str) -> Column:
+    return Column("away", "bool", description=f"not at home: {text}")
 
 
 def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
