@@ -11,9 +11,14 @@ CONFUSION = {"cook": {"bake": 0.5, "read": 0.2}, "sleep": {"rest": 1.0}}
 
 
 def rows(steps: list[int], user: int = 0, robot: int = 0, camera: int = 0) -> np.ndarray:
-    found = np.zeros((len(steps), ROBOT + 1), np.int64)
-    found[:, STEP], found[:, USER], found[:, ROBOT], found[:, CAMERA] = steps, user, robot, camera
-    return found
+    observations = np.zeros((len(steps), ROBOT + 1), np.int64)
+    (
+        observations[:, STEP],
+        observations[:, USER],
+        observations[:, ROBOT],
+        observations[:, CAMERA],
+    ) = steps, user, robot, camera
+    return observations
 
 
 def activities(latency: int = 0) -> Activities:
@@ -22,40 +27,40 @@ def activities(latency: int = 0) -> Activities:
         (0, 0): ActivitySense(latency, KEYS, CONFUSION),
         (0, 1): ActivitySense(0, KEYS, None),
     }
-    made = Activities(2, senses)
-    made.begin(0, 10, "cook")
-    made.begin(0, 20, "sleep")
-    made.begin(0, 20, "read")  # at once: the last counts
-    made.begin(1, 5, "sleep")
-    return made
+    result = Activities(2, senses)
+    result.begin(0, 10, "cook")
+    result.begin(0, 20, "sleep")
+    result.begin(0, 20, "read")  # at once: the last counts
+    result.begin(1, 5, "sleep")
+    return result
 
 
-def test_what_is_done_is_what_began_last_at_the_look() -> None:
-    found = activities().true(rows([9, 10, 19, 20, 99]))
-    assert [None, "cook", "cook", "read", "read"] == found.tolist()
+def test_the_true_activity_is_the_last_that_began_before_the_look() -> None:
+    true = activities().true(rows([9, 10, 19, 20, 99]))
+    assert [None, "cook", "cook", "read", "read"] == true.tolist()
     late = activities(latency=3).true(rows([12, 13, 22, 23]))
     assert [None, "cook", "cook", "read"] == late.tolist()
 
 
-def test_each_activity_is_taken_for_others_as_often_as_told() -> None:
-    made = Activities(1, {(0, 0): ActivitySense(0, KEYS, CONFUSION)})
-    made.begin(0, 0, "cook")
-    found = made.perceived(rows(list(range(20_000))))
+def test_activities_are_confused_at_the_configured_rates() -> None:
+    one_user = Activities(1, {(0, 0): ActivitySense(0, KEYS, CONFUSION)})
+    one_user.begin(0, 0, "cook")
+    perceived = one_user.perceived(rows(list(range(20_000))))
     for name, share in (("bake", 0.5), ("read", 0.2), ("cook", 0.3), ("rest", 0.0)):
-        assert agree(found == name, share)
+        assert agree(perceived == name, share)
 
 
-def test_what_is_perceived_at_a_step_does_not_depend_on_what_else_is_asked() -> None:
+def test_perceived_activities_do_not_depend_on_other_queries() -> None:
     every = list(range(5, 60))
     whole = activities().perceived(rows(every)).tolist()
     assert whole == [activities().perceived(rows([step])).tolist()[0] for step in every]
 
 
-def test_users_are_told_apart_and_nobody_does_nothing() -> None:
-    made = activities()
-    assert ["rest"] == made.perceived(rows([10], user=1)).tolist()
-    assert [None] == made.perceived(rows([10], user=-1)).tolist()
-    assert [None] == made.true(rows([10], user=-1)).tolist()
+def test_each_user_has_an_activity_and_nobody_has_none() -> None:
+    two_users = activities()
+    assert ["rest"] == two_users.perceived(rows([10], user=1)).tolist()
+    assert [None] == two_users.perceived(rows([10], user=-1)).tolist()
+    assert [None] == two_users.true(rows([10], user=-1)).tolist()
 
 
 def test_a_camera_that_does_not_tell_activities_has_only_the_truth() -> None:
@@ -64,9 +69,9 @@ def test_a_camera_that_does_not_tell_activities_has_only_the_truth() -> None:
     assert ["cook"] == activities().true(there).tolist()
 
 
-def test_where_no_camera_tells_them_nothing_is_worked_out() -> None:
-    made = Activities(1, {(0, 0): ActivitySense(0, KEYS, None)})
-    made.begin(0, 0, "cook")
-    assert not made.are_perceived
-    assert [None] == made.true(rows([5])).tolist()
+def test_activities_that_no_camera_perceives_are_not_computed() -> None:
+    one_user = Activities(1, {(0, 0): ActivitySense(0, KEYS, None)})
+    one_user.begin(0, 0, "cook")
+    assert not one_user.are_perceived
+    assert [None] == one_user.true(rows([5])).tolist()
     assert 0 == len(activities().perceived(rows([])))

@@ -56,7 +56,7 @@ def test_bins_last_a_minute_or_a_step() -> None:
     ]
 
 
-def test_whom_two_robots_perceive_at_once_counts_once_and_strangers_only_as_anybody() -> None:
+def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone() -> None:
     rows = [(60, 0, 1), (60, 0, 1), (61, 0, 1), (61, -1, 1), (119, 1, 0), (120, -1, 0), (180, 0, 0)]
 
     seen = count_seen(sightings(rows), 60, 2, 60, 2, 2)
@@ -87,7 +87,7 @@ def test_bins_sum_up_to_the_exposure_whatever_the_spans(max_span: int | None) ->
     assert rows["seen"].sum() > 0
 
 
-def test_who_did_not_say_so_gets_a_clear_error() -> None:
+def test_missing_needs_are_a_clear_error() -> None:
     with pytest.raises(ComponentError, match=r"needs = \{'evidence'\}"):
         evidence_of("10 min", "Unsaid")
 

@@ -59,7 +59,7 @@ def content(what: str, **more: Any) -> dict[str, Any]:
     }
 
 
-def test_a_run_starts_from_what_another_has_learned(tmp_path: Path) -> None:
+def test_a_run_starts_from_the_learned_state_of_another(tmp_path: Path) -> None:
     first = run(content("Counts"), "artifacts.learned=true", out=tmp_path / "first")
     learned = tmp_path / "first" / "learned" / "mine.npz"
     second = run(content("Counts", learned=str(learned)), out=tmp_path / "second")
@@ -78,14 +78,16 @@ def test_nothing_is_stored_unasked(tmp_path: Path) -> None:
     assert not (tmp_path / "run" / "learned").exists()
 
 
-def test_what_no_file_can_hold_is_said_and_the_run_is_whole(tmp_path: Path) -> None:
+def test_learned_state_that_cannot_be_stored_is_reported_and_the_run_is_complete(
+    tmp_path: Path,
+) -> None:
     stored = run(content("Hoards"), "artifacts.learned=true", out=tmp_path / "run")
 
     assert "complete" == stored.manifest["status"]
     assert any("'queue'" in note and "remember()" in note for note in stored.manifest["notes"])
 
 
-def test_what_was_learned_in_another_home_is_refused(tmp_path: Path) -> None:
+def test_learned_state_of_another_home_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mine.npz"
     save_learned({"counts": np.zeros(99)}, path, "mine")
     with pytest.raises(ComponentError, match=r"'counts' of shape \(99,\).*in another home"):
@@ -103,13 +105,13 @@ def test_a_file_that_is_none_is_refused_in_plain_words(tmp_path: Path, text: str
 def test_nested_mappings_come_back(tmp_path: Path) -> None:
     state = {"a": {"b": np.eye(2), "c": {"d": 1.5}}, "e": "word", "f": True}
     save_learned(state, tmp_path / "x.npz", "x")
-    found = load_learned(tmp_path / "x.npz")
+    loaded = load_learned(tmp_path / "x.npz")
 
-    assert (np.eye(2) == found["a"].pop("b")).all()
-    assert {"a": {"c": {"d": 1.5}}, "e": "word", "f": True} == found
+    assert (np.eye(2) == loaded["a"].pop("b")).all()
+    assert {"a": {"c": {"d": 1.5}}, "e": "word", "f": True} == loaded
 
 
-def test_looking_back_gives_the_steps_that_were_asked_for() -> None:
+def test_looking_back_returns_the_requested_steps() -> None:
     stored = run({**content("LooksBack"), "metrics": {"distance": {"period": "10 min"}}})
     steps = stored.tables["mine"]["steps"].to_pylist()
 

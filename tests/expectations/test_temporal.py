@@ -72,8 +72,8 @@ def built(formula: Any) -> Any:
 
 def trace_of(values: list[float], end: int) -> Trace:
     array = np.array(values[:end], np.float64)
-    kept = np.append(True, array[1:] != array[:-1])
-    return Trace(np.flatnonzero(kept), array[kept], end)
+    is_first = np.append(True, array[1:] != array[:-1])
+    return Trace(np.flatnonzero(is_first), array[is_first], end)
 
 
 def known_of(signals: dict[str, list[float]], end: int, *, over: bool) -> RunSignals:
@@ -88,7 +88,7 @@ def dense(trace: Trace) -> list[float]:
 
 @settings(max_examples=examples(200))
 @given(formulas, truths, truths, numbers, numbers, st.integers(1, 14), st.booleans(), st.booleans())
-def test_the_robustness_of_each_step_is_that_of_the_twin(
+def test_the_robustness_of_each_step_equals_the_reference(
     formula: Formula,
     a: list[float],
     b: list[float],
@@ -150,7 +150,7 @@ def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
     assert (verdict.holds, verdict.slack_s) == (True, 1.0)
 
 
-def test_what_is_still_open_at_the_end_does_not_count() -> None:
+def test_undecided_expectations_at_the_end_do_not_count() -> None:
     a = [0] * 12 + [1, 0]
     expectation = after(moving("a"), moving("b"), within=3)
     verdict = verdict_of("", expectation, known_of({"a": a, "b": [0] * 14}, 14, over=True))

@@ -18,8 +18,8 @@ def test_label_triangles_are_the_parts_of_the_twin(polygons: list[Polygon]) -> N
     part = label_triangles(mesh.neighbors)
 
     expected = sorted(sorted(triangles) for triangles in parts_of(mesh.neighbors))
-    found = [np.flatnonzero(part == i).tolist() for i in range(int(part.max()) + 1)]
-    assert expected == sorted(found)
+    parts = [np.flatnonzero(part == i).tolist() for i in range(int(part.max()) + 1)]
+    assert expected == sorted(parts)
 
 
 @quick

@@ -41,7 +41,7 @@ CLASSES = {name for name, value in PUBLIC.items() if isinstance(value, type)}
 # --- What is written about it ------------------------------------------------------------------
 
 
-def test_the_stub_is_what_nanobind_makes_of_the_module() -> None:
+def test_the_stub_equals_the_output_of_nanobind() -> None:
     """Of spaces and line breaks, other versions of nanobind think otherwise."""
     stubs = pytest.importorskip("nanobind.stubgen", reason="nanobind isn't installed")
     generator = stubs.StubGen(_core, quiet=True)
@@ -52,7 +52,7 @@ def test_the_stub_is_what_nanobind_makes_of_the_module() -> None:
     )
 
 
-def test_there_are_functions_classes_and_constants() -> None:
+def test_the_core_has_functions_classes_and_constants() -> None:
     assert {"look", "watch", "locate", "visible_region"} <= FUNCTIONS
     assert {"Mesh", "Routes", "Window", "Timelines", "UserDraw"} <= CLASSES
     assert all(
@@ -70,7 +70,7 @@ def parts(name: str) -> Iterator[tuple[str, Any]]:
 
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS | CLASSES))
-def test_every_name_says_what_it_is(name: str) -> None:
+def test_every_name_has_a_docstring(name: str) -> None:
     for part, value in parts(name):
         text = (value.__doc__ or "").strip()
         # A function's begins with its signature; what follows is what it does.
@@ -100,7 +100,7 @@ def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody() -> None:
 
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "kernels").glob("*.py")), ids=lambda p: p.stem)
-def test_a_module_of_kernels_lists_what_it_has_and_all_of_it_is_there(path: Path) -> None:
+def test_modules_of_kernels_list_all_their_names(path: Path) -> None:
     if path.stem == "__init__":
         return
     module = importlib.import_module(f"fleet2d.kernels.{path.stem}")
@@ -242,10 +242,10 @@ def corners() -> Corners:
 
 
 def timelines() -> _core.Timelines:
-    made = _core.Timelines(2, SECOND)
-    made.follow(0, 0, track(), np.array([5]), np.array([0, 1], np.int8))
-    made.walk(1, 0, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
-    return made
+    result = _core.Timelines(2, SECOND)
+    result.follow(0, 0, track(), np.array([5]), np.array([0, 1], np.int8))
+    result.walk(1, 0, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
+    return result
 
 
 Args = Callable[[], tuple[Any, ...]]
@@ -472,10 +472,10 @@ CALLS: dict[str, Args] = {
 
 def named(name: str) -> Any:
     """Return a function, class or method of the core."""
-    found: Any = _core
+    result: Any = _core
     for part in name.split("."):
-        found = getattr(found, part)
-    return found
+        result = getattr(result, part)
+    return result
 
 
 def test_every_function_and_method_is_called_here() -> None:
@@ -620,8 +620,8 @@ def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(
 
 def answer(name: str, args: tuple[Any, ...]) -> Any:
     """Return what a call gives, with all that it has written to."""
-    found = named(name)(*args)
-    return [found, *(leaf(args, at) for at in WRITTEN.get(name, ()))]
+    result = named(name)(*args)
+    return [result, *(leaf(args, at) for at in WRITTEN.get(name, ()))]
 
 
 def same(one: Any, other: Any) -> bool:
@@ -756,50 +756,50 @@ def test_no_damage_does_more_than_raise_an_error(call: tuple[str, tuple[Any, ...
 # --- States ------------------------------------------------------------------------------------
 
 
-def ask(made: Any) -> None:
+def use_all_methods(instance: Any) -> None:
     """Ask an object for all that it may be asked."""
-    if isinstance(made, _core.Mesh):
+    if isinstance(instance, _core.Mesh):
         for x, y in POINTS.tolist():
-            _core.visible_region(made, x, y)
-        _core.build_fans(made)
-    elif isinstance(made, _core.Routes):
-        made.find(100, 500, 1000, 500)
-    elif isinstance(made, _core.Legs):
-        made.rows()
-        made.track()
-    elif isinstance(made, _core.StepDraws):
-        made.below(10)
-    elif isinstance(made, _core.Window):
-        for body in range(len(made.start) - 1):
-            made.dense(body, made.first, min(made.end, made.first + 99))
+            _core.visible_region(instance, x, y)
+        _core.build_fans(instance)
+    elif isinstance(instance, _core.Routes):
+        instance.find(100, 500, 1000, 500)
+    elif isinstance(instance, _core.Legs):
+        instance.rows()
+        instance.track()
+    elif isinstance(instance, _core.StepDraws):
+        instance.below(10)
+    elif isinstance(instance, _core.Window):
+        for body in range(len(instance.start) - 1):
+            instance.dense(body, instance.first, min(instance.end, instance.first + 99))
     else:
         for step in (0, 4, 30):
-            made.poses(step)
-            made.window(step, step + 20)
-        made.forget(10)
-        made.window(10, 40)
-        made.walk(1, 12, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
-        copy.deepcopy(made).window(11, 40)
+            instance.poses(step)
+            instance.window(step, step + 20)
+        instance.forget(10)
+        instance.window(10, 40)
+        instance.walk(1, 12, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
+        copy.deepcopy(instance).window(11, 40)
 
 
 def grown() -> _core.Timelines:
     """Return timelines with several pieces, some of which are forgotten."""
-    made = timelines()
-    made.window(0, 20)
-    made.forget(6)
-    made.follow(0, 8, track(), np.array([5]), np.array([0, 1], np.int8))
-    made.walk(0, 15, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
-    made.window(6, 30)
-    return made
+    result = timelines()
+    result.window(0, 20)
+    result.forget(6)
+    result.follow(0, 8, track(), np.array([5]), np.array([0, 1], np.int8))
+    result.walk(0, 15, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
+    result.window(6, 30)
+    return result
 
 
 def legs() -> _core.Legs:
     """Return legs of every kind."""
-    made = _core.Legs()
-    made.mark(5, 100, 100, 7, 0)
-    made.turn(5, 100, 100, 7, 0, 300, 500.0)
-    made.walk(SECOND, 7, POINTS[:2].copy(), 1000.0, 500.0)
-    return made
+    result = _core.Legs()
+    result.mark(5, 100, 100, 7, 0)
+    result.turn(5, 100, 100, 7, 0, 300, 500.0)
+    result.walk(SECOND, 7, POINTS[:2].copy(), 1000.0, 500.0)
+    return result
 
 
 STATES: dict[str, Callable[[], Any]] = {
@@ -814,19 +814,19 @@ STATES: dict[str, Callable[[], Any]] = {
 
 def restored(name: str, state: Any) -> Any:
     """Return what is read from a state."""
-    made = PUBLIC[name].__new__(PUBLIC[name])
-    made.__setstate__(state)
-    return made
+    result = PUBLIC[name].__new__(PUBLIC[name])
+    result.__setstate__(state)
+    return result
 
 
 @pytest.mark.parametrize("name", STATES)
-def test_what_is_read_from_a_state_has_the_same_state(name: str) -> None:
+def test_restored_objects_have_the_same_state(name: str) -> None:
     state = STATES[name]().__getstate__()
     again = restored(name, state)
     for path in leaves(state, (np.ndarray, int, np.integer)):
         assert np.array_equal(leaf(state, path), leaf(again.__getstate__(), path)), path
     with suppress(ValueError):  # what is forgotten
-        ask(again)
+        use_all_methods(again)
     assert pickle.dumps(STATES[name]()) == pickle.dumps(pickle.loads(pickle.dumps(STATES[name]())))
 
 
@@ -860,4 +860,4 @@ def test_a_damaged_state_is_refused_or_can_be_worked_with(data: st.DataObject, n
         else:
             state = put(state, at, data.draw(st.sampled_from(EXTREME)))
     with suppress(TypeError, ValueError, MemoryError):
-        ask(restored(name, state))
+        use_all_methods(restored(name, state))

@@ -26,7 +26,7 @@ def views(seed: int, robots: int) -> tuple[NDArray[np.int64], ...]:
 
 @pytest.mark.parametrize("robots", [0, 1, 3])
 @pytest.mark.parametrize("seed", range(4))
-def test_views_are_those_of_numpy(seed: int, robots: int) -> None:
+def test_views_equal_numpy(seed: int, robots: int) -> None:
     cells, room, size, room_cells = views(seed, robots)
     first, of_patch = np.flatnonzero(np.diff(room, prepend=-1)), np.maximum(size, 1)
     summed, most = cells[:, :, 0], cells[:, :, 1].max(axis=1, initial=0)
@@ -39,9 +39,9 @@ def test_views_are_those_of_numpy(seed: int, robots: int) -> None:
         np.rint(np.minimum(shown, 1) * 255).astype(np.uint8),
     )
 
-    found = gather_views(cells, room, size, room_cells, 60)
+    result = gather_views(cells, room, size, room_cells, 60)
 
-    for one, other in zip(expected, found, strict=True):
+    for one, other in zip(expected, result, strict=True):
         assert one.dtype == other.dtype
         assert np.array_equal(one, other)
 
@@ -72,7 +72,7 @@ def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, NDArray[np.in
 
 @pytest.mark.parametrize("users", [0, 1, 2, 5])
 @pytest.mark.parametrize("longest", [1, 7, 9, 60, 700])
-def test_sums_by_hour_are_those_of_numpy(users: int, longest: int) -> None:
+def test_sums_by_hour_equal_numpy(users: int, longest: int) -> None:
     random = np.random.default_rng(users)
     ends = np.cumsum(random.integers(1, longest + 1, 9))
     stretches = [chain_of(random, int(ends[-1])) for _ in range(max(users, 1))]
@@ -81,10 +81,10 @@ def test_sums_by_hour_are_those_of_numpy(users: int, longest: int) -> None:
     first = np.array([0, *ends[:-1]])
     expected = np.add.reduceat(values(chains, unknown, users), first, axis=0)
 
-    found = sum_places(stretches, unknown, users, first)
+    result = sum_places(stretches, unknown, users, first)
 
-    assert np.array_equal(expected, found)
-    for sums, (a, b) in zip(found, pairwise([0, *ends.tolist()]), strict=True):
+    assert np.array_equal(expected, result)
+    for sums, (a, b) in zip(result, pairwise([0, *ends.tolist()]), strict=True):
         assert (sums[:, -1] == b - a).all()
 
 

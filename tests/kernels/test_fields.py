@@ -8,7 +8,7 @@ from fleet2d.kernels.fields import squared_distance, walking_distance
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29), (40, 25)])
 @pytest.mark.parametrize("free", [0.0, 0.1, 0.5, 0.9, 0.99, 1.0])
-def test_squared_distance_of_random_masks_is_that_of_brute_force(
+def test_squared_distance_of_random_masks_equals_brute_force(
     shape: tuple[int, int], free: float
 ) -> None:
     rng = np.random.default_rng([*shape, int(100 * free)])
@@ -47,7 +47,7 @@ def test_squared_distance_is_the_same_on_every_side(turns: int) -> None:
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29)])
 @pytest.mark.parametrize("free", [0.0, 0.3, 0.6, 0.9, 1.0])
 @pytest.mark.parametrize("count", [0, 1, 3])
-def test_walking_distance_of_random_masks_is_that_of_trying_all_steps(
+def test_walking_distance_of_random_masks_equals_trying_all_steps(
     shape: tuple[int, int], free: float, count: int
 ) -> None:
     rng = np.random.default_rng([*shape, int(100 * free), count])

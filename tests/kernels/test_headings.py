@@ -56,7 +56,7 @@ def test_half_sine_goes_round_the_whole_turn(shift: int) -> None:
 
 
 @pytest.mark.parametrize("heading", [0, 1, 1023, 1024, 1025, 2048, 3071, 3072, 4095, -1, 5000])
-def test_sine_and_cosine_are_those_of_the_heading(heading: int) -> None:
+def test_sine_and_cosine_equal_the_heading(heading: int) -> None:
     exact = slow.sine(2 * heading) * UNIT, slow.cosine(2 * heading) * UNIT
 
     assert abs(int(sine(heading)) - exact[0]) <= Decimal("0.5")
@@ -113,7 +113,7 @@ def test_heading_of_large_vectors_is_the_nearest(dx: int, dy: int) -> None:
     assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
 
 
-def test_heading_of_vectors_beside_a_half_way_direction_is_the_nearest() -> None:
+def test_heading_of_vectors_near_a_boundary_is_the_nearest() -> None:
     """The hardest vectors: up to 700 units long, all but in the middle between two headings."""
     rng = np.random.default_rng(5)
     for part in 2 * rng.integers(0, TURN, 60) + 1:

@@ -49,7 +49,7 @@ class InLists:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_legs_are_those_of_lists(seed: int) -> None:
+def test_legs_equal_lists(seed: int) -> None:
     random, legs, twin = np.random.default_rng(seed), Legs(), InLists()
     legs.mark(*twin.now)
     waits = random.integers(0, 10**7, 8)

@@ -29,8 +29,8 @@ def lenses(**camera: object) -> Lenses:
 def test_a_camera_turns_with_its_body(
     heading: int, forward: float, left: float, mount: float
 ) -> None:
-    found = lenses(offset=[forward, left], heading_deg=mount)
-    x, y, towards = camera_pose(found, 0, 1000, 2000, heading, 0)
+    stacked = lenses(offset=[forward, left], heading_deg=mount)
+    x, y, towards = camera_pose(stacked, 0, 1000, 2000, heading, 0)
     angle = 2 * math.pi * heading / 4096
     along, across = (round(v * UNITS_PER_M) for v in (forward, left))
     assert 1000 + along * math.cos(angle) - across * math.sin(angle) == pytest.approx(x, abs=0.51)
@@ -41,15 +41,15 @@ def test_a_camera_turns_with_its_body(
 @pytest.mark.parametrize(
     ("seconds", "degrees"), [(0, -45), (4.999, -45), (5, 0), (10, 45), (15, 0), (20, -45)]
 )
-def test_a_panning_camera_looks_where_its_turn_says(seconds: float, degrees: int) -> None:
-    found = lenses(pan={"headings_deg": [-45, 0, 45, 0], "dwell": "5 s"})
-    _, _, towards = camera_pose(found, 0, 0, 0, 1024, round(seconds * 1e6))
+def test_a_panning_camera_looks_along_its_current_heading(seconds: float, degrees: int) -> None:
+    stacked = lenses(pan={"headings_deg": [-45, 0, 45, 0], "dwell": "5 s"})
+    _, _, towards = camera_pose(stacked, 0, 0, 0, 1024, round(seconds * 1e6))
     assert 1024 + degrees * 4096 // 360 == pytest.approx(towards, abs=1)
 
 
 @quick
 @given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET)
-def test_what_is_in_a_wedge_is_within_its_angle(heading: int, half: int, dx: int, dy: int) -> None:
+def test_points_in_a_wedge_are_within_its_angle(heading: int, half: int, dx: int, dy: int) -> None:
     off = abs((math.atan2(dy, dx) * 4096 / math.pi - 2 * heading + 4096) % 8192 - 4096)
     if (dx, dy) != (0, 0) and abs(off - half) > 1e-2:
         assert (off < half) == in_wedge(heading, half, dx, dy)
@@ -69,27 +69,27 @@ def test_no_body_that_reaches_into_a_wedge_is_left_out(
 
 
 def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
-    found = lenses(range=[0, 5], body_points=8)
-    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
+    stacked = lenses(range=[0, 5], body_points=8)
+    shown = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
     assert 0b111111111 == shown
-    behind = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, -2 * UNITS_PER_M, 0)
+    behind = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, -2 * UNITS_PER_M, 0)
     assert 0 == behind
 
 
 @pytest.mark.parametrize(("far", "expected"), [(1.81, 1), (2.0, 6), (2.21, 9)])
 def test_points_beyond_the_range_are_not_in_view(far: float, expected: int) -> None:
     """A body of 20 cm at 2 m: its nearest point, then half of it, then all."""
-    found = lenses(range=[0, far], body_points=8)
-    shown = points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
+    stacked = lenses(range=[0, far], body_points=8)
+    shown = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
     assert expected == pytest.approx(shown.bit_count(), abs=2)
     assert (far > 2.2) == (shown == 0b111111111)
 
 
 def test_a_pillar_hides_a_body_behind_it() -> None:
-    walls, found = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
+    walls, stacked = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
     x, y = (round(v * UNITS_PER_M) for v in (3.5, 1.2))
-    assert 0 == points_in_view(walls, found, 0, 0, MIDDLE, MIDDLE, 0, x, y)
-    assert 9 == points_in_view(HALL, found, 0, 0, MIDDLE, MIDDLE, 0, x, y).bit_count()
+    assert 0 == points_in_view(walls, stacked, 0, 0, MIDDLE, MIDDLE, 0, x, y)
+    assert 9 == points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, x, y).bit_count()
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ FAR = st.one_of(st.integers(-60, 60), st.integers(-(2**26), 2**26))
 
 @quick
 @given(FAR, FAR, FAR, FAR, st.one_of(st.integers(1, 60), st.integers(1, 2**17 - 1)))
-def test_what_a_body_hides_is_that_of_fractions(
+def test_points_hidden_by_a_body_equal_exact_fractions(
     px: int, py: int, bx: int, by: int, radius: int
 ) -> None:
     assert slow.hides((px, py), (bx, by), radius) == hides(px, py, bx, by, radius)
@@ -133,7 +133,7 @@ def test_what_a_body_hides_is_that_of_fractions(
 
 @quick
 @given(FAR, FAR, st.integers(1, 63), st.integers(1, 2**17 - 1), st.integers(-2, 2))
-def test_what_a_body_hides_is_exact_at_its_rim(
+def test_hiding_is_exact_at_the_rim_of_a_body(
     px: int, py: int, part: int, radius: int, beside: int
 ) -> None:
     """Centres a radius away from the line, as nearly as the lattice has them."""

@@ -92,23 +92,23 @@ class Scene:
         return self.thickness + 7 * np.arange(count) if self.thickness else None
 
     def obstacles(self) -> dict[int, slow.Obstacle] | None:
-        """Return what hides users, as the twin wants it."""
+        """Return the obstacles that hide users, for the reference."""
         radii = self.radii()
         if radii is None:
             return None
         _, robot, first_user = self.window(0)
         here = [slow.Body(x, y, False) for x, y, *_ in self.robot.tolist()]
-        found = {}
+        result = {}
         for number, radius in enumerate(radii.tolist()):
             user = number - first_user
             if 0 <= user < len(self.users):
                 poses = [
                     slow.Body(x, y, bool(away)) for x, y, away, *_ in self.users[user].tolist()
                 ]
-                found[user] = slow.Obstacle(poses, radius)
+                result[user] = slow.Obstacle(poses, radius)
             elif number != robot:
-                found[-1 - number] = slow.Obstacle(here, radius)
-        return found
+                result[-1 - number] = slow.Obstacle(here, radius)
+        return result
 
 
 @dataclass
@@ -153,10 +153,12 @@ def listed(eye: slow.Eye | Sequence[slow.Eye]) -> list[slow.Eye]:
 
 def tables_of(eyes: Sequence[slow.Eye], scene: Scene) -> ErrorTables:
     """Return how cameras err, with a stream for each draw."""
-    given = list(scene.perceptions) or [None] * len(eyes)
+    perceptions = list(scene.perceptions) or [None] * len(eyes)
     count = len(scene.users)
-    about = TableContext([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
-    errors = error_tables([Lens(**eye._asdict()) for eye in eyes], given, about)
+    context = TableContext(
+        [f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r"
+    )
+    errors = error_tables([Lens(**eye._asdict()) for eye in eyes], perceptions, context)
     for c in range(len(eyes)):
         for draw in UserDraw:
             errors.keys[c, :, draw] = scene.keys + np.uint64(c + 100 * (draw - UserDraw.DETECT))
@@ -232,7 +234,7 @@ def looked_slowly(
     """Return what the twin sees."""
     eyes, carried = listed(eye), carried or nothing_known(eye, scene)
     shown = scene.shown
-    found = slow.look(
+    result = slow.look(
         home.walls,
         eyes,
         [slow.Body(x, y, bool(away), heading) for x, y, heading, away in scene.robot.tolist()],
@@ -251,7 +253,7 @@ def looked_slowly(
         scene.obstacles(),
     )
     known = carried.known
-    return Seen(*found, [k.noticed for k in known], [int(k.seen) for k in known])
+    return Seen(*result, [k.noticed for k in known], [int(k.seen) for k in known])
 
 
 def rested(rng: np.random.Generator, poses: Int64, moves: float) -> Int64:
@@ -374,7 +376,7 @@ def errors_of(draw: st.DrawFn, cameras: Sequence[slow.Eye], users: int) -> list[
 
 @quick
 @given(homes(), eyes(), seeds(), st.integers(0, 3), st.integers(0, 10**9), stoppings)
-def test_look_is_that_of_the_twin(
+def test_look_equals_the_reference(
     polygons: list[Polygon],
     eye: slow.Eye,
     seed: int,
@@ -390,7 +392,7 @@ def test_look_is_that_of_the_twin(
 
 @quick
 @given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(0, 3), stoppings)
-def test_look_of_several_cameras_is_that_of_the_twin(
+def test_look_of_several_cameras_equals_the_reference(
     polygons: list[Polygon],
     cameras: list[slow.Eye],
     seed: int,
@@ -411,7 +413,7 @@ THICKNESSES = st.sampled_from([0, 1, 30, 100])
 
 @quick
 @given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings)
-def test_look_at_bodies_that_mostly_rest_is_that_of_the_twin(
+def test_look_at_bodies_that_mostly_rest_equals_the_reference(
     polygons: list[Polygon],
     cameras: list[slow.Eye],
     seed: int,
@@ -436,7 +438,7 @@ def test_look_at_bodies_that_mostly_rest_is_that_of_the_twin(
     stoppings,
     st.sampled_from([1, 30, 100]),
 )
-def test_look_past_bodies_that_hide_each_other_is_that_of_the_twin(
+def test_look_past_bodies_that_hide_each_other_equals_the_reference(
     polygons: list[Polygon],
     cameras: list[slow.Eye],
     seed: int,
@@ -454,7 +456,7 @@ def test_look_past_bodies_that_hide_each_other_is_that_of_the_twin(
 
 
 @pytest.mark.parametrize("moves", [0.1, 1.0])
-def test_look_past_bodies_in_one_room_is_that_of_the_twin(moves: float) -> None:
+def test_look_past_bodies_in_one_room_equals_the_reference(moves: float) -> None:
     """Where bodies hide each other often, and parts of each other."""
     eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
     scene = scene_in(ROOM, np.random.default_rng(8), 6, 120, moves)
@@ -469,7 +471,7 @@ def test_look_past_bodies_in_one_room_is_that_of_the_twin(moves: float) -> None:
 
 @quick
 @given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=2), seeds(), MOVES, stoppings)
-def test_look_of_cameras_that_err_is_that_of_the_twin(
+def test_look_of_cameras_that_err_equals_the_reference(
     data: st.DataObject,
     cameras: list[slow.Eye],
     seed: int,
@@ -490,7 +492,7 @@ def test_look_of_cameras_that_err_is_that_of_the_twin(
 @given(
     st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings, THICKNESSES
 )
-def test_look_by_another_method_is_that_of_the_twin(
+def test_look_by_another_method_equals_the_reference(
     data: st.DataObject,
     cameras: list[slow.Eye],
     seed: int,
@@ -533,7 +535,7 @@ def test_look_of_several_cameras_at_two_spans_is_that_at_one(
     assert (whole.noticed, whole.seen) == (second.noticed, second.seen)
 
 
-def test_look_returns_all_sightings_however_many_there_are() -> None:
+def test_look_returns_any_number_of_sightings() -> None:
     scene = line_of([(50 + i, 0) for i in range(20)], steps=5000)
 
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 0)
@@ -546,7 +548,7 @@ def test_look_returns_all_sightings_however_many_there_are() -> None:
 
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("detection", [0.0, 0.5, 1.0])
-def test_look_in_one_room_is_that_of_the_twin(degrees: int, detection: float) -> None:
+def test_look_in_one_room_equals_the_reference(degrees: int, detection: float) -> None:
     home = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
     eye = slow.Eye(0, 700, half_angle(degrees), round(detection * 2**53), 2)
     scene = scene_in(home, np.random.default_rng(degrees), 4, 150)
@@ -559,7 +561,7 @@ def test_look_in_one_room_is_that_of_the_twin(degrees: int, detection: float) ->
 
 @pytest.mark.parametrize("per_track", [True, False])
 @pytest.mark.parametrize(("memory", "patience"), [("0 s", 2), ("4 s", 5)])
-def test_look_in_one_room_of_cameras_that_err_is_that_of_the_twin(
+def test_look_in_one_room_of_cameras_that_err_equals_the_reference(
     per_track: bool, memory: str, patience: int
 ) -> None:
     """Where users are in view most of the time, so that every way to err happens often."""
@@ -617,7 +619,7 @@ def test_look_at_two_spans_is_that_at_one(
 
 @quick
 @given(homes(), eyes(), seeds(), stoppings)
-def test_look_that_goes_on_after_each_stop_sees_what_one_that_never_stops_does(
+def test_looks_with_stops_equal_looks_without(
     polygons: list[Polygon], eye: slow.Eye, seed: int, stops: tuple[bool, bool]
 ) -> None:
     home = home_of(polygons)
@@ -726,7 +728,7 @@ def test_look_sees_within_its_angle_borders_included(
 
 
 @pytest.mark.parametrize("half", [1, 11, 1024, 2047, 2048, 2049, 3072, 4085, 4095, 4096])
-def test_in_wedge_of_every_direction_is_that_of_cosines(half: int) -> None:
+def test_in_wedge_of_every_direction_equals_cosines(half: int) -> None:
     rng = np.random.default_rng(half)
     for heading in [0, 512, 2048, 4095, *rng.integers(0, 4096, 12).tolist()]:
         ahead, right, left = 2 * heading, 2 * heading - half, 2 * heading + half
@@ -749,7 +751,7 @@ def test_look_of_the_narrowest_camera_does_not_see_behind() -> None:
 
 
 @pytest.mark.parametrize("half", [1, 300, 2047])
-def test_in_wedge_never_takes_what_is_right_behind(half: int) -> None:
+def test_in_wedge_excludes_points_right_behind(half: int) -> None:
     for heading in range(0, 4096, 64):
         behind = [round(-1000 * float(f(2 * heading))) for f in (slow.cosine, _sine)]
 
@@ -767,7 +769,7 @@ def test_look_counts_a_user_as_lost_after_its_patience() -> None:
     assert [(100, 0, USER_SEEN), (105, 0, USER_LOST)] == seen.events
 
 
-def test_look_keeps_a_user_who_is_back_before_its_patience_ends() -> None:
+def test_look_does_not_lose_a_user_who_is_back_in_time() -> None:
     scene = line_of([(50, 0)], steps=9)
     scene.users[0, 2:5, 2] = 1
 

@@ -90,7 +90,7 @@ def slow_sides(mask: Mask) -> set[tuple[int, ...]]:
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("diagonal", [False, True])
-def test_parts_of_random_masks_are_those_of_the_slow_twin(
+def test_parts_of_random_masks_equal_the_reference(
     shape: tuple[int, int], share: float, diagonal: bool
 ) -> None:
     for mask in masks(shape, share, 4):
@@ -99,9 +99,7 @@ def test_parts_of_random_masks_are_those_of_the_slow_twin(
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", SHARES)
-def test_steps_in_random_masks_are_those_of_the_slow_twin(
-    shape: tuple[int, int], share: float
-) -> None:
+def test_steps_in_random_masks_equal_the_reference(shape: tuple[int, int], share: float) -> None:
     for mask, start in zip(masks(shape, share), masks(shape, 0.1), strict=True):
         assert np.array_equal(slow_count_steps(start, mask), count_steps(start, mask))
 

@@ -24,7 +24,7 @@ def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at: list)
 
 
 @given(places)
-def test_the_length_of_a_way_is_that_of_a_plain_loop(at: list) -> None:
+def test_path_length_equals_a_plain_loop(at: list) -> None:
     x, y = np.array(at, np.int64).reshape(-1, 2).T.copy()
     poses = Poses(x, y, np.zeros_like(x), np.zeros(len(x), np.uint8))
     way = sum(hypot(x[i] - x[i - 1], y[i] - y[i - 1]) for i in range(1, len(x)))
@@ -43,7 +43,7 @@ def visits(rooms: list[int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(rooms_by_step)
-def test_steps_together_are_those_of_a_loop_over_all_steps(rooms: tuple) -> None:
+def test_steps_together_equal_a_loop_over_all_steps(rooms: tuple) -> None:
     one, other = rooms
     expected = sum(a == b >= 0 for a, b in zip(one, other, strict=True))
     assert expected == count_together(*visits(one), *visits(other), len(one))

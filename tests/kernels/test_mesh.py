@@ -47,7 +47,7 @@ def lowest_triangle(home: Home, x: int, y: int) -> int:
 
 @quick
 @given(homes(), seeds())
-def test_locate_finds_the_lowest_triangle_that_holds_the_point(
+def test_locate_returns_the_lowest_triangle_with_the_point(
     polygons: list[Polygon], seed: int
 ) -> None:
     home = home_of(polygons)
@@ -57,7 +57,7 @@ def test_locate_finds_the_lowest_triangle_that_holds_the_point(
 
 
 @pytest.mark.parametrize(("x", "y"), [(-1, 5), (5, -1), (10**6, 5), (5, 10**6), (641, 5)])
-def test_locate_says_outside_beyond_the_plan(x: int, y: int) -> None:
+def test_locate_returns_outside_beyond_the_plan(x: int, y: int) -> None:
     home = home_of([shapely.box(0, 0, 640, 640)])
 
     assert locate(home.mesh, x, y) == -1
@@ -92,12 +92,12 @@ def test_rasterized_cells_are_those_strictly_inside_in_every_mesh(
     rows, columns = home.rows - fewer, home.columns - 2 * fewer
     mesh = shuffled(home.mesh, np.random.default_rng(seed))
 
-    found = rasterize_cells(mesh, rows, columns)
+    triangle_of_cell = rasterize_cells(mesh, rows, columns)
 
     grid = np.indices((rows, columns)).reshape(2, -1).T[:, ::-1] * 64 + 33
     inside = is_inside(home.walls, grid) & ~on_any_wall(home.walls, grid)
-    assert inside.tolist() == (found.ravel() >= 0).tolist()
-    for (x, y), triangle in zip(grid.tolist(), found.ravel().tolist(), strict=True):
+    assert inside.tolist() == (triangle_of_cell.ravel() >= 0).tolist()
+    for (x, y), triangle in zip(grid.tolist(), triangle_of_cell.ravel().tolist(), strict=True):
         assert triangle == (locate(mesh, x, y) if triangle >= 0 else -1)
 
 
@@ -111,7 +111,7 @@ def test_cells_on_a_diagonal_wall_are_not_free() -> None:
     assert free[4, 5]
 
 
-def test_cells_of_every_home_are_those_that_shapely_holds_free(shared_data: Path) -> None:
+def test_cells_of_every_home_equal_the_free_cells_of_shapely(shared_data: Path) -> None:
     for home in all_homes(shared_data):
         if home.rows * home.columns > 10**6:
             continue
@@ -119,6 +119,6 @@ def test_cells_of_every_home_are_those_that_shapely_holds_free(shared_data: Path
         shapely.prepare(free)
         x, y = np.meshgrid(np.arange(home.columns) * 64 + 33, np.arange(home.rows) * 64 + 33)
 
-        found = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
+        is_free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
 
-        assert np.array_equal(shapely.contains_xy(free, x, y), found)
+        assert np.array_equal(shapely.contains_xy(free, x, y), is_free)

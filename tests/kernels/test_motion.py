@@ -74,13 +74,13 @@ def tracks(draw: st.DrawFn) -> list[slow.Row]:
 
 @quick
 @given(tracks(), st.integers(-60, 400), st.sampled_from([1, 3, 20, 333_333]))
-def test_trace_track_is_that_of_fractions(track: list[slow.Row], begin: int, step: int) -> None:
+def test_trace_track_equals_fractions(track: list[slow.Row], begin: int, step: int) -> None:
     assert twin(track, begin, step, 40) == traced(track, begin, step, 40)
 
 
 @quick
 @given(tracks(), st.integers(0, 200), st.integers(1, 40), st.integers(0, 30), st.integers(0, 30))
-def test_trace_track_of_two_spans_is_that_of_one(
+def test_trace_track_of_two_spans_equals_one(
     track: list[slow.Row], begin: int, step: int, first: int, second: int
 ) -> None:
     whole = traced(track, begin, step, first + second)
@@ -178,9 +178,7 @@ KNOWN = Breakpoints(*(np.array([0, 5, 9]) for _ in range(4)), np.zeros(3, np.uin
         pytest.param(KNOWN, 1 << 60, "step", id="beyond-all-time"),
     ],
 )
-def test_trace_track_refuses_what_it_would_get_wrong(
-    track: Breakpoints, step: int, message: str
-) -> None:
+def test_trace_track_refuses_invalid_input(track: Breakpoints, step: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         trace_track(track, 0, step, poses(4))
 
@@ -203,7 +201,7 @@ corners = st.one_of(
     st.floats(100.0, 8000.0),
     st.integers(0, 4095),
 )
-def test_time_route_turns_then_walks_no_faster_than_it_can(
+def test_time_route_turns_then_walks_at_most_at_top_speed(
     route: list[tuple[int, int]], speed: float, rate: float, heading: int
 ) -> None:
     """Each leg takes the least whole microseconds; a rounded float may add or take one."""
@@ -247,7 +245,7 @@ def test_time_route_of_a_known_route() -> None:
 
 
 @pytest.mark.parametrize("route", [[(5, 5)], [(5, 5), (5, 5)], [(5, 5)] * 4])
-def test_time_route_without_a_way_to_go_is_its_start(route: list[tuple[int, int]]) -> None:
+def test_time_route_of_length_0_is_its_start(route: list[tuple[int, int]]) -> None:
     assert [[1_000_000, 5, 5, 77]] == timed(route, 1000.0, 1024.0, heading=77).tolist()
 
 
@@ -263,7 +261,7 @@ def test_time_route_refuses_speeds_that_lead_nowhere(speed: float, rate: float) 
         timed([(0, 0), (5, 5)], speed, rate)
 
 
-def test_time_route_that_takes_for_ever_ends_at_the_last_time_there_is() -> None:
+def test_endless_time_route_ends_at_the_last_possible_time() -> None:
     assert 2**61 == timed([(0, 0), (5, 5), (0, 9)], 1e-300, 1e-300)[-1, 0]
 
 
@@ -313,7 +311,7 @@ def check_walk(space: Home, steps: Int64, rule: WalkRule) -> int:
 
 @quick
 @given(homes(), seeds(), st.sampled_from([700, 20_000, 90_000]), st.integers(0, 200))
-def test_trace_meander_is_that_of_a_look_at_every_wall(
+def test_trace_meander_equals_a_check_of_every_wall(
     polygons: list[Polygon], seed: int, stride: int, limit: int
 ) -> None:
     home, rng = home_of(polygons), np.random.default_rng(seed)
@@ -329,7 +327,7 @@ def test_trace_meander_is_that_of_a_look_at_every_wall(
 
 @quick
 @given(homes(), seeds(), st.sampled_from([40, 100]))
-def test_trace_meander_from_the_border_of_the_space_is_that_of_the_twin(
+def test_trace_meander_from_the_border_of_the_space_equals_the_reference(
     polygons: list[Polygon], seed: int, reach: int
 ) -> None:
     home, rng = home_of(polygons), np.random.default_rng(seed)
@@ -390,7 +388,7 @@ def test_trace_meander_never_leaves_a_real_home(shared_data: Path, stride: float
 
 @quick
 @given(homes(), seeds(), st.integers(1, 39))
-def test_trace_meander_of_two_spans_is_that_of_one(
+def test_trace_meander_of_two_spans_equals_one(
     polygons: list[Polygon], seed: int, cut: int
 ) -> None:
     home, rng = home_of(polygons), np.random.default_rng(seed)

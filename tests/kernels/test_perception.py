@@ -33,12 +33,12 @@ def test_pick_is_the_first_outcome_above_the_draw(sums: list[int], draw: int) ->
     assert expected == k.pick(np.array(sums, np.int64), draw)
 
 
-def test_random_shares_are_those_of_single_draws_and_uniform() -> None:
+def test_random_shares_equal_single_draws_and_uniform() -> None:
     counters = np.arange(20_000)
-    found = k.random_shares(KEY, counters)
-    assert [k.random_share(KEY, i) for i in range(50)] == found[:50].tolist()
-    assert ((found >= 0) & (found < k.ONE)).all()
-    counts = np.bincount(found * 16 // k.ONE, minlength=16)
+    shares = k.random_shares(KEY, counters)
+    assert [k.random_share(KEY, i) for i in range(50)] == shares[:50].tolist()
+    assert ((shares >= 0) & (shares < k.ONE)).all()
+    counts = np.bincount(shares * 16 // k.ONE, minlength=16)
     assert ((counts - 1250) ** 2 / 1250).sum() < 44  # 15 degrees of freedom: 1 in 10,000
 
 
@@ -55,7 +55,7 @@ def test_lasting_is_the_exponential_of_the_steps(steps: int) -> None:
 
 @quick
 @given(VECTOR)
-def test_the_way_back_is_half_a_turn_from_the_way_there(vector: tuple[int, int]) -> None:
+def test_opposite_headings_differ_by_half_a_turn(vector: tuple[int, int]) -> None:
     """So that one search for a heading tells both where a user is and where the camera is."""
     dx, dy = vector
     if (dx, dy) != (0, 0):
@@ -85,9 +85,9 @@ def test_steady_chance_is_the_product_of_its_factors(
         * np.interp(away, [0, 180], [1, 0.5])
         * (1, 0.8, 0.3)[posture]
     )
-    found = k.steady_chance(BY_ALL, 0, heading, dx, dy, faces, posture, 1)
+    chance = k.steady_chance(BY_ALL, 0, heading, dx, dy, faces, posture, 1)
     if abs(bearing) < 179.8:  # else the sides of the seam differ
-        assert expected == pytest.approx(found / k.ONE, abs=3e-3)
+        assert expected == pytest.approx(chance / k.ONE, abs=3e-3)
 
 
 def test_notice_chance_is_the_product_in_its_unit_and_1_is_sure() -> None:
@@ -107,15 +107,15 @@ def test_the_farthest_distances_share_the_last_bin(vector: tuple[int, int]) -> N
 
 @quick
 @given(VECTOR, st.integers(-2000, 2000), st.integers(0, 9000))
-def test_turn_and_stretch_is_that_of_trigonometry(
-    vector: tuple[int, int], turn: int, wanted: int
+def test_turn_and_stretch_equals_trigonometry(
+    vector: tuple[int, int], turn: int, target_length: int
 ) -> None:
     dx, dy = vector
     distance = k.length(dx, dy)
     if distance >= 100:
         angle = math.atan2(dy, dx) + 2 * math.pi * turn / 8192
-        x, y = k.turn_and_stretch(dx, dy, turn, distance, wanted)
-        scale = math.hypot(dx, dy) / distance * wanted
+        x, y = k.turn_and_stretch(dx, dy, turn, distance, target_length)
+        scale = math.hypot(dx, dy) / distance * target_length
         assert (scale * math.cos(angle), scale * math.sin(angle)) == pytest.approx((x, y), abs=1.6)
 
 
@@ -134,7 +134,7 @@ def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
     assert {0} == {y for _, y in places}
 
 
-def test_a_posture_is_taken_for_the_one_that_the_draw_says() -> None:
+def test_the_perceived_posture_follows_from_the_draw() -> None:
     table = table_of(attributes={"posture": {"sit": {"stand": 0.25, "lie": 0.25}}})
     quarter = k.ONE // 4
     draws = (0, quarter - 1, quarter, 3 * quarter - 1, 3 * quarter, k.ONE - 1)

@@ -39,7 +39,7 @@ def in_reach(x: int, y: int, heading: int, reach: Reach, px: int, py: int) -> bo
 
 
 @pytest.mark.parametrize("half", HALVES)
-def test_points_in_reach_are_those_of_plain_integers(half: int) -> None:
+def test_points_in_reach_equal_plain_integers(half: int) -> None:
     rng = np.random.default_rng(half)
     x, y = 1000, 700
     around = rng.integers(-300, 300, (60, 2))

@@ -11,19 +11,19 @@ def test_a_forecast_is_the_row_of_the_power() -> None:
     transition = np.random.default_rng(2).dirichlet(np.ones(4), 4)
     for bins in (0, 1, 7, 300):
         expected = np.linalg.matrix_power(transition, bins)[2]
-        found = advance(np.eye(4)[2].copy(), transition, bins)
-        assert np.abs(expected - found).max() < 1e-12
+        forecast = advance(np.eye(4)[2].copy(), transition, bins)
+        assert np.abs(expected - forecast).max() < 1e-12
 
 
-def test_each_sum_is_that_of_as_many_days_drawn_with_replacement() -> None:
+def test_each_resample_draws_as_many_days_with_replacement() -> None:
     days = np.array([[1.0, 10.0], [2.0, 20.0], [4.0, 40.0]])
     key = np.uint64(7)
-    found = resampled(key, days, 50)
+    sums = resampled(key, days, 50)
     for b in range(50):
         draws = np.uint64(random_bits(key, b))
         drawn = [int(random_below(draws, d, 3)) for d in range(3)]
-        assert days[drawn].sum(axis=0).tolist() == found[b].tolist()
-    assert len(np.unique(found[:, 0])) > 5
+        assert days[drawn].sum(axis=0).tolist() == sums[b].tolist()
+    assert len(np.unique(sums[:, 0])) > 5
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -46,7 +46,7 @@ def test_random_bits_are_the_published_outputs_of_splitmix64(seed: int) -> None:
 
 @quick
 @given(keys, counters)
-def test_random_bits_of_any_key_and_counter_are_those_of_the_twin(key: int, counter: int) -> None:
+def test_random_bits_of_any_key_and_counter_equal_the_reference(key: int, counter: int) -> None:
     assert slow.random_bits(key, counter) == int(random_bits(np.uint64(key), counter))
 
 
@@ -124,7 +124,7 @@ def test_random_bell_has_the_stated_moments() -> None:
     assert round(1020 / BELL_STD, 2) == 4.88
 
 
-def test_random_bell_draws_spread_as_its_distribution_says() -> None:
+def test_random_bell_draws_follow_their_distribution() -> None:
     """Ten thousand fixed draws: mean and standard deviation within three standard errors."""
     drawn = np.array([int(random_bell(np.uint64(11), i)) for i in range(10_000)])
 
@@ -134,7 +134,7 @@ def test_random_bell_draws_spread_as_its_distribution_says() -> None:
 
 @quick
 @given(keys, counters, st.lists(st.integers(1, 2**31 - 1)))
-def test_draws_of_a_step_are_those_of_the_twin(key: int, step: int, bounds: list[int]) -> None:
+def test_draws_of_a_step_equal_the_reference(key: int, step: int, bounds: list[int]) -> None:
     draws = StepDraws(np.uint64(key), step)
     own_key = slow.random_bits(key, step)
 
@@ -145,7 +145,7 @@ def test_draws_of_a_step_are_those_of_the_twin(key: int, step: int, bounds: list
 
 @quick
 @given(keys, st.lists(st.integers(0, 30)))
-def test_bits_are_taken_from_draws_of_30_from_the_lowest_on(key: int, counts: list[int]) -> None:
+def test_bits_of_a_draw_of_30_are_used_from_the_lowest(key: int, counts: list[int]) -> None:
     bits, draws = Bits(StepDraws(np.uint64(key), 5)), StepDraws(np.uint64(key), 5)
 
     left = value = 0
@@ -177,7 +177,7 @@ def test_more_than_30_bits_are_refused() -> None:
 
 
 @pytest.mark.parametrize("way", [copy.copy, lambda draws: pickle.loads(pickle.dumps(draws))])
-def test_a_copy_of_draws_goes_on_by_itself(way: Callable[[StepDraws], StepDraws]) -> None:
+def test_a_copy_of_draws_is_independent(way: Callable[[StepDraws], StepDraws]) -> None:
     draws = StepDraws(np.uint64(3), 5)
     draws.below(7)
     twin = way(draws)

@@ -61,13 +61,13 @@ def check_verdicts(home: Home, mesh: Mesh, rng: np.random.Generator, eyes: int, 
         points = np.concatenate(around)
         right, wall = visible_region(mesh, *eye.tolist())
         expected = points_in_sight(mesh, *eye.tolist(), points)
-        found = region_contains_points(mesh, *eye.tolist(), right, wall, points)
-        assert np.array_equal(expected, found)
+        contained = region_contains_points(mesh, *eye.tolist(), right, wall, points)
+        assert np.array_equal(expected, contained)
 
 
 @quick
 @given(homes(), seeds())
-def test_region_holds_exactly_the_points_in_line_of_sight(
+def test_region_contains_exactly_the_points_in_line_of_sight(
     polygons: list[Polygon], seed: int
 ) -> None:
     home, rng = home_of(polygons), np.random.default_rng(seed)
@@ -75,7 +75,9 @@ def test_region_holds_exactly_the_points_in_line_of_sight(
     check_verdicts(home, shuffled(home.mesh, rng), rng, eyes=1, count=4)
 
 
-def test_region_holds_exactly_the_points_in_line_of_sight_in_real_homes(shared_data: Path) -> None:
+def test_region_contains_exactly_the_points_in_line_of_sight_in_real_homes(
+    shared_data: Path,
+) -> None:
     rng = np.random.default_rng(3)
 
     for home in all_homes(shared_data):
@@ -123,7 +125,7 @@ def test_area_is_exact(polygons: list[Polygon], seed: int) -> None:
             assert expected == pytest.approx(area_of(home.mesh, x, y)[0], rel=1e-12)
 
 
-def test_area_is_exact_and_the_outline_has_it_in_a_real_home(shared_data: Path) -> None:
+def test_area_is_exact_and_equals_the_outline_in_a_real_home(shared_data: Path) -> None:
     home = houseexpo(shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json")
 
     for x, y in np.random.default_rng(4).choice(home.cells, 20).tolist():
@@ -171,7 +173,7 @@ def check_regions_of_cells(home: Home, step: int) -> float:
     return len(right) / len(cells)
 
 
-def test_regions_of_cells_are_those_found_one_by_one() -> None:
+def test_regions_of_cells_equal_single_regions() -> None:
     check_regions_of_cells(ROOM, step=11)
 
 
@@ -188,9 +190,9 @@ def test_points_far_outside_the_home_are_in_no_region() -> None:
     right, wall = visible_region(ROOM.mesh, 200, 200)
     far = np.array([[200, 200], [2**62, 2**62], [-(2**63), 200], [200, 2**63 - 1]])
 
-    found = region_contains_points(ROOM.mesh, 200, 200, right, wall, far)
+    contained = region_contains_points(ROOM.mesh, 200, 200, right, wall, far)
 
-    assert found.tolist() == [True, False, False, False]
+    assert contained.tolist() == [True, False, False, False]
 
 
 def test_numbers_that_name_no_vertex_wall_or_cell_are_refused() -> None:

@@ -153,7 +153,7 @@ def test_find_route_without_corners_is_straight() -> None:
     assert [[33, 33], [601, 97]] == path.tolist()
 
 
-def test_find_route_to_where_it_starts_has_no_length() -> None:
+def test_find_route_to_its_start_has_length_0() -> None:
     home = home_of([shapely.box(0, 0, 640, 640)])
 
     path = routes_of(home).find(33, 33, 33, 33)
@@ -162,7 +162,7 @@ def test_find_route_to_where_it_starts_has_no_length() -> None:
     assert [[33, 33], [33, 33]] == path.tolist()
 
 
-def test_find_route_round_a_pillar_goes_the_shorter_way() -> None:
+def test_find_route_round_a_pillar_takes_the_shorter_side() -> None:
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
 
     path = routes_of(home).find(101, 301, 501, 301)
@@ -193,7 +193,7 @@ def test_find_route_through_a_point_where_two_pillars_meet_bends_at_it() -> None
     assert [[319, 129], [320, 320], [321, 511]] == path.tolist()
 
 
-def test_find_route_of_equal_ways_is_always_the_same() -> None:
+def test_find_route_among_equal_routes_is_deterministic() -> None:
     """The tie goes to corners with lower ids: the lower way, as ids are sorted by x, then y."""
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(220, 220, 420, 420))])
 

@@ -24,8 +24,8 @@ HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
 
 
-def found_in(home: Home, mesh: Mesh, pose: tuple[int, int, int], reach: Reach) -> Bool:
-    """Return the mask of the cells in view; no cell may be told twice."""
+def mask_in_view(home: Home, mesh: Mesh, pose: tuple[int, int, int], reach: Reach) -> Bool:
+    """Return the mask of the cells in view; no cell may be in two spans."""
     spans = cells_in_view(mesh, *pose, reach, home.rows, home.columns)
     mask = np.zeros((home.rows, home.columns), np.bool_)
     mark_spans(spans, mask)
@@ -57,7 +57,7 @@ def random_pose(home: Home, rng: np.random.Generator) -> tuple[int, int, int]:
 
 @quick
 @given(homes(), seeds())
-def test_cells_are_those_that_brute_force_finds(polygons: list[Polygon], seed: int) -> None:
+def test_cells_equal_brute_force(polygons: list[Polygon], seed: int) -> None:
     home, rng = home_of(polygons), np.random.default_rng(seed)
     mesh = shuffled(home.mesh, rng, 2)
 
@@ -65,20 +65,20 @@ def test_cells_are_those_that_brute_force_finds(polygons: list[Polygon], seed: i
         pose, (near, far, half) = random_pose(home, rng), random_reach(rng)
         shape = (home.rows, home.columns)
         expected = slow.cells_in_view(home.walls, shape, pose, near, far, half, SINES)
-        found = found_in(home, mesh, pose, Reach(near**2, far**2, half))
-        assert np.array_equal(expected, found), (pose, near, far, half)
+        in_view = mask_in_view(home, mesh, pose, Reach(near**2, far**2, half))
+        assert np.array_equal(expected, in_view), (pose, near, far, half)
 
 
 @pytest.mark.parametrize("half", HALVES)
 @pytest.mark.parametrize("at", [(33, 33), (0, 0), (40, 2), (33, 0), (0, 33)])
-def test_cells_round_a_pillar_are_those_that_brute_force_finds(
-    half: int, at: tuple[int, int]
-) -> None:
+def test_cells_round_a_pillar_equal_brute_force(half: int, at: tuple[int, int]) -> None:
     for heading in range(0, 4096, 256):
         pose = (320 + at[0], 192 + at[1], heading)
         shape = (ROOM.rows, ROOM.columns)
         expected = slow.cells_in_view(ROOM.walls, shape, pose, 70, 700, half, SINES)
-        assert np.array_equal(expected, found_in(ROOM, ROOM.mesh, pose, Reach(4900, 490_000, half)))
+        assert np.array_equal(
+            expected, mask_in_view(ROOM, ROOM.mesh, pose, Reach(4900, 490_000, half))
+        )
 
 
 def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(
@@ -93,7 +93,9 @@ def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(
                 pose, (near, far, half) = random_pose(turned, rng), random_reach(rng)
                 reach = Reach(near**2, far**2, half)
                 expected = by_lines(turned, pose, reach)
-                assert np.array_equal(expected, found_in(turned, turned.mesh, pose, reach)), pose
+                assert np.array_equal(expected, mask_in_view(turned, turned.mesh, pose, reach)), (
+                    pose
+                )
                 compared += expected.size
     assert compared > 200_000 * (number + 1)
 
@@ -102,22 +104,22 @@ def test_everything_in_view_all_round_is_free(shared_data: Path) -> None:
     for home in list(all_homes(shared_data))[:10]:
         free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
         x, y = home.cells[len(home.cells) // 2].tolist()
-        found = found_in(home, home.mesh, (x, y, 0), Reach(0, 10**12, 4096))
-        assert found[y // 64, x // 64]
-        assert not (found & ~free).any()
+        in_view = mask_in_view(home, home.mesh, (x, y, 0), Reach(0, 10**12, 4096))
+        assert in_view[y // 64, x // 64]
+        assert not (in_view & ~free).any()
 
 
 def test_no_camera_in_a_wall_sees_a_cell() -> None:
     for x, y in [(128, 200), (600, 350), (0, 0), (-5, 9), (5000, 20)]:
-        assert not found_in(ROOM, ROOM.mesh, (x, y, 0), Reach(0, 10**9, 4096)).any()
+        assert not mask_in_view(ROOM, ROOM.mesh, (x, y, 0), Reach(0, 10**9, 4096)).any()
 
 
-def test_range_ends_are_in_view_and_what_is_nearer_is_not() -> None:
+def test_the_range_includes_its_ends_and_nothing_nearer() -> None:
     eye = (64 * 6 + 33, 64 * 3 + 33, 0)
 
-    found = found_in(ROOM, ROOM.mesh, eye, Reach(64**2, (2 * 64) ** 2, 1))
+    in_view = mask_in_view(ROOM, ROOM.mesh, eye, Reach(64**2, (2 * 64) ** 2, 1))
 
-    assert np.argwhere(found).tolist() == [[3, 7], [3, 8]]
+    assert np.argwhere(in_view).tolist() == [[3, 7], [3, 8]]
 
 
 def test_numbers_without_a_meaning_are_refused() -> None:

@@ -206,15 +206,15 @@ def test_vertices_seen_from_a_point_are_those_no_wall_blocks(
 
     for x, y in awkward_points(home, rng, 2).tolist():
         seen = vertices_seen_from_point(mesh, x, y)
-        found = [tuple(vertex) for vertex in mesh.vertices[seen].tolist()]
+        visible = [tuple(vertex) for vertex in mesh.vertices[seen].tolist()]
         if locate(mesh, x, y) == -1:
             expected = set()
         elif (x, y) in corners:
             expected = {(x, y)}
         else:
             expected = vertices_seen(home.walls, (x, y))
-        assert len(set(found)) == len(found)
-        assert expected == set(found)
+        assert len(set(visible)) == len(visible)
+        assert expected == set(visible)
 
 
 @quick
@@ -227,10 +227,10 @@ def test_vertices_seen_from_a_vertex_are_those_no_wall_blocks(
 
     for vertex in range(0, len(mesh.vertices), 3):
         seen = vertices_seen_from_vertex(mesh, vertex)
-        found = [tuple(other) for other in mesh.vertices[seen].tolist()]
+        visible = [tuple(other) for other in mesh.vertices[seen].tolist()]
         x, y = mesh.vertices[vertex].tolist()
-        assert len(set(found)) == len(found)
-        assert vertices_seen(home.walls, (x, y)) == set(found)
+        assert len(set(visible)) == len(visible)
+        assert vertices_seen(home.walls, (x, y)) == set(visible)
 
 
 def test_fans_list_each_triangle_at_its_three_corners() -> None:

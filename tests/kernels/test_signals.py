@@ -23,15 +23,15 @@ Track = list[tuple[int, int, int, bool]]
 
 
 def timelines_of(tracks: list[Track]) -> Timelines:
-    made = Timelines(len(tracks), STEP_US)
+    result = Timelines(len(tracks), STEP_US)
     for body, legs in enumerate(tracks):
         time = np.cumsum([0, *(leg[0] for leg in legs[1:])]) * STEP_US
         x, y, away = (np.array(column) for column in list(zip(*legs, strict=True))[1:])
         points = Breakpoints(
             time, x.astype(np.int64), y.astype(np.int64), np.zeros_like(time), away.astype(np.uint8)
         )
-        made.follow(body, 0, points, np.zeros(0, np.int64), np.zeros(1, np.int8))
-    return made
+        result.follow(body, 0, points, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    return result
 
 
 def poses_of(window: Window, body: int) -> list[slow.Pose]:
@@ -41,19 +41,19 @@ def poses_of(window: Window, body: int) -> list[slow.Pose]:
 
 
 def dense(stretches: tuple[np.ndarray, np.ndarray], end: int = STEPS) -> list[float]:
-    start, found = stretches
-    assert (found[1:] != found[:-1]).all(), "neighbours differ"
-    return np.repeat(found, np.diff(np.append(start, end))).tolist()
+    start, numbers = stretches
+    assert (numbers[1:] != numbers[:-1]).all(), "neighbours differ"
+    return np.repeat(numbers, np.diff(np.append(start, end))).tolist()
 
 
 def stretches(numbers: list[float]) -> tuple[np.ndarray, np.ndarray]:
     array = np.array(numbers)
-    kept = np.append(True, array[1:] != array[:-1])
-    return np.flatnonzero(kept), array[kept]
+    is_first = np.append(True, array[1:] != array[:-1])
+    return np.flatnonzero(is_first), array[is_first]
 
 
 @given(bodies)
-def test_distances_between_bodies_are_those_of_each_step(tracks: list[Track]) -> None:
+def test_distances_between_bodies_equal_each_step(tracks: list[Track]) -> None:
     window = timelines_of(tracks).window(0, STEPS)
     pairs = zip(poses_of(window, 0), poses_of(window, 1), strict=True)
     assert [slow.distance(*pair) for pair in pairs] == dense(
@@ -62,9 +62,7 @@ def test_distances_between_bodies_are_those_of_each_step(tracks: list[Track]) ->
 
 
 @given(bodies, st.lists(st.tuples(spot, spot, spot, spot), max_size=4))
-def test_distances_to_a_shape_are_those_of_each_step(
-    tracks: list[Track], boxes: list[slow.Edge]
-) -> None:
+def test_distances_to_a_shape_equal_each_step(tracks: list[Track], boxes: list[slow.Edge]) -> None:
     edges = [
         edge
         for x0, y0, x1, y1 in boxes
@@ -78,23 +76,25 @@ def test_distances_to_a_shape_are_those_of_each_step(
 
 @given(bodies, st.integers(1, STEPS - 1))
 def test_speeds_go_on_from_window_to_window(tracks: list[Track], cut: int) -> None:
-    made = timelines_of(tracks)
-    poses = poses_of(made.window(0, STEPS), 0)
+    timelines = timelines_of(tracks)
+    poses = poses_of(timelines.window(0, STEPS), 0)
     x, y, away = poses[cut - 1]
     nothing = np.zeros(0, np.int64)
-    first = signals.speeds(made.window(0, cut), 0, nothing)
-    second = signals.speeds(made.window(cut, STEPS), 0, np.array([x, y, away], np.int64))
-    found = dense(first, cut) + dense((second[0] - cut, second[1]), STEPS - cut)
-    assert [slow.speed(poses, step) for step in range(STEPS)] == found
+    first = signals.speeds(timelines.window(0, cut), 0, nothing)
+    second = signals.speeds(timelines.window(cut, STEPS), 0, np.array([x, y, away], np.int64))
+    speeds = dense(first, cut) + dense((second[0] - cut, second[1]), STEPS - cut)
+    assert [slow.speed(poses, step) for step in range(STEPS)] == speeds
 
 
 @given(values, st.integers(-6, 6), st.integers(0, 9), value, value)
-def test_the_greatest_value_of_a_window_is_that_of_its_steps(
+def test_the_greatest_value_of_a_window_equals_its_steps(
     numbers: list[float], low: int, length: int, before: float, after: float
 ) -> None:
     expected = slow.sliding_max(numbers, low, low + length, before, after)
-    found = signals.sliding_max(*stretches(numbers), len(numbers), low, low + length, before, after)
-    assert expected == dense(found, len(numbers))
+    result = signals.sliding_max(
+        *stretches(numbers), len(numbers), low, low + length, before, after
+    )
+    assert expected == dense(result, len(numbers))
 
 
 @given(st.lists(st.tuples(value, value), min_size=1, max_size=12), value)
@@ -103,8 +103,8 @@ def test_until_is_the_best_of_all_steps_to_wait_for(
 ) -> None:
     hold, goal = ([pair[i] for pair in pairs] for i in (0, 1))
     steps = np.arange(len(pairs))
-    found = signals.until(steps, np.array(hold), np.array(goal), after)
-    assert slow.until(hold, goal, after) == dense(found, len(pairs))
+    result = signals.until(steps, np.array(hold), np.array(goal), after)
+    assert slow.until(hold, goal, after) == dense(result, len(pairs))
 
 
 def test_wrong_stretches_are_refused() -> None:

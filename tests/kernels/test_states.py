@@ -28,12 +28,12 @@ class _Finder(pickle.Pickler):
 
     def __init__(self) -> None:
         super().__init__(io.BytesIO(), 5)
-        self.found: dict[str, Any] = {}
+        self.objects: dict[str, Any] = {}
 
     def persistent_id(self, obj: Any) -> Any:
         kind = type(obj)
         if kind.__module__ == "fleet2d._core" and kind.__name__ in KINDS:
-            self.found.setdefault(kind.__name__, obj)
+            self.objects.setdefault(kind.__name__, obj)
         return None
 
 
@@ -47,14 +47,14 @@ def originals() -> dict[str, Any]:
     finder.dump(run._state.bodies)
     space = next(iter(run.actors.values())).space
     finder.dump([space.mesh, space.routes])
-    found = finder.found
-    timelines = found["Timelines"]
-    found["Window"] = timelines.window(500, 600)
+    objects = finder.objects
+    timelines = objects["Timelines"]
+    objects["Window"] = timelines.window(500, 600)
     legs = _core.Legs()
     legs.mark(0, 5, 5, 0, 0)
     legs.walk(0, 0, np.array([[5, 5], [900, 5], [900, 900]], np.int64), 200.0, 1024.0)
-    found["Legs"] = legs
-    return found
+    objects["Legs"] = legs
+    return objects
 
 
 def arrays_in(state: Any, where: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:

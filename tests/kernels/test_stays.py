@@ -45,8 +45,8 @@ def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...
     )  # fmt: skip
     shown = random.choice([0, 0, 60, 60, 255], (count, patches)).astype(np.uint8)
     shown[:, -1] = 0
-    kept = random.random(count) < 0.5  # the view often stays as it was
-    for t in np.flatnonzero(kept[1:]) + 1:
+    is_same = random.random(count) < 0.5  # the view often stays as it was
+    for t in np.flatnonzero(is_same[1:]) + 1:
         shown[t] = shown[t - 1]
     seen = np.zeros((count, patches))
     for t in np.flatnonzero(random.random(count) < 0.4):

@@ -23,7 +23,7 @@ def random_costs(rng: np.random.Generator, shape: tuple[int, int], walls: float)
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 8), (14, 11)])
 @pytest.mark.parametrize("walls", [0.0, 0.2, 0.5])
-def test_cost_distance_is_that_of_brute_force(shape: tuple[int, int], walls: float) -> None:
+def test_cost_distance_equals_brute_force(shape: tuple[int, int], walls: float) -> None:
     rng = np.random.default_rng([*shape, int(10 * walls)])
     for _ in range(4):
         cost = random_costs(rng, shape, walls)
@@ -37,7 +37,7 @@ def test_cost_distance_is_that_of_brute_force(shape: tuple[int, int], walls: flo
             )  # known, though the rest may not be
 
 
-def test_way_down_costs_what_the_field_says_and_keeps_to_open_cells() -> None:
+def test_descending_path_costs_the_value_of_the_field_and_uses_open_cells() -> None:
     rng = np.random.default_rng(2)
     for _ in range(20):
         cost = random_costs(rng, (12, 15), 0.25)
@@ -59,7 +59,7 @@ def test_way_down_costs_what_the_field_says_and_keeps_to_open_cells() -> None:
             assert field[start] == total
 
 
-def test_without_costs_it_is_the_walking_distance() -> None:
+def test_without_costs_the_field_is_the_walking_distance() -> None:
     free = np.random.default_rng(7).random((40, 30)) < 0.8
     free[5, 5] = True
     plain = walking_distance(free, np.array([[5, 5]]))
@@ -67,7 +67,7 @@ def test_without_costs_it_is_the_walking_distance() -> None:
     assert np.array_equal(np.where(plain >= 0, plain * 200, -1), field)
 
 
-def test_goal_where_no_way_leads_is_reached_from_nowhere() -> None:
+def test_unreachable_goal_is_reached_from_nowhere() -> None:
     cost = np.full((3, 3), -1, np.int32)
     assert (cost_distance(cost, (1, 1), (0, 0)) == -1).all()
     assert descend(cost, cost_distance(cost, (1, 1), (0, 0)), (0, 0)).shape == (0, 2)
@@ -76,7 +76,7 @@ def test_goal_where_no_way_leads_is_reached_from_nowhere() -> None:
 @pytest.mark.parametrize(
     ("bx", "by"), [(700, 33), (33, 500), (741, 555), (600, 37), (33, 33), (65, 65)]
 )
-def test_leg_costs_the_same_both_ways_and_what_sampling_says(bx: int, by: int) -> None:
+def test_leg_costs_the_same_in_both_directions_and_as_by_sampling(bx: int, by: int) -> None:
     cost = random_costs(np.random.default_rng(3), (12, 20), 0.0)
     length = float(np.hypot(bx - 33, by - 33))
     shares = (np.arange(200_000) + 0.5) / 200_000
@@ -95,7 +95,7 @@ def test_leg_through_a_closed_cell_or_out_of_the_grid_is_none() -> None:
     assert leg_cost(cost, 33, 33, 64 * 20 + 5, 33) == np.inf
 
 
-def test_pulled_way_keeps_its_ends_and_is_never_dearer() -> None:
+def test_pulled_path_has_the_same_ends_and_never_costs_more() -> None:
     rng = np.random.default_rng(4)
     straight = 0
     for walls in (0.0, 0.1, 0.3):

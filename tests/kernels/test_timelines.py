@@ -204,8 +204,8 @@ class Moving(RuleBasedStateMachine):
         elif how == "deepcopy":
             self.timelines = copy.deepcopy(self.timelines)
         else:
-            kept = pickle.dumps(self.timelines)
-            self.timelines = pickle.loads(pickle.dumps(pickle.loads(kept)))
+            state = pickle.dumps(self.timelines)
+            self.timelines = pickle.loads(pickle.dumps(pickle.loads(state)))
 
     @invariant()
     def the_present_pose_is_known(self) -> None:
@@ -249,7 +249,7 @@ def resting(bodies: int = 1) -> Timelines:
     return timelines
 
 
-def test_who_rests_for_ten_years_has_one_run() -> None:
+def test_resting_for_ten_years_is_one_run() -> None:
     window = resting(3).window(0, 10 * 365 * 86_400_000)
     assert [0, 1, 2, 3] == window.start.tolist()
     assert [5, 5, 5] == window.x.tolist()
@@ -267,7 +267,7 @@ def test_a_window_of_nobody_has_no_runs() -> None:
 
 
 @pytest.mark.parametrize("name", ["start", "step", "x", "y", "heading", "away", "posture"])
-def test_arrays_of_a_window_can_not_be_written_to_and_outlive_it(name: str) -> None:
+def test_arrays_of_a_window_are_read_only_and_outlive_it(name: str) -> None:
     array = getattr(resting(500).window(3, 9), name)
     before = array.tolist()
     gc.collect()
@@ -320,30 +320,30 @@ def test_timelines_keep_the_meshes_of_walks_alive() -> None:
     assert 200 == len(dense(again.window(0, 200), 0, 0, 200))
 
 
-def test_meshes_are_let_go_with_the_walks_that_needed_them() -> None:
+def test_meshes_are_freed_with_their_walks() -> None:
     """Doors that open and shut make many of them in a month."""
     timelines, rule_ = resting(2), WalkRule(np.uint64(5), 9000, 40_000, 500)
     meshes = [home_of([shapely.box(0, 0, 1280, 900 + 2 * i)]).mesh for i in range(4)]
 
-    def kept() -> list[int]:
+    def reference_counts() -> list[int]:
         return [sys.getrefcount(mesh) for mesh in meshes]
 
-    free = kept()
+    free = reference_counts()
     timelines.walk(0, 0, meshes[0], meshes[1], rule_, (221, 333, 77))
     timelines.walk(1, 5, meshes[0], meshes[0], rule_, (221, 333, 77))
     timelines.walk(0, 10, meshes[2], meshes[3], rule_, (221, 333, 77))
     timelines.pose(0, 30)
     for before, used in ((9, [1, 1, 1, 1]), (10, [1, 0, 1, 1]), (50, [1, 0, 1, 1])):
         timelines.forget(before)
-        assert used == [now - then for now, then in zip(kept(), free, strict=True)]
+        assert used == [now - then for now, then in zip(reference_counts(), free, strict=True)]
     expected = timelines.window(50, 90)
     again = pickle.loads(pickle.dumps(timelines)).window(50, 90)
     assert runs_of(expected, 0) == runs_of(again, 0)
     del timelines
-    assert free == kept()
+    assert free == reference_counts()
 
 
-def test_a_copy_goes_its_own_way() -> None:
+def test_copies_are_independent() -> None:
     timelines = resting()
     twin = copy.deepcopy(timelines)
     track = breakpoints([(0, 50, 60, 70, 1)])
@@ -408,7 +408,7 @@ TRACK = breakpoints([(0, 5, 6, 7, 0), (10, 6, 6, 7, 0)])
         (lambda timelines: Timelines(1, 0), "1 or more"),
     ],
 )
-def test_what_has_no_meaning_is_refused_and_changes_nothing(
+def test_invalid_calls_are_refused_and_change_nothing(
     do: Callable[[Timelines], None], message: str
 ) -> None:
     timelines = resting()
@@ -425,7 +425,7 @@ def test_a_body_without_a_motion_yet_is_nowhere() -> None:
 
 
 @pytest.mark.parametrize("walks", [False, True])
-def test_what_is_forgotten_is_refused(walks: bool) -> None:
+def test_forgotten_steps_are_refused(walks: bool) -> None:
     timelines = resting()
     (walk() if walks else follow(step=4))(timelines)
     timelines.pose(0, 30)
@@ -441,7 +441,7 @@ def test_what_is_forgotten_is_refused(walks: bool) -> None:
 
 @pytest.mark.parametrize("bodies", [0, 1, 3])
 @pytest.mark.parametrize("steps", [0, 1, 9])
-def test_a_window_that_was_written_is_read_as_it_was(bodies: int, steps: int) -> None:
+def test_a_pickled_window_is_restored(bodies: int, steps: int) -> None:
     rng = np.random.default_rng(steps)
     columns = (rng.integers(0, 2, (bodies, steps)).astype(t) for t in POSE_TYPES)
     window = Window(7, *columns)
@@ -476,12 +476,12 @@ def test_states_that_no_window_has_are_refused(changes: dict[str, Any], message:
     types = [int, int, np.int64, np.int64, *POSE_TYPES]
 
     def read(parts: dict[str, Any]) -> Window:
-        made = Window.__new__(Window)
+        window = Window.__new__(Window)
         values = (
             v if t is int else np.array(v, t) for v, t in zip(parts.values(), types, strict=True)
         )
-        made.__setstate__(tuple(values))
-        return made
+        window.__setstate__(tuple(values))
+        return window
 
     assert [(7, (2, 2, 2, 2, 2)), (8, (3, 3, 3, 3, 3))] == runs_of(read(state), 1)
     with pytest.raises(ValueError, match=message):

@@ -164,26 +164,26 @@ TWO = [
 @pytest.mark.parametrize(("every", "slots"), [(1, 64), (1, 2), (3, 8)])
 @pytest.mark.parametrize("ends", [[], [1, 2, 17, 18, 40]], ids=["whole", "in spans"])
 @pytest.mark.parametrize("body", [None, 2], ids=["alone", "among others"])
-def test_what_was_seen_is_what_brute_force_sees(
+def test_sight_record_equals_brute_force(
     cameras: Any, every: int, slots: int, ends: list[int], body: int | None
 ) -> None:
     poses = random_poses(np.random.default_rng(len(cameras)), 60)
     lenses = lenses_of(*cameras)
 
     expected = by_brute_force(poses, lenses, every)
-    found = by_kernel(poses, lenses, every, slots, ends, body)
+    result = by_kernel(poses, lenses, every, slots, ends, body)
 
-    assert expected.exposure == found.exposure
-    assert expected.binned == found.binned
-    assert expected.most == found.most
-    assert np.array_equal(expected.first, found.first)
-    assert np.array_equal(expected.last, found.last)
+    assert expected.exposure == result.exposure
+    assert expected.binned == result.binned
+    assert expected.most == result.most
+    assert np.array_equal(expected.first, result.first)
+    assert np.array_equal(expected.last, result.last)
     assert (expected.first >= 0).sum() > 20
 
 
 @quick
 @given(seeds(), st.sampled_from([ONE, TWO]), st.integers(1, 4), st.lists(st.integers(1, 59)))
-def test_what_is_seen_in_spans_is_what_brute_force_sees(
+def test_sight_record_in_spans_equals_brute_force(
     seed: int, cameras: Any, every: int, cuts: list[int]
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -191,9 +191,9 @@ def test_what_is_seen_in_spans_is_what_brute_force_sees(
     slots = int(rng.choice([2, 4, 64]))
 
     expected = by_brute_force(poses, lenses, every)
-    found = by_kernel(poses, lenses, every, slots, sorted(set(cuts)))
+    result = by_kernel(poses, lenses, every, slots, sorted(set(cuts)))
 
-    for one, other in zip(expected, found, strict=True):
+    for one, other in zip(expected, result, strict=True):
         assert np.array_equal(one, other)
 
 

@@ -41,18 +41,18 @@ def name_of(value: Any, missing: str) -> str:
     return value if isinstance(value, str) else missing
 
 
-def test_precision_and_confusion_are_those_of_the_stored_rows(stored: Run) -> None:
+def test_precision_and_confusion_equal_the_stored_rows(stored: Run) -> None:
     rows = table(stored, "observations", robot="astro")
     true = np.array([name_of(v, "nobody") for v in rows["true_user"]])
-    found = np.array([name_of(v, "unknown") for v in rows["user"]])
+    perceived = np.array([name_of(v, "unknown") for v in rows["user"]])
     result = stored.metrics["detections"]["astro"]
     assert (true != "nobody").mean() == pytest.approx(result["precision"])
     real = true != "nobody"
-    assert (true == found)[real].mean() == pytest.approx(result["recognized"])
+    assert (true == perceived)[real].mean() == pytest.approx(result["recognized"])
     for who, shares in result["confusion"].items():
-        for taken in ("ana", "ben", "cleo", "unknown"):
-            expected = (found[true == who] == taken).mean()
-            assert expected == pytest.approx(shares.get(taken, 0.0)), (who, taken)
+        for identity in ("ana", "ben", "cleo", "unknown"):
+            expected = (perceived[true == who] == identity).mean()
+            assert expected == pytest.approx(shares.get(identity, 0.0)), (who, identity)
 
 
 def test_recall_and_confusion_are_those_configured(stored: Run) -> None:

@@ -61,9 +61,11 @@ def test_room_share_per_period_is_stored(stored: Run) -> None:
         for user, lived in everybody.items():
             part = [("away" if row["away"] else row["room"]) for row in lived[first:end]]
             mine = (shares["step"] == end - 1) & (shares["user"] == user)
-            found = dict(zip(shares["room"][mine], shares["share"][mine], strict=True))
-            assert 7 == len(found)
-            assert found == {room: pytest.approx(part.count(room) / len(part)) for room in found}
+            share_by_room = dict(zip(shares["room"][mine], shares["share"][mine], strict=True))
+            assert 7 == len(share_by_room)
+            assert share_by_room == {
+                room: pytest.approx(part.count(room) / len(part)) for room in share_by_room
+            }
 
 
 @pytest.mark.parametrize("user", ["ana", "ben"])
@@ -74,7 +76,7 @@ def test_sightings_are_the_share_of_steps_at_home_with_a_detection(stored: Run, 
     assert stored.metrics["sightings"][user] == pytest.approx(len(seen) / len(at_home), rel=1e-12)
 
 
-def test_who_was_never_at_home_has_no_share_of_sightings(stored: Run) -> None:
+def test_users_who_were_never_at_home_have_no_share_of_sightings(stored: Run) -> None:
     assert "gone" not in stored.metrics["sightings"]
     assert {"away": 1.0} == stored.metrics["room_share"]["gone"]
 
@@ -103,7 +105,7 @@ def test_metrics_of_a_run_without_users_are_empty() -> None:
     assert {"room_share": {}, "sightings": {}} == empty.metrics
 
 
-def test_metrics_of_a_run_cut_short_are_of_what_was_simulated() -> None:
+def test_metrics_of_an_interrupted_run_are_of_the_simulated_steps() -> None:
     simulation = fleet2d.Simulation(content())
     simulation.advance(90)
     metrics = simulation.finish().metrics

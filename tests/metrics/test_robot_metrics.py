@@ -102,12 +102,12 @@ def test_intrusion_is_the_time_in_each_zone_without_a_wall_between(stored: Run) 
     near = np.flatnonzero(gap < 3.6)
     ends = np.stack([np.stack([p["x"], p["y"]], axis=1)[near] for p in (one, other)], axis=1)
     clear = shapely.contains_properly(space, shapely.linestrings(ends))
-    found = stored.metrics["intrusion"]["bolt"]["ben"]
+    result = stored.metrics["intrusion"]["bolt"]["ben"]
     for zone, low, high in (("intimate", 0, 0.45), ("personal", 0.45, 1.2), ("social", 1.2, 3.6)):
         minutes = (clear & (gap[near] >= low) & (gap[near] < high)).sum() / 60
         # A line that all but touches a corner may be told otherwise.
-        assert found[zone] == pytest.approx(minutes / (6000 / 86400), abs=0.05 * 14.4)
-    assert found["social"] > 10
+        assert result[zone] == pytest.approx(minutes / (6000 / 86400), abs=0.05 * 14.4)
+    assert result["social"] > 10
 
 
 def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored: Run) -> None:
@@ -116,14 +116,14 @@ def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored:
     for k in range(1, len(gap)):
         moves = (ben["x"][k], ben["y"][k]) != (ben["x"][k - 1], ben["y"][k - 1])
         steps.append(bool(moves and (gap[k] < 0.4 or gap[k - 1] < 0.4)))
-    found = stored.metrics["blocking"]["bolt"]["ben"]
+    result = stored.metrics["blocking"]["bolt"]["ben"]
     assert sum(steps) > 3
-    assert found["seconds"] == pytest.approx(sum(steps) * 14.4)
-    assert found["blocks"] == pytest.approx(sum(1 for hit, _ in groupby(steps) if hit) * 14.4)
+    assert result["seconds"] == pytest.approx(sum(steps) * 14.4)
+    assert result["blocks"] == pytest.approx(sum(1 for hit, _ in groupby(steps) if hit) * 14.4)
 
 
 @pytest.mark.parametrize("period", ["7 min", "1 d"])
-def test_who_steps_aside_for_a_robot_is_counted(period: str) -> None:
+def test_users_who_step_aside_for_a_robot_are_counted(period: str) -> None:
     stands = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [3.0, 3.1]}]}]}
     polite = {"type": "reactions", "manners": {"steps_aside": 1, "turns": 0}}
     to_and_fro = {"type": "patrol", "waypoints": [[1.0, 3.1], [4.5, 3.1]], "dwell": "1 min"}
@@ -135,8 +135,8 @@ def test_who_steps_aside_for_a_robot_is_counted(period: str) -> None:
     stored = run(crossing)
     aside = [row for row in events(stored, "ana") if row[2] == "steps aside for astro"]
     assert len(aside) > 3
-    found = stored.metrics["blocking"]["astro"]["ana"]
-    assert found["asides"] == pytest.approx(len(aside) * 14.4)
+    result = stored.metrics["blocking"]["astro"]["ana"]
+    assert result["asides"] == pytest.approx(len(aside) * 14.4)
 
 
 def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
@@ -146,47 +146,47 @@ def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
         if sum(1 for _ in steps) >= 60:
             rests.append(place)
     moves = sum(np.hypot(a[0] - b[0], a[1] - b[1]) > 0.5 for a, b in pairwise(rests))
-    found = stored.metrics["travel"]["astro"]
+    result = stored.metrics["travel"]["astro"]
     assert moves > 10
-    assert found["relocations"] == pytest.approx(moves * 14.4)
+    assert result["relocations"] == pytest.approx(moves * 14.4)
     metres = np.hypot(np.diff(astro["x"]), np.diff(astro["y"])).sum()
-    assert found["metres"] == pytest.approx(metres * 14.4)
+    assert result["metres"] == pytest.approx(metres * 14.4)
 
 
-def test_reach_time_is_the_way_at_call_times_divided_by_speed(stored: Run) -> None:
+def test_reach_time_is_the_distance_at_call_times_divided_by_speed(stored: Run) -> None:
     home_steps = np.flatnonzero(~poses(stored, "ana")["away"])
     calls = [k for k in range(0, 6000, 600) if k in set(home_steps.tolist())]
-    found = stored.metrics["reach_time"]["astro"]["ana"]
-    assert len(calls) == found["calls"]
+    result = stored.metrics["reach_time"]["astro"]["ana"]
+    assert len(calls) == result["calls"]
     straight = gaps(stored, "astro", "ana")[calls] / 0.6
-    assert straight.mean() <= found["mean"] <= 3 * straight.mean()
-    assert found["mean"] <= found["p90"]
+    assert straight.mean() <= result["mean"] <= 3 * straight.mean()
+    assert result["mean"] <= result["p90"]
 
 
-def test_coverage_is_what_the_layer_says_at_the_end(stored: Run) -> None:
-    found = stored.metrics["coverage"]["astro"]
-    assert 0.5 < found["share"] < 1
-    assert 0 < found["half_h"] <= 1.67
+def test_coverage_follows_from_the_layer_at_the_end(stored: Run) -> None:
+    result = stored.metrics["coverage"]["astro"]
+    assert 0.5 < result["share"] < 1
+    assert 0 < result["half_h"] <= 1.67
     rows = table(stored, "coverage", robot="astro")
     assert rows["share"].tolist() == sorted(rows["share"].tolist())
-    assert rows["share"][-1] == pytest.approx(found["share"])
+    assert rows["share"][-1] == pytest.approx(result["share"])
 
 
-def test_battery_tells_the_lowest_charge_and_the_dockings(stored: Run) -> None:
-    found = stored.metrics["battery"]["astro"]
+def test_battery_has_the_lowest_charge_and_the_dockings(stored: Run) -> None:
+    result = stored.metrics["battery"]["astro"]
     told_ = [
         (step, name, float(d.split()[0]))
         for step, name, d in events(stored)
         if name in ("battery", "docks", "charged")
     ]
-    assert found["lowest"] == pytest.approx(min(level for *_, level in told_) / 100)
+    assert result["lowest"] == pytest.approx(min(level for *_, level in told_) / 100)
     docks = [step for step, name, _ in told_ if name == "docks"]
-    assert found["dockings"] == pytest.approx(len(docks) * 14.4)
-    assert 0 < found["charging"] < 1
+    assert result["dockings"] == pytest.approx(len(docks) * 14.4)
+    assert 0 < result["charging"] < 1
     assert {"astro"} == set(stored.metrics["battery"])
 
 
-def test_time_to_find_tells_outcomes_and_times(stored: Run) -> None:
+def test_time_to_find_has_outcomes_and_times(stored: Run) -> None:
     rows = table(stored, "time_to_find", robot="astro")
     begun = [step for step, name, _ in events(stored) if name == "find_begins"]
     ends = [
@@ -200,14 +200,14 @@ def test_time_to_find_tells_outcomes_and_times(stored: Run) -> None:
     home = rows["at_home"]
     assert home.any()
     assert (~home).any()
-    found = stored.metrics["time_to_find"]["astro"]
-    assert found["success"] == pytest.approx((rows["end"][home] == "found").mean())
-    assert found["out_told"] == pytest.approx((rows["end"][~home] == "not_at_home").mean())
-    assert 0 < found["spl"] <= 1 <= found["ratio"]
-    assert found["median"] <= found["p90"] if "p90" in found else True
+    result = stored.metrics["time_to_find"]["astro"]
+    assert result["success"] == pytest.approx((rows["end"][home] == "found").mean())
+    assert result["out_told"] == pytest.approx((rows["end"][~home] == "not_at_home").mean())
+    assert 0 < result["spl"] <= 1 <= result["ratio"]
+    assert result["median"] <= result["p90"] if "p90" in result else True
 
 
-def test_a_search_that_the_run_ends_is_cut_short_there() -> None:
+def test_a_search_at_the_end_of_the_run_is_censored() -> None:
     cut = content("1 d")
     cut["simulation"]["duration"] = "9 min 30 s"
     cut["users"]["ana"] = {
@@ -217,11 +217,11 @@ def test_a_search_that_the_run_ends_is_cut_short_there() -> None:
     del cut["robots"]["astro"]["battery"]
     find = {"type": "find", "user": "ana", "every": "9 min", "source": "rtp", "policy": "random"}
     cut["robots"]["astro"]["behaviors"] = [find, {"type": "patrol", "waypoints": [[1.0, 3.0]]}]
-    found = run(cut).metrics["time_to_find"]["astro"]
-    assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0} == found
+    result = run(cut).metrics["time_to_find"]["astro"]
+    assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0} == result
 
 
-def test_who_is_told_not_to_be_at_home_but_is_counts_as_a_false_verdict() -> None:
+def test_a_wrong_verdict_not_at_home_is_counted() -> None:
     hidden = content("1 d")
     hidden["users"]["ana"] = {
         "type": "schedule",
@@ -231,19 +231,19 @@ def test_who_is_told_not_to_be_at_home_but_is_counts_as_a_false_verdict() -> Non
     hidden["objects"] = {"gate": gate}
     find = {"type": "find", "user": "ana", "every": "40 min", "out": 0.9, "deadline": "30 min"}
     hidden["robots"]["astro"]["behaviors"] = ["dock", find]
-    found = run(hidden).metrics["time_to_find"]["astro"]
-    assert (2, 2, 0.0) == (found["searches"], found["false_out"], found["success"])
+    result = run(hidden).metrics["time_to_find"]["astro"]
+    assert (2, 2, 0.0) == (result["searches"], result["false_out"], result["success"])
 
 
-def test_a_battery_that_runs_empty_is_told() -> None:
+def test_a_battery_that_runs_empty_is_reported() -> None:
     empty = content("1 d")
     empty["robots"]["astro"]["behaviors"] = [{"type": "dock", "threshold": 0.01}, "meander"]
     empty["robots"]["astro"]["battery"] = {**BATTERY, "charger": [7.0, 6.0]}
     stored = run(empty)
     step = next(step for step, _, detail in events(stored) if detail == "0.0 %")
-    found = stored.metrics["battery"]["astro"]
-    assert found["empty"] == pytest.approx(1 - step / 6000)
-    assert 0 == found["lowest"]
+    result = stored.metrics["battery"]["astro"]
+    assert result["empty"] == pytest.approx(1 - step / 6000)
+    assert 0 == result["lowest"]
 
 
 @pytest.mark.parametrize("name", [*METRICS, "detections"])
@@ -273,13 +273,13 @@ def test_kaplan_meier_is_the_product_over_times(rows: list[tuple[int, bool]]) ->
 
 
 @given(st.lists(st.integers(1, 50), min_size=1, max_size=30))
-def test_without_cuts_it_is_the_sample(times: list[int]) -> None:
+def test_without_censoring_the_estimate_equals_the_sample(times: list[int]) -> None:
     curve = kaplan_meier([float(t) for t in times], [True] * len(times))
     assert restricted_mean(curve, 60.0) == pytest.approx(np.mean(times))
     assert quantile(curve, 0.5) == pytest.approx(np.quantile(times, 0.5, method="inverted_cdf"))
 
 
-def test_what_never_happens_has_no_median_and_the_deadline_for_a_mean() -> None:
+def test_events_that_never_happen_have_no_median_and_the_deadline_as_mean() -> None:
     curve = kaplan_meier([10.0, 10.0], [False, False])
     assert quantile(curve, 0.5) is None
     assert 10.0 == restricted_mean(curve, 10.0)
@@ -292,32 +292,32 @@ class Diary(Metric):
     """Keeps what plans said happened, period by period."""
 
     def start(self, home: Any) -> None:
-        self.found: list[list[Any]] = []
+        self.events: list[list[Any]] = []
 
     def update(self, history: Any, state: Any) -> None:
-        self.found += [list(event) for event in history.events]
+        self.events += [list(event) for event in history.events]
 
     def result(self) -> dict[str, Any]:
-        return {"events": self.found}
+        return {"events": self.events}
 
 
 @pytest.mark.parametrize("period", ["1 s", "7 min", "1 d"])
 def test_history_has_the_events_of_the_table(period: str) -> None:
-    told_events = content()
-    told_events["simulation"]["duration"] = "40 min"
-    told_events["metrics"] = {"diary": {"type": f"{__name__}:Diary", "period": period}}
-    stored = run(told_events)
+    scenario_content = content()
+    scenario_content["simulation"]["duration"] = "40 min"
+    scenario_content["metrics"] = {"diary": {"type": f"{__name__}:Diary", "period": period}}
+    stored = run(scenario_content)
     rows = table(stored, "events")
     sights = np.isin(rows["event"], ["user_seen", "user_lost"])
     rows["detail"] = np.where(sights, rows["user"], rows["detail"])
     columns = [rows[name].tolist() for name in ("step", "entity", "event", "detail")]
     expected = [list(row) for row in zip(*columns, strict=True)]
-    found = stored.metrics["diary"]["events"]
+    events = stored.metrics["diary"]["events"]
     assert len(expected) > 10
     assert sights.any()
     # Rows of one step and body may be stored in another order.
-    assert sorted(map(str, expected)) == sorted(map(str, found))
-    assert [row[0] for row in found] == sorted(row[0] for row in found)
+    assert sorted(map(str, expected)) == sorted(map(str, events))
+    assert [row[0] for row in events] == sorted(row[0] for row in events)
 
 
 class Listener(Algorithm):

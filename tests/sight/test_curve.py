@@ -43,13 +43,11 @@ def test_a_table_is_straight_between_its_rows_and_level_outside(
 
 @quick
 @given(st.floats(-20, 20), st.floats(0.01, 5), SHARE, st.floats(-30, 30))
-def test_a_logistic_is_that_of_its_formula(
-    midpoint: float, width: float, top: float, x: float
-) -> None:
-    found = Curve(midpoint=midpoint, width=width, top=top).at(x)
+def test_a_logistic_equals_its_formula(midpoint: float, width: float, top: float, x: float) -> None:
+    values = Curve(midpoint=midpoint, width=width, top=top).at(x)
     step = (Decimal(x) - Decimal(midpoint)) / Decimal(width)
     expected = Decimal(top) / (1 + step.exp()) if step < 200 else Decimal(0)
-    assert float(expected) == pytest.approx(found, abs=1e-12)
+    assert float(expected) == pytest.approx(values, abs=1e-12)
 
 
 def test_a_number_is_the_same_everywhere_and_may_be_a_percentage() -> None:
@@ -65,7 +63,7 @@ def test_two_rows_of_no_width_are_no_table() -> None:
 @pytest.mark.parametrize(
     "data", [[], {}, {"midpoint": 3}, {"width": 1}, {"points": [[0, 1]], "midpoint": 1, "width": 1}]
 )
-def test_what_is_neither_a_table_nor_a_logistic_is_refused(data: Any) -> None:
+def test_curves_that_are_neither_tables_nor_logistic_are_refused(data: Any) -> None:
     with pytest.raises(ValidationError):
         Curve.model_validate(data)
 
@@ -83,7 +81,7 @@ def test_chances_are_shares_of_2_to_the_31() -> None:
     assert ONE == chance(1.0)
 
 
-def test_the_day_ends_where_it_begins() -> None:
+def test_a_daily_curve_is_periodic() -> None:
     """Light at 23:30 and at 0:30 lies on the straight line from the last row to the first."""
     day = Curve.model_validate([[6, 0.2], [18, 1.0]]).around_the_clock()
     assert [0.6, 0.6] == pytest.approx([day.at(0), day.at(12)])
@@ -96,11 +94,11 @@ def test_rows_at_both_ends_of_the_day_make_it_jump_at_midnight() -> None:
     assert [0.5, 0.999, 0.001] == pytest.approx([day.at(12), day.at(23.976), day.at(0.024)])
 
 
-def test_a_single_row_holds_all_day() -> None:
+def test_a_single_row_is_used_all_day() -> None:
     assert 0.4 == Curve.model_validate([[12, 0.4]]).around_the_clock().at(3)
 
 
-def test_decay_halves_as_it_should_and_ends_at_nothing() -> None:
+def test_decay_halves_at_the_half_life_and_ends_at_0() -> None:
     assert np.exp(-0.7) == pytest.approx(decay(Decimal("0.7")), rel=1e-15)
     assert 0 == chance(decay(Decimal(10**9)))
 
@@ -108,6 +106,6 @@ def test_decay_halves_as_it_should_and_ends_at_nothing() -> None:
 @quick
 @given(st.dictionaries(st.sampled_from("abcd"), st.floats(0, 0.25)))
 def test_cumulative_probabilities_ascend_to_their_sum(weights: dict[str, float]) -> None:
-    found = cumulative(weights, "abcd")
-    assert sorted(found) == found
-    assert found[-1] == pytest.approx(sum(weights.values()) * ONE, abs=1)
+    sums = cumulative(weights, "abcd")
+    assert sorted(sums) == sums
+    assert sums[-1] == pytest.approx(sum(weights.values()) * ONE, abs=1)

@@ -87,13 +87,13 @@ def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home, tmp_
             expected = LineOfSight().cells(home, *pose, reach)
             for method in (*exact_methods(tmp_path), flashlight):
                 assert np.array_equal(expected, method.cells(home, *pose, reach)), method
-            found = flashlight.sees(home, *pose, reach, centres)
-            assert np.array_equal(expected.ravel(), found)
+            in_view = flashlight.sees(home, *pose, reach, centres)
+            assert np.array_equal(expected.ravel(), in_view)
             nearby = centres + np.random.default_rng(1).integers(-33, 31, centres.shape)
-            assert np.array_equal(found, flashlight.sees(home, *pose, reach, nearby))
+            assert np.array_equal(in_view, flashlight.sees(home, *pose, reach, nearby))
 
 
-def test_flashlight_keeps_no_more_than_its_memory_and_answers_the_same(home: Home) -> None:
+def test_flashlight_stays_within_its_memory_and_gives_the_same_results(home: Home) -> None:
     small, large = Flashlight(memory_mb=0.01), Flashlight()
     poses = some_poses(home, 60)
     reach = some_reaches()[0]
@@ -146,7 +146,7 @@ def test_file_is_written_once_and_read_by_others(home: Home, tmp_path: Path) -> 
     ],
     ids=["empty", "other", "cut off", "of floats", "too short"],
 )
-def test_damaged_file_is_an_error_that_says_what_to_do(
+def test_damaged_file_is_an_error_that_tells_what_to_do(
     home: Home, tmp_path: Path, damage: Any
 ) -> None:
     VisibilityPolygon(precompute="file", path=tmp_path).start(home)
@@ -182,7 +182,7 @@ class XRay(FieldOfView):
         return np.ones(len(points), np.bool_)
 
 
-def test_own_method_needs_only_what_is_visible(home: Home) -> None:
+def test_own_method_needs_only_visible(home: Home) -> None:
     pose, reach = some_poses(home, 1)[0], some_reaches()[0]
     cells = XRay().cells(home, *pose, reach)
 
@@ -190,7 +190,7 @@ def test_own_method_needs_only_what_is_visible(home: Home) -> None:
     assert {"flashlight", "line_of_sight", "visibility_polygon"} <= set(components("sight"))
 
 
-def test_flashlight_takes_the_memory_that_it_says(home: Home) -> None:
+def test_flashlight_uses_the_memory_that_it_reports(home: Home) -> None:
     flashlight, reach = Flashlight(), Reach(0, 5760**2, 1229)
     poses = [(x, y, heading) for x, y, heading in some_poses(home, 400) if x > 0]
     flashlight.cells(home, *poses[0], reach)
@@ -198,7 +198,7 @@ def test_flashlight_takes_the_memory_that_it_says(home: Home) -> None:
     tracemalloc.start()
     for pose in poses:
         flashlight.cells(home, *pose, reach)
-    taken, _ = tracemalloc.get_traced_memory()
+    bytes_used, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
 
-    assert taken == pytest.approx(flashlight.cache_size[1], rel=0.15)
+    assert bytes_used == pytest.approx(flashlight.cache_size[1], rel=0.15)

@@ -34,9 +34,9 @@ FACING = RNG.uniform(-180, 180, N)
 def noticed(watch: Watch, user: int = 0) -> npt.NDArray[np.bool_]:
     """Return for each step whether a user is noticed."""
     rows = watch.look()
-    found = np.zeros(watch.users.shape[1], bool)
-    found[rows[rows[:, USER] == user, STEP] - watch.first] = True
-    return found
+    result = np.zeros(watch.users.shape[1], bool)
+    result[rows[rows[:, USER] == user, STEP] - watch.first] = True
+    return result
 
 
 def check_by(
@@ -58,18 +58,18 @@ def check_by(
 TABLE = [[1, 0.95], [3, 0.8], [4, 0.3], [8, 0.1]]
 
 
-def test_detection_falls_with_distance_as_its_table_says() -> None:
+def test_detection_falls_with_distance_like_its_table() -> None:
     hits = noticed(Watch(around(DISTANCE, BEARING), perception={"detection": {"distance": TABLE}}))
     check_by(DISTANCE, range(1, 9), hits, np.interp(DISTANCE, *np.array(TABLE).T))
 
 
-def test_detection_falls_with_distance_as_its_logistic_says() -> None:
+def test_detection_falls_with_distance_like_its_logistic() -> None:
     curve = {"midpoint": 4, "width": 0.6, "top": 0.9}
     hits = noticed(Watch(around(DISTANCE, BEARING), perception={"detection": {"distance": curve}}))
     check_by(DISTANCE, range(1, 9), hits, 0.9 / (1 + np.exp((DISTANCE - 4) / 0.6)))
 
 
-def test_detection_left_and_right_of_the_axis_is_told_apart() -> None:
+def test_detection_can_differ_left_and_right_of_the_axis() -> None:
     """Left, counter-clockwise, is positive: a sign error would swap 0.9 and 0.2."""
     table = [[-60, 0.2], [0, 0.5], [60, 0.9]]
     watch = Watch(around(DISTANCE, BEARING), perception={"detection": {"bearing": table}})
@@ -92,7 +92,7 @@ def test_bearing_is_from_where_the_camera_looks(heading: float) -> None:
     check_by(off_axis, [-90, -45, 0, 45, 90], noticed(watch), expected)
 
 
-def test_a_curve_of_bearing_without_negative_angles_holds_for_both_sides() -> None:
+def test_a_curve_of_bearing_without_negative_angles_is_used_for_both_sides() -> None:
     table = [[0, 0.9], [54, 0.2]]
     watch = Watch(around(DISTANCE, BEARING), perception={"detection": {"bearing": table}})
     expected = np.interp(np.abs(BEARING), *np.array(table, float).T)
@@ -137,7 +137,7 @@ def test_detection_follows_the_light_of_the_day() -> None:
     check_by(hour, [2, 6, 7, 8, 14, 20, 21, 22], noticed(watch), expected)
 
 
-def test_detection_falls_with_what_a_pillar_hides_of_a_body() -> None:
+def test_detection_falls_with_the_part_of_a_body_that_a_pillar_hides() -> None:
     count = 12
     distance, bearing = RNG.uniform(3, 5, N), RNG.uniform(0, 35, N)
     users = around(distance, bearing)
@@ -191,7 +191,7 @@ def test_all_factors_multiply() -> None:
 
 
 @pytest.mark.parametrize(("memory", "period", "step_s"), [(20, 1, 1), (20, 3, 0.5), (0.8, 1, 0.1)])
-def test_misses_come_in_runs_as_their_time_constant_says(
+def test_misses_are_correlated_with_their_time_constant(
     memory: float, period: int, step_s: float
 ) -> None:
     """The chance to stay as before is that of a two-state Markov chain."""
@@ -267,7 +267,7 @@ def test_false_positives_come_at_their_rate_whatever_the_period_and_the_step() -
     assert (rows[:, STEP] % 4 == 0).all()
 
 
-def test_false_positives_are_uniform_over_what_is_in_view() -> None:
+def test_false_positives_are_uniform_over_the_view() -> None:
     rows = ghosts(perception={"false_positives": {"per_hour": 1800}}, walls=hall(PILLAR))
     xy = rows[:, [X, Y]] / UNITS_PER_M
     eye = np.array([SIDE_M / 2] * 2)
@@ -293,7 +293,7 @@ def test_false_positives_are_uniform_over_what_is_in_view() -> None:
         assert agree(inside, area.mean(), z=5)
 
 
-def test_false_positives_at_a_spot_come_only_while_it_is_in_view() -> None:
+def test_false_positives_at_a_spot_occur_only_while_it_is_in_view() -> None:
     robot = np.tile([SIDE_M / 2, SIDE_M / 2, 0.0], (N, 1))
     robot[N // 2 :, 2] = 180
     spots = [
@@ -311,7 +311,7 @@ def test_false_positives_at_a_spot_come_only_while_it_is_in_view() -> None:
         assert abs(offset[:, axis].std() / 0.1 - 1) < 5 / np.sqrt(2 * len(rows))
 
 
-def test_false_positives_look_like_whom_they_should() -> None:
+def test_false_positives_have_the_configured_identities() -> None:
     users = np.concatenate([NOBODY_THERE] * 3)
     perception = {"false_positives": {"per_hour": 900, "looks_like": {"cleo": 0.5, "ana": 0.2}}}
     rows = Watch(users, camera={"range": [1, 3]}, perception=perception).look()
@@ -334,7 +334,7 @@ def test_users_are_recognized_mistaken_or_unknown_by_distance() -> None:
         check_by(distance, edges, rows[:, IDENTITY] == who, share)
 
 
-def test_users_are_mistaken_as_the_confusion_matrix_says() -> None:
+def test_users_are_mistaken_like_the_confusion_matrix() -> None:
     """No row is like a column: a transposed matrix would fail."""
     shares = {
         "ana": {"ben": 0.7, "cleo": 0.3},
@@ -347,11 +347,11 @@ def test_users_are_mistaken_as_the_confusion_matrix_says() -> None:
     names = ("ana", "ben", "cleo", "dora")
     shares["dora"] = dict.fromkeys(("ana", "ben", "cleo"), 1 / 3)
     for u, true in enumerate(names):
-        taken = rows[rows[:, USER] == u, IDENTITY]
-        assert (taken >= 0).all()
-        for v, found in enumerate(names):
-            share = 0.4 if u == v else 0.6 * shares[true].get(found, 0.0)
-            assert agree(taken == v, share), (true, found)
+        identities = rows[rows[:, USER] == u, IDENTITY]
+        assert (identities >= 0).all()
+        for v, perceived in enumerate(names):
+            share = 0.4 if u == v else 0.6 * shares[true].get(perceived, 0.0)
+            assert agree(identities == v, share), (true, perceived)
 
 
 def test_the_only_user_is_mistaken_for_nobody_known() -> None:
@@ -366,9 +366,9 @@ def test_an_identity_lasts_as_long_as_its_track() -> None:
     perception = {"identity": {"mistaken": 0.4, "per_track": True}}
     rows = Watch(users, perception=perception).look()
     rows = rows[rows[:, USER] == 0]
-    taken = rows[:, IDENTITY].reshape(-1, 20)
-    assert (taken == taken[:, :1]).all()
-    assert agree(taken[:, 0] == 1, 0.4)
+    identities = rows[:, IDENTITY].reshape(-1, 20)
+    assert (identities == identities[:, :1]).all()
+    assert agree(identities[:, 0] == 1, 0.4)
 
 
 # --- Where, and how -------------------------------------------------------------------------------
@@ -377,11 +377,13 @@ def test_an_identity_lasts_as_long_as_its_track() -> None:
 def polar(rows: Int64) -> tuple[Float64, Float64, Float64]:
     """Return true distance [m], and the errors in distance [m] and bearing [deg]."""
     eye = SIDE_M / 2
-    true, found = (rows[:, columns] / UNITS_PER_M - eye for columns in ([TRUE_X, TRUE_Y], [X, Y]))
-    bearings = [np.arctan2(xy[:, 1], xy[:, 0]) for xy in (true, found)]
+    true, perceived = (
+        rows[:, columns] / UNITS_PER_M - eye for columns in ([TRUE_X, TRUE_Y], [X, Y])
+    )
+    bearings = [np.arctan2(xy[:, 1], xy[:, 0]) for xy in (true, perceived)]
     turn = np.rad2deg((bearings[1] - bearings[0] + np.pi) % (2 * np.pi) - np.pi)
     distance = np.hypot(*true.T)
-    return distance, np.hypot(*found.T) - distance, turn
+    return distance, np.hypot(*perceived.T) - distance, turn
 
 
 def check_noise(values: Float64, std: Float64 | float) -> None:
@@ -440,9 +442,9 @@ def test_postures_are_confused_as_configured() -> None:
     rows = watch.look()
     expected = [[0.9, 0.1, 0], [0.2, 0.75, 0.05], [0, 0, 1]]
     for true in range(3):
-        found = rows[posture[0, rows[:, STEP]] == true, POSTURE]
+        perceived = rows[posture[0, rows[:, STEP]] == true, POSTURE]
         for code in range(3):
-            assert agree(found == code, expected[true][code])
+            assert agree(perceived == code, expected[true][code])
 
 
 # --- Together -------------------------------------------------------------------------------------
@@ -470,7 +472,7 @@ def test_a_perception_that_never_errs_perceives_the_truth() -> None:
     assert (rows[:, X : POSTURE + 1] == rows[:, TRUE_X:]).all()
 
 
-def test_spans_do_not_show_in_what_is_perceived() -> None:
+def test_spans_do_not_change_perception() -> None:
     users = np.concatenate([around(DISTANCE, BEARING, FACING)] * 2)[:, :2000]
     whole = Watch(users, perception=EVERYTHING, camera={"latency": "3 s"})
     expected = whole.look()

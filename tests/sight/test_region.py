@@ -37,6 +37,6 @@ def test_contains_takes_points_of_any_shape() -> None:
 
 
 @pytest.mark.parametrize(("x", "y"), [(-3.0, 2.0), (0.0, 4.0), (50.0, 2.0), (-1.0, 3.0)])
-def test_an_eye_in_a_wall_is_an_error_that_says_where(x: float, y: float) -> None:
+def test_an_eye_in_a_wall_is_an_error_with_its_place(x: float, y: float) -> None:
     with pytest.raises(PlacementError, match=rf"\({x:g}, {y:g}\) m is in a wall or outside"):
         VisibleRegion(L_SHAPE, x, y)

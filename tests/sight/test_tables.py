@@ -23,16 +23,16 @@ def tables(
     return error_tables([lens], [Perception.model_validate(perception)], scene(users))
 
 
-def shares(found: k.ErrorTables, begin: int, count: int) -> Any:
-    return found.table[0, begin : begin + count] / k.ONE
+def shares(error_tables: k.ErrorTables, begin: int, count: int) -> Any:
+    return error_tables.table[0, begin : begin + count] / k.ONE
 
 
 @pytest.mark.parametrize("farthest", [0.3, 1.0, 4.5, 12.8, 100.0])
 def test_distances_up_to_the_farthest_body_have_an_entry(farthest: float) -> None:
     """The entry of a distance in lattice units holds the curve within an entry's width of there."""
     curve = {"midpoint": farthest / 2, "width": farthest / 10}
-    found = tables({"detection": {"distance": curve}}, range=[0, farthest], body_points=4)
-    shift = int(found.table[0, k.SHIFT])
+    error_tables = tables({"detection": {"distance": curve}}, range=[0, farthest], body_points=4)
+    shift = int(error_tables.table[0, k.SHIFT])
     reach = round(farthest * UNITS_PER_M) + 257
     assert reach >> shift < k.BINS
     assert farthest < 0.5 or reach >> shift >= k.BINS // 2 - 1  # none is wasted
@@ -40,41 +40,47 @@ def test_distances_up_to_the_farthest_body_have_an_entry(farthest: float) -> Non
         entry = round(metres * UNITS_PER_M) >> shift
         expected = 1 / (1 + np.exp((metres - farthest / 2) / (farthest / 10)))
         slope = (1 << shift) / UNITS_PER_M / (farthest / 10) / 4
-        assert expected == pytest.approx(shares(found, entry, 1)[0], abs=slope + 1e-9)
+        assert expected == pytest.approx(shares(error_tables, entry, 1)[0], abs=slope + 1e-9)
 
 
 def test_bearings_left_are_behind_the_middle_of_their_table() -> None:
-    found = tables({"detection": {"bearing": [[-90, 0], [90, 1]]}})
-    at = shares(found, k.AT_BEARING, 4096)
+    error_tables = tables({"detection": {"bearing": [[-90, 0], [90, 1]]}})
+    at = shares(error_tables, k.AT_BEARING, 4096)
     assert [0, 0.25, 0.5, 0.75, 1] == pytest.approx(
         at[[0, 1536, 2048, 2560, 4095]].tolist(), abs=1e-9
     )
 
 
-def test_bearings_without_a_sign_are_those_of_both_sides() -> None:
+def test_bearings_without_a_sign_equal_both_sides() -> None:
     at = shares(tables({"detection": {"bearing": [[0, 1], [180, 0]]}}), k.AT_BEARING, 4096)
     assert at[1:2048].tolist() == at[2049:][::-1].tolist()
 
 
 def test_light_is_by_minute_and_orientation_by_the_turn() -> None:
-    found = tables({"detection": {"light": [[0, 0], [24, 1]], "orientation": [[0, 1], [180, 0]]}})
-    facing = shares(found, k.AT_FACING, 2049)
+    error_tables = tables(
+        {"detection": {"light": [[0, 0], [24, 1]], "orientation": [[0, 1], [180, 0]]}}
+    )
+    facing = shares(error_tables, k.AT_FACING, 2049)
     assert [1, 0.5, 0] == pytest.approx(facing[[0, 1024, 2048]].tolist(), abs=1e-9)
-    assert 0.5 == pytest.approx(shares(found, k.AT_LIGHT, 1440)[720], abs=1e-3)
+    assert 0.5 == pytest.approx(shares(error_tables, k.AT_LIGHT, 1440)[720], abs=1e-3)
 
 
 def test_shares_of_a_body_are_by_the_number_of_points_in_view() -> None:
     curve = {"detection": {"visible_share": [[0, 0], [1, 1]]}}
-    found = shares(tables(curve, body_points=3), k.AT_SHOWN, 5)
-    assert [0, 0.25, 0.5, 0.75, 1] == pytest.approx(found.tolist(), abs=1e-9)
+    by_points = shares(tables(curve, body_points=3), k.AT_SHOWN, 5)
+    assert [0, 0.25, 0.5, 0.75, 1] == pytest.approx(by_points.tolist(), abs=1e-9)
 
 
 def test_confusions_are_cumulative_and_end_at_1() -> None:
-    found = tables({"identity": {"mistaken": 0.5, "confusion": {"ana": {"ben": 0.3, "cleo": 0.7}}}})
-    confusion = found.confusion[0] / k.ONE
+    error_tables = tables(
+        {"identity": {"mistaken": 0.5, "confusion": {"ana": {"ben": 0.3, "cleo": 0.7}}}}
+    )
+    confusion = error_tables.confusion[0] / k.ONE
     assert [0, 0.3, 1] == pytest.approx(confusion[0].tolist(), abs=1e-9)
     assert [0.5, 0.5, 1] == pytest.approx(confusion[1].tolist(), abs=1e-9)
-    assert k.ONE == found.confusion[0, 0, 2] == found.confusion[0, 2, 1]  # thirds, too, end at 1
+    assert (
+        k.ONE == error_tables.confusion[0, 0, 2] == error_tables.confusion[0, 2, 1]
+    )  # thirds, too, end at 1
 
 
 def test_memory_outlasts_twice_the_steps_with_the_square_of_the_probability() -> None:
@@ -85,20 +91,20 @@ def test_memory_outlasts_twice_the_steps_with_the_square_of_the_probability() ->
 
 
 def test_numbers_of_false_positives_are_poissons() -> None:
-    found = tables({"false_positives": {"per_hour": 1800}})
+    error_tables = tables({"false_positives": {"per_hour": 1800}})
     mean = 0.5
-    assert np.exp(-mean) == pytest.approx(found.ghosts[0, 0] / k.ONE, abs=1e-9)
-    assert np.exp(-mean) * (1 + mean) == pytest.approx(found.ghosts[0, 1] / k.ONE, abs=1e-9)
-    assert (np.diff(found.ghosts[0]) >= 0).all()
+    assert np.exp(-mean) == pytest.approx(error_tables.ghosts[0, 0] / k.ONE, abs=1e-9)
+    assert np.exp(-mean) * (1 + mean) == pytest.approx(error_tables.ghosts[0, 1] / k.ONE, abs=1e-9)
+    assert (np.diff(error_tables.ghosts[0]) >= 0).all()
 
 
 def test_cameras_without_false_positives_are_not_haunted() -> None:
     assert 0 == tables({"false_positives": {"per_hour": 0, "spots": []}}).has_ghosts[0]
     spot = {"at": [1, 2], "per_hour": 3}
-    found = tables({"false_positives": {"spots": [spot]}})
-    assert 1 == found.has_ghosts[0]
-    assert 0 == found.source[0, 0]  # nothing appears just anywhere
-    assert LATTICE.to_lattice((1.0, 2.0)).tolist() == found.spot[0, 1, :2].tolist()
+    error_tables = tables({"false_positives": {"spots": [spot]}})
+    assert 1 == error_tables.has_ghosts[0]
+    assert 0 == error_tables.source[0, 0]  # nothing appears just anywhere
+    assert LATTICE.to_lattice((1.0, 2.0)).tolist() == error_tables.spot[0, 1, :2].tolist()
 
 
 def test_a_home_of_one_user_or_of_none_has_nobody_to_be_mistaken_for() -> None:
@@ -117,7 +123,7 @@ def test_where_no_camera_errs_the_tables_are_empty() -> None:
     assert 1 == error_tables([lens], [None], scene()).table.size
 
 
-def test_only_what_says_nothing_is_perfect() -> None:
+def test_only_an_empty_perception_is_perfect() -> None:
     assert is_perfect(None)
     assert is_perfect(Perception.model_validate({"detection": {"distance": 1, "posture": {}}}))
     assert not is_perfect(Perception.model_validate({"attributes": {"activity": {}}}))
@@ -127,12 +133,12 @@ def test_only_what_says_nothing_is_perfect() -> None:
 def test_lenses_of_several_cameras_are_padded_to_one_shape() -> None:
     cameras = [{"body_points": 4, "range": [0, 2]}, {"pan": {"headings_deg": [0, 90]}}]
     lenses = [Camera.model_validate(camera).lens(UNITS_PER_M, 10**6) for camera in cameras]
-    found = stack_lenses(lenses, [True, False], scene())
-    assert (2, 3, 5, 2) == found.bodies.shape
-    assert [256, 0, -256, 0] == found.bodies[0, 0, 1:, 0].tolist()
-    assert [257, 0] == found.reach[:, 0].tolist()
-    assert [(2 * UNITS_PER_M + 257) ** 2, round(4.5 * UNITS_PER_M) ** 2] == found.widest[
+    stacked = stack_lenses(lenses, [True, False], scene())
+    assert (2, 3, 5, 2) == stacked.bodies.shape
+    assert [256, 0, -256, 0] == stacked.bodies[0, 0, 1:, 0].tolist()
+    assert [257, 0] == stacked.reach[:, 0].tolist()
+    assert [(2 * UNITS_PER_M + 257) ** 2, round(4.5 * UNITS_PER_M) ** 2] == stacked.widest[
         :, 0
     ].tolist()
-    assert [[0, 0], [0, 1024]] == found.pans.tolist()
-    assert [0, 1] == found.moves.tolist()
+    assert [[0, 0], [0, 1024]] == stacked.pans.tolist()
+    assert [0, 1] == stacked.moves.tolist()

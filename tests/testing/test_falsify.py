@@ -55,13 +55,13 @@ def falsify(*arguments: str) -> Any:
     return CliRunner().invoke(app, [*arguments, "--workers", "1"])
 
 
-def test_what_it_keeps_is_a_scenario_that_fails(folder: Path) -> None:
+def test_the_resulting_scenario_fails(folder: Path) -> None:
     done = falsify("flat.yaml", "--over", OVER, "--budget", "30", "--out", "found.yaml")
     assert 1 == done.exit_code, done.output
     assert "comes is violated" in done.output
     assert "kept: found.yaml" in done.output
-    kept = yaml.safe_load((folder / "found.yaml").read_text())
-    assert "flat.yaml" == kept["extends"]
+    failing = yaml.safe_load((folder / "found.yaml").read_text())
+    assert "flat.yaml" == failing["extends"]
     simulation = fleet2d.Simulation("found.yaml")
     simulation.run()
     assert not simulation.verdicts()["comes"].holds
@@ -73,11 +73,11 @@ def test_what_it_keeps_is_a_scenario_that_fails(folder: Path) -> None:
 def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
     done = falsify("test_flat.py::test_comes", "--over", OVER, "--budget", "30", "--quiet")
     assert (1, "") == (done.exit_code, done.output)
-    kept = fleet2d.load_scenario("falsified.yaml")
-    assert kept.robots["astro"].speed < 0.3
+    failing = fleet2d.load_scenario("falsified.yaml")
+    assert failing.robots["astro"].speed < 0.3
 
 
-def test_where_nothing_fails_it_says_how_narrowly(folder: Path) -> None:
+def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None:
     slow = "robots.astro.speed={low: 0.5, high: 0.6}"
     done = falsify("flat.yaml", "--over", slow, "--budget", "5")
     assert 0 == done.exit_code
@@ -105,7 +105,7 @@ def test_wrong_input_is_refused_in_words(folder: Path, arguments: list[str], wor
     assert words in str(done.exception)
 
 
-def test_a_planted_fault_is_found_that_random_search_misses(
+def test_a_planted_fault_is_detected_that_random_search_misses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.syspath_prepend(str(BENCHMARKS))

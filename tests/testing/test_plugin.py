@@ -69,7 +69,7 @@ def suite(
     return run
 
 
-def test_each_seed_is_a_life_and_the_decision_is_reported(suite: Suite) -> None:
+def test_each_seed_is_a_run_and_the_decision_is_reported(suite: Suite) -> None:
     result = suite("""
 seeds = []
 @trial("flat.yaml", seeds=12)
@@ -193,14 +193,14 @@ def test_trials():
         ("@trial('flat.yaml', seeds=3, holds=.5)\ndef test_x(trial): pass", "take 5 seeds or more"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_test_is_said(suite: pytest.Pytester, code: str, words: str) -> None:
+def test_errors_of_a_test_are_reported(suite: pytest.Pytester, code: str, words: str) -> None:
     result = suite(code)
     assert {"failed": 1} == result.outcomes
     assert all(word in result.text for word in words.split("…")), result.text
     assert "plugin.py" not in result.text
 
 
-def test_it_runs_in_several_processes(suite: Suite, tmp_path: Path) -> None:
+def test_trials_run_in_several_processes(suite: Suite, tmp_path: Path) -> None:
     code = """
 @pytest.mark.parametrize("number", range(4))
 @trial("flat.yaml", seeds=5)

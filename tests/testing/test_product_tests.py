@@ -34,7 +34,7 @@ def test_each_of_the_twelve_tests_has_a_worse_robot(week: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("name", WORSE)
-def test_it_holds_for_the_product_and_fails_for_a_worse_robot(week: ModuleType, name: str) -> None:
+def test_tests_pass_for_the_product_and_fail_for_a_worse_robot(week: ModuleType, name: str) -> None:
     function = getattr(week, f"test_{name}")
     claim = getattr(function, ATTRIBUTE)
 

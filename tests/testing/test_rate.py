@@ -25,7 +25,7 @@ def decisions(test: RateTest, rate: float, seed: int) -> NDArray[np.bool_]:
 
 
 @pytest.mark.parametrize(("seeds", "holds"), CLAIMS)
-def test_ten_thousand_decisions_err_no_oftener_than_said(seeds: int, holds: float) -> None:
+def test_error_rates_of_ten_thousand_decisions_are_as_stated(seeds: int, holds: float) -> None:
     test = rate_test(seeds, holds)
     noise = 4 * np.sqrt(0.05 * 0.95 / DECISIONS)
     refusals_of_truth = 1 - decisions(test, holds, 1).mean()
@@ -37,7 +37,7 @@ def test_ten_thousand_decisions_err_no_oftener_than_said(seeds: int, holds: floa
 
 @pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
 @pytest.mark.parametrize(("seeds", "holds"), CLAIMS)
-def test_exact_error_rates_are_as_said(seeds: int, holds: float, error: float) -> None:
+def test_exact_error_rates_are_as_stated(seeds: int, holds: float, error: float) -> None:
     test = rate_test(seeds, holds, error)
     assert 1 - test.acceptance(holds) <= error + 1e-12
     assert test.acceptance(test.told_from) <= error + 1e-12
@@ -61,7 +61,7 @@ def test_acceptance_is_the_sum_over_all_outcomes(rate: float) -> None:
     assert looked == pytest.approx(test.mean_seeds(rate), abs=1e-9)
 
 
-def test_it_stops_early_where_it_is_clear() -> None:
+def test_clear_rates_stop_early() -> None:
     test = rate_test(100, 0.95)
     assert test.mean_seeds(0.5) < 15
     assert test.mean_seeds(1.0) < 60

@@ -13,7 +13,7 @@ PEOPLE = {"ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"}}
 FLAT = Claim(scenario("2 h", users=PEOPLE, robots={"astro": "patrol"})).variants[0]
 
 
-def test_it_goes_on_until_all_is_decided_and_no_longer() -> None:
+def test_a_trial_ends_when_all_expectations_are_decided() -> None:
     def soon(trial: Trial) -> None:
         trial.advance(100)
         trial.expect("eventually(distance(astro, ana) < 100 m, within=10 s)")

@@ -47,7 +47,7 @@ def test_shares_of_each_user_and_hour_sum_to_one(stored) -> None:
                 assert 0 <= rows["share"][mine & (rows["room"] == "away")][0] <= 1
 
 
-def test_who_meanders_at_home_is_found_at_home(stored) -> None:
+def test_likelihood_finds_a_meandering_user_at_home(stored) -> None:
     rows = table(stored, "e_likelihood", user="ben", room="away")
     assert rows["share"][-1] < 0.3
     rows = table(stored, "e_likelihood", user="ana", room="kitchen_0")
@@ -68,11 +68,11 @@ def test_a_run_is_the_same_with_and_without_other_learners(stored) -> None:
 
 
 def test_the_longest_span_changes_nothing() -> None:
-    found = [
+    digests_by_span = [
         digests(run(content("2 h", rtp={"type": "rtp"}, ltp={"type": "ltp"}), max_span=span))
         for span in (100, 100_000)
     ]
-    assert found[0] == found[1]
+    assert digests_by_span[0] == digests_by_span[1]
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_the_longest_span_changes_nothing() -> None:
         ({"type": "rtp", "model": {"detection": 0.5}}, "'type' is needed"),
     ],
 )
-def test_wrong_settings_are_told(settings: dict[str, Any], words: str) -> None:
+def test_wrong_settings_are_refused_with_a_message(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(Fleet2DError, match=words):
         run(content(mine=settings))
 
@@ -98,11 +98,11 @@ def test_they_are_found_by_their_short_names() -> None:
     assert lookup("algorithm", "rtp") is lookup("algorithm", "real_time_presence")
 
 
-def test_a_home_without_users_or_cameras_is_told_something_defined() -> None:
+def test_presence_is_defined_without_users_or_cameras() -> None:
     for robots in ({}, {"astro": {"type": "patrol", "camera": None}}):
         algorithms = {"ltp": {"type": "ltp", "estimator": "likelihood"}, "rtp": {"type": "rtp"}}
-        found = run(scenario("2 h", robots=robots, algorithms=algorithms))
-        rows = table(found, "ltp")
+        stored = run(scenario("2 h", robots=robots, algorithms=algorithms))
+        rows = table(stored, "ltp")
         assert {"anyone"} == set(rows["user"])
         assert np.isfinite(rows["share"]).all()
 
@@ -123,8 +123,8 @@ class Sure(Model):
 """
     (tmp_path / "mine.py").write_text(code)
     model = {"type": f"{tmp_path.as_posix()}/mine:Sure", "room": 2}
-    found = run(content("1 h", rtp={"type": "rtp", "model": model}))
-    rows = table(found, "rtp", user="ana", share=1.0)
+    stored = run(content("1 h", rtp={"type": "rtp", "model": model}))
+    rows = table(stored, "rtp", user="ana", share=1.0)
     assert 12 == len(rows["step"])
     assert {"bedroom_0"} == set(rows["room"])
 
@@ -136,7 +136,7 @@ def test_a_longer_step_than_a_minute_makes_bins_of_a_step() -> None:
     assert len(table(fleet2d.run(slow), "rtp")["step"]) == 2 * 288 * 3 * 7
 
 
-def test_a_run_goes_on_from_what_another_has_learned(tmp_path: Path) -> None:
+def test_a_run_can_start_from_the_learned_state_of_another(tmp_path: Path) -> None:
     algorithms = {"ltp": {"type": "ltp", "estimator": "likelihood"}, "rtp": {"type": "rtp"}}
     before = content("1 d", **algorithms)
     before["artifacts"] |= {"learned": True}
@@ -164,10 +164,10 @@ def test_every_estimator_has_all_variants_for_everybody() -> None:
             fields |= {} if half_life == "null" else {"half_life": half_life}
             algorithms[f"w_{key}"] = {**fields, "by": "hour_of_week"}
             algorithms[f"o_{key}"] = {**fields, **({} if name == "fremen" else {"interval": 0.9})}
-    found = run(content("54 h", **algorithms))
+    stored = run(content("54 h", **algorithms))
     for name in algorithms:
         for user in ("ana", "ben", "anyone"):
-            rows = table(found, name, user=user)
+            rows = table(stored, name, user=user)
             last = rows["step"] == rows["step"].max()
             rooms = last & (rows["room"] != "away")
             assert 1.0 == pytest.approx(rows["share"][rooms].sum()), name

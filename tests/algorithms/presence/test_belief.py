@@ -34,7 +34,7 @@ def test_rooms_and_away_of_a_user_and_of_anyone() -> None:
     assert presence.high() is None
 
 
-def test_it_never_changes_and_is_not_copied() -> None:
+def test_frozen_arrays_never_change_and_are_not_copied() -> None:
     presence = some()
     assert presence is copy.deepcopy(presence)
     assert presence is presence.at(NOON + timedelta(days=1))
@@ -64,7 +64,7 @@ def test_what_is_no_distribution_is_refused(changes, words: str) -> None:
         some(**changes)
 
 
-def test_it_becomes_a_row_per_user_and_room_and_one_of_away() -> None:
+def test_presence_has_a_row_for_each_user_and_room_and_for_away() -> None:
     columns = some().to_columns(["hall", "bath"])
     rows = list(zip(*(columns[name] for name in ("user", "room", "share")), strict=True))
     assert [
@@ -92,7 +92,7 @@ def test_each_hour_of_the_week_has_its_own() -> None:
 
 
 @pytest.mark.parametrize("half_life", [None, 2.0])
-def test_sums_by_day_and_hour_are_those_of_a_loop(half_life: float | None) -> None:
+def test_sums_by_day_and_hour_equal_a_loop(half_life: float | None) -> None:
     random = np.random.default_rng(1)
     day = np.sort(random.choice([100, 101, 103, 109, 110], 300))
     minute = np.concatenate([np.sort(random.integers(0, 1440, (day == d).sum())) for d in (100, 101, 103, 109, 110)])  # fmt: skip

@@ -28,37 +28,37 @@ def learned(estimator: Estimator, bins, rooms: int = 3, users: int = 2, length: 
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_sighting_share_is_that_of_its_twin(seed: int) -> None:
+def test_sighting_share_equals_the_reference(seed: int) -> None:
     bins = any_evidence(seed)
-    found = learned(SightingShare(), bins)
-    for row, user in enumerate(found.names):
+    result = learned(SightingShare(), bins)
+    for row, user in enumerate(result.names):
         expected = slow.sighting_share(bins.seen[:, row].tolist())
-        assert expected == pytest.approx(found.share(user).tolist(), rel=1e-12)
+        assert expected == pytest.approx(result.share(user).tolist(), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_exposure_ratio_is_that_of_its_twin(seed: int) -> None:
+def test_exposure_ratio_equals_the_reference(seed: int) -> None:
     bins = any_evidence(seed)
-    found = learned(ExposureRatio(detection=0.8), bins)
-    for row, user in enumerate(found.names):
+    result = learned(ExposureRatio(detection=0.8), bins)
+    for row, user in enumerate(result.names):
         home, away = slow.exposure_ratio(
             bins.seen[:, row].tolist(), bins.watched.tolist(), bins.bin_steps, 0.8
         )
-        assert home == pytest.approx(found.share(user).tolist(), rel=1e-12)
-        assert away == pytest.approx(found.away(user), abs=1e-12)
+        assert home == pytest.approx(result.share(user).tolist(), rel=1e-12)
+        assert away == pytest.approx(result.away(user), abs=1e-12)
 
 
 def test_audit_only_is_the_exposure_ratio_of_bins_in_audits() -> None:
     bins = any_evidence(1, bins=200)
     audit = AuditOnly(every=timedelta(minutes=30), length=timedelta(minutes=10))
-    found = learned(audit, bins)
+    result = learned(audit, bins)
     inside = bins.minute % 30 < 10
     assert 40 < inside.sum() < 100
     home, away = slow.exposure_ratio(
         bins.seen[inside, 0].tolist(), bins.watched[inside].tolist(), bins.bin_steps, 0.95
     )
-    assert home == pytest.approx(found.share("u0").tolist(), rel=1e-12)
-    assert away == pytest.approx(found.away("u0"), abs=1e-12)
+    assert home == pytest.approx(result.share("u0").tolist(), rel=1e-12)
+    assert away == pytest.approx(result.away("u0"), abs=1e-12)
 
 
 def test_an_audit_longer_than_from_one_to_the_next_is_refused() -> None:
@@ -80,22 +80,22 @@ def independent(bins: int, share: NDArray[np.float64], seed: int) -> Evidence:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_exposure_ratio_finds_the_truth_when_looks_are_independent(seed: int) -> None:
+def test_exposure_ratio_estimates_the_truth_from_independent_looks(seed: int) -> None:
     """Counts are binomial; each ratio is within 4.5 standard errors but once in 150,000 times."""
     truth = np.array([0.4, 0.2, 0.15, 0.05, 0.2])
-    found = independent(40_000, truth, seed)
-    presence = learned(ExposureRatio(), bins_of(found), rooms=4, users=1, length=1440)
-    looks = found.watched.sum(axis=0)
+    collected = independent(40_000, truth, seed)
+    presence = learned(ExposureRatio(), bins_of(collected), rooms=4, users=1, length=1440)
+    looks = collected.watched.sum(axis=0)
     chance = truth[:4] * 0.95
     error = 4.5 * np.sqrt(chance * (1 - chance) / looks)
     ratios = presence.with_away("u0")[:4] * 0.95
     assert (np.abs(ratios - chance) < error + 2 / looks).all()  # and the bin beforehand
     # The share of sightings is off by what rooms are watched.
-    naive = learned(SightingShare(), bins_of(found), rooms=4, users=1, length=1440)
+    naive = learned(SightingShare(), bins_of(collected), rooms=4, users=1, length=1440)
     assert np.abs(naive.share("u0") - truth[:4] / 0.8).max() > 0.1
 
 
-def test_exposure_ratio_by_patches_finds_who_is_always_in_the_corner() -> None:
+def test_exposure_ratio_by_patches_finds_a_user_who_stays_in_a_corner() -> None:
     """A robot that mostly sees the part of a room in which the person never is.
 
     By rooms that would count as having looked in vain. 8,000 looks at least at each patch: standard
@@ -109,20 +109,22 @@ def test_exposure_ratio_by_patches_finds_who_is_always_in_the_corner() -> None:
     room, first = np.array([0, 0, 1]), [0, 2]
     parts = Parts(room, np.array([5, 5, 10]), shown, shown, SightingCounts.of(seen))
     by_room = np.add.reduceat(shown * parts.cells, first, axis=1) / 10
-    found = Evidence(0, 1, by_room, np.add.reduceat(seen, first, axis=2), parts)
-    presence = learned(ExposureRatio(detection=1.0), bins_of(found), rooms=2, users=1, length=9999)
+    collected = Evidence(0, 1, by_room, np.add.reduceat(seen, first, axis=2), parts)
+    presence = learned(
+        ExposureRatio(detection=1.0), bins_of(collected), rooms=2, users=1, length=9999
+    )
     assert [0.6, 0.4] == pytest.approx(presence.share("u0").tolist(), abs=0.03)
-    blind = bins_of(found)._replace(by_patch=None)
+    blind = bins_of(collected)._replace(by_patch=None)
     assert learned(ExposureRatio(), blind, rooms=2, users=1, length=9999).share("u0")[0] < 0.4
 
 
 @pytest.mark.parametrize("cls", ALL)
 def test_without_any_evidence_all_rooms_are_alike_and_nobody_is_away(cls: type[Estimator]) -> None:
     none = any_evidence(1).part(0, 0)
-    found = learned(cls(), none)
+    result = learned(cls(), none)
     for user in ("u0", "u1", "anyone"):
-        assert [1 / 3] * 3 == pytest.approx(found.share(user).tolist())
-        assert 0.0 == found.away(user)
+        assert [1 / 3] * 3 == pytest.approx(result.share(user).tolist())
+        assert 0.0 == result.away(user)
 
 
 @pytest.mark.parametrize("cls", ALL)
@@ -131,24 +133,24 @@ def test_a_user_never_seen_has_a_distribution_and_an_only_room_has_all(
 ) -> None:
     bins = any_evidence(2, bins=60, rooms=1)
     bins.seen[:, 0] = 0
-    found = learned(cls(), bins, rooms=1)
-    for user in found.names:
-        assert [1.0] == found.share(user).tolist()
-        assert 0 <= found.away(user) <= 1
-    assert found.away("u0") > found.away("u1")
+    result = learned(cls(), bins, rooms=1)
+    for user in result.names:
+        assert [1.0] == result.share(user).tolist()
+        assert 0 <= result.away(user) <= 1
+    assert result.away("u0") > result.away("u1")
 
 
 @pytest.mark.parametrize("cls", ALL)
 def test_a_home_without_known_users_has_anyone(cls: type[Estimator]) -> None:
     bins = any_evidence(3, users=0, bins=300)
-    found = learned(cls(), bins, users=0)
-    assert ("anyone",) == found.names
-    assert 1.0 == pytest.approx(found.share().sum())
-    assert found.share()[bins.seen[:, 0].sum(axis=0).argmax()] > 0.2
+    result = learned(cls(), bins, users=0)
+    assert ("anyone",) == result.names
+    assert 1.0 == pytest.approx(result.share().sum())
+    assert result.share()[bins.seen[:, 0].sum(axis=0).argmax()] > 0.2
 
 
 @pytest.mark.parametrize("cls", [SightingShare, ExposureRatio, AuditOnly])
-def test_what_is_learned_does_not_depend_on_how_often_it_is_updated(cls: type[Estimator]) -> None:
+def test_estimates_do_not_depend_on_the_interval_of_updates(cls: type[Estimator]) -> None:
     bins = any_evidence(4, bins=400)
     one, other = (learned(cls(), bins, length=length) for length in (1, 400))
     for user in one.names:
@@ -159,7 +161,7 @@ def test_hours_of_the_week_are_smoothed_towards_the_whole() -> None:
     bins = any_evidence(5, bins=300, users=1)
     estimator = ExposureRatio()
     learned(estimator, bins, users=1)
-    found = estimator.weekly(["u0"], MONDAY, smoothing=30)
+    weekly = estimator.weekly(["u0"], MONDAY, smoothing=30)
     hour = (bins.day - 1) % 7 * 24 + bins.minute // 60
     for slot in sorted({*hour.tolist(), 50}):
         mine = hour == slot
@@ -167,10 +169,10 @@ def test_hours_of_the_week_are_smoothed_towards_the_whole() -> None:
         e = bins.watched[mine].sum(axis=0) + 30 * bins.watched.mean(axis=0)
         rate = (n + n.sum() / e.sum()) / (e + 1)
         assert (rate / rate.sum()).tolist() == pytest.approx(
-            found.by_hour_of_week("u0")[slot].tolist()
+            weekly.by_hour_of_week("u0")[slot].tolist()
         )
     later = MONDAY + timedelta(hours=50, minutes=59)
-    assert found.by_hour_of_week("u0")[50].tolist() == found.at(later).share("u0").tolist()
+    assert weekly.by_hour_of_week("u0")[50].tolist() == weekly.at(later).share("u0").tolist()
 
 
 @pytest.mark.parametrize("cls", ALL)
@@ -182,23 +184,23 @@ def test_old_evidence_fades_with_the_half_life(cls: type[Estimator]) -> None:
     watched, seen = np.zeros((bins, 2)), np.zeros((bins, 2, 2), np.int64)
     watched[np.arange(bins), looks] = 1
     seen[np.arange(bins), :, looks] = (where == looks)[:, None]
-    found = []
+    shares = []
     for half_life in (None, 1.0):
         estimator = cls()
         estimator.begin(2, 1, half_life)
         for part in pieces(bins_of(Evidence(0, 1, watched, seen)), 720):
             estimator.observe(part)
-        found.append(estimator.presence(["u0"], MONDAY).share("u0")[1])
-    assert 2 / 12 == pytest.approx(found[0], abs=0.08)
-    assert found[1] > 0.45
+        shares.append(estimator.presence(["u0"], MONDAY).share("u0")[1])
+    assert 2 / 12 == pytest.approx(shares[0], abs=0.08)
+    assert shares[1] > 0.45
 
 
 @pytest.mark.parametrize("cls", [SightingShare, ExposureRatio, Likelihood])
-def test_intervals_hold_the_estimate_and_need_two_whole_days(cls: type[Estimator]) -> None:
+def test_intervals_contain_the_estimate_and_need_two_whole_days(cls: type[Estimator]) -> None:
     estimator = cls()
     estimator.begin(4, 1)
-    found = bins_of(independent(6 * 1440, np.array([0.4, 0.2, 0.15, 0.05, 0.2]), 1))
-    parts = pieces(found, 1440)
+    collected = bins_of(independent(6 * 1440, np.array([0.4, 0.2, 0.15, 0.05, 0.2]), 1))
+    parts = pieces(collected, 1440)
     for part in parts[:2]:
         estimator.observe(part)
     low, high = estimator.interval(np.uint64(3), 0.9)
@@ -235,23 +237,23 @@ def test_intervals_cover_the_truth_about_as_often_as_stated() -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_what_was_learned_can_be_gone_on_from(cls: type[Estimator]) -> None:
+def test_learning_continues_from_a_learned_state(cls: type[Estimator]) -> None:
     bins = any_evidence(6, bins=3000)
     estimator = cls()
     before = learned(estimator, bins, length=60)
     other = cls()
     other.begin(3, 2)
     other.recall(estimator.remember(), MONDAY.toordinal())
-    found = other.presence(["u0", "u1"], MONDAY)
-    for user in found.names:
+    result = other.presence(["u0", "u1"], MONDAY)
+    for user in result.names:
         expected = before.with_away(user)
         if cls is not Fremen:  # which forecasts from days that are over
-            assert expected.tolist() == pytest.approx(found.with_away(user).tolist())
+            assert expected.tolist() == pytest.approx(result.with_away(user).tolist())
     assert max(other.counts.days) < MONDAY.toordinal()
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_what_was_learned_elsewhere_is_refused(cls: type[Estimator]) -> None:
+def test_state_learned_in_another_home_is_refused(cls: type[Estimator]) -> None:
     estimator, other = cls(), cls()
     learned(estimator, any_evidence(7))
     other.begin(5, 2)

@@ -26,14 +26,14 @@ def rhythmic(days: int, seed: int) -> Evidence:
 
 
 @pytest.mark.parametrize("days", [1, 4])
-def test_forecasts_are_those_of_the_definition(days: int) -> None:
-    found = rhythmic(days, days)
+def test_forecasts_equal_the_definition(days: int) -> None:
+    collected = rhythmic(days, days)
     # With weights as published: in view as a whole or not at all.
-    found.watched[:] = found.watched > 0
+    collected.watched[:] = collected.watched > 0
     last = 1  # of the next day, which ends the days before
     extra = Evidence(
-        0, 1, np.concatenate([found.watched, found.watched[:last]]),
-        np.concatenate([found.seen, found.seen[:last]]),
+        0, 1, np.concatenate([collected.watched, collected.watched[:last]]),
+        np.concatenate([collected.seen, collected.seen[:last]]),
     )  # fmt: skip
     estimator = Fremen()
     estimator.begin(3, 1)
@@ -42,15 +42,15 @@ def test_forecasts_are_those_of_the_definition(days: int) -> None:
     minutes = np.array([777, 9999])
     by_order = estimator._by_order(minutes)
     for room in (0, 2) if days == 1 else (0,):
-        samples = np.flatnonzero(found.watched[:, room])
-        state = found.seen[samples, 0, room].tolist()
+        samples = np.flatnonzero(collected.watched[:, room])
+        state = collected.seen[samples, 0, room].tolist()
         for m in (0, 1, 4):
             for k, at in enumerate(minutes.tolist()):
                 expected = slow.fremen(samples.tolist(), [1.0] * len(state), state, days, m, at)
                 assert expected == pytest.approx(by_order[k, 0, room, m], abs=1e-6)
 
 
-def test_a_daily_rhythm_is_found_and_an_order_chosen_that_has_it() -> None:
+def test_a_daily_rhythm_is_detected_and_its_order_chosen() -> None:
     estimator = Fremen()
     estimator.begin(3, 1)
     for part in pieces(bins_of(rhythmic(9, 1))):

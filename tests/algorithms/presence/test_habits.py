@@ -41,7 +41,9 @@ def stationary(of: StayModel) -> np.ndarray:
 
 
 @given(st.integers(0, 500), st.integers(0, 6), st.integers(0, 23))
-def test_left_alone_it_leads_to_the_shares_of_the_hour(seed: int, weekday: int, hour: int) -> None:
+def test_without_evidence_the_filter_converges_to_the_shares_of_the_hour(
+    seed: int, weekday: int, hour: int
+) -> None:
     of, known = model(seed), habits(seed)
     now = known.at(of, weekday, hour)
     days = known.week.reshape(7, 24, -1)[:, hour]
@@ -77,7 +79,7 @@ def test_average_evidence_draws_to_the_average(smoothing: float) -> None:
         assert np.abs(smooth - usual).max() < 1e-3
 
 
-def test_an_hour_in_which_nobody_was_anywhere_else_is_bounded() -> None:
+def test_rates_of_an_hour_without_transitions_are_bounded() -> None:
     of, known = model(4), habits(4)
     week = known.week.copy()
     week[:, :-1] = 0

@@ -28,22 +28,22 @@ from fleet2d.metrics.presence.distances import total_variation
 
 def test_anyone_is_where_not_everybody_is_missing() -> None:
     one, other = np.array([[0.5, 0.25, 0.25]]), np.array([[0.5, 0.0, 0.5]])
-    found = with_anyone([one, other], np.zeros((1, 2), bool))[0]
-    assert [0.75, 0.25, 0.125] == found[2].tolist()
-    found = with_anyone([one, other], np.array([[False, True]]))[0]
-    assert [0.75, 1.0, 0.0] == found[2].tolist()
+    combined = with_anyone([one, other], np.zeros((1, 2), bool))[0]
+    assert [0.75, 0.25, 0.125] == combined[2].tolist()
+    combined = with_anyone([one, other], np.array([[False, True]]))[0]
+    assert [0.75, 1.0, 0.0] == combined[2].tolist()
 
 
-def test_who_is_none_of_the_users_is_unknown() -> None:
+def test_observations_of_no_user_are_unknown() -> None:
     bins = any_evidence(10, users=1)
     bins.seen[:, 0], bins.seen[:, 1] = 0, 0
     bins.seen[3, 1, 2] = 6
     assert [[3, 2]] == np.argwhere(unknown_seen(bins)).tolist()
 
 
-def learn(estimator, found, rooms: int, users: int = 1):
+def learn(estimator, collected, rooms: int, users: int = 1):
     estimator.begin(rooms, users)
-    for part in pieces(bins_of(found), 240):
+    for part in pieces(bins_of(collected), 240):
         estimator.observe(part)
     return estimator.presence([f"u{i}" for i in range(users)], MONDAY)
 
@@ -66,7 +66,7 @@ def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
         assert np.mean(where == 4) == pytest.approx(presence.away("u0"), abs=0.03)
 
 
-def test_sighting_share_collapses_under_hangout_and_likelihood_holds() -> None:
+def test_sighting_share_fails_under_hangout_but_likelihood_does_not() -> None:
     """Robots that hang out where they saw somebody most: the rich get richer (6 runs of 30 days).
 
     Of 12 runs each the means were .65 and .10, with standard errors of .024 and .017: of 6, bounds
@@ -75,10 +75,10 @@ def test_sighting_share_collapses_under_hangout_and_likelihood_holds() -> None:
     errors = []
     for seed in range(6):
         where = person(30 * DAY, 5, seed)
-        found, truth = evidence(where, 5, hangout, seed), shares_at_home(where, 5)
+        collected, truth = evidence(where, 5, hangout, seed), shares_at_home(where, 5)
         errors.append(
             [
-                total_variation(truth, learn(estimator, found, 5).share("u0"))
+                total_variation(truth, learn(estimator, collected, 5).share("u0"))
                 for estimator in (SightingShare(), ExposureRatio(), Likelihood())
             ]
         )
@@ -89,15 +89,15 @@ def test_sighting_share_collapses_under_hangout_and_likelihood_holds() -> None:
     assert (np.array(errors)[:, 0] > np.array(errors)[:, 2]).all()
 
 
-def test_exposure_ratio_is_biased_by_following_and_likelihood_holds() -> None:
+def test_following_biases_exposure_ratio_but_not_likelihood() -> None:
     """Robots that stay while they see the person: rooms left at once are watched too little."""
     errors = []
     for seed in range(4):
         where = person(30 * DAY, 5, seed)
-        found, truth = evidence(where, 5, follow, seed), shares_at_home(where, 5)
+        collected, truth = evidence(where, 5, follow, seed), shares_at_home(where, 5)
         errors.append(
             [
-                total_variation(truth, learn(estimator, found, 5).share("u0"))
+                total_variation(truth, learn(estimator, collected, 5).share("u0"))
                 for estimator in (ExposureRatio(), Likelihood())
             ]
         )
@@ -106,9 +106,11 @@ def test_exposure_ratio_is_biased_by_following_and_likelihood_holds() -> None:
     assert ratio > 3 * full
 
 
-def audits(t: int, at: int, found: bool, sightings, random: np.random.Generator) -> int:
+def audits(t: int, at: int, sees_person: bool, sightings, random: np.random.Generator) -> int:
     """Go through the rooms by the clock for 15 minutes every other hour, else follow."""
-    return t // 3 % len(sightings) if t % 120 < 15 else follow(t, at, found, sightings, random)
+    return (
+        t // 3 % len(sightings) if t % 120 < 15 else follow(t, at, sees_person, sightings, random)
+    )
 
 
 def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between() -> None:
@@ -118,9 +120,9 @@ def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between()
     """
     for seed in range(4):
         where = person(60 * DAY, 5, seed)
-        found, truth = evidence(where, 5, audits, seed), shares_at_home(where, 5)
+        collected, truth = evidence(where, 5, audits, seed), shares_at_home(where, 5)
         audited, all_looks = (
-            total_variation(truth, learn(estimator, found, 5).share("u0"))
+            total_variation(truth, learn(estimator, collected, 5).share("u0"))
             for estimator in (AuditOnly(), ExposureRatio())
         )
         assert audited < 0.06
@@ -130,9 +132,9 @@ def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between()
 def test_independent_patrol_is_fair_to_all() -> None:
     for seed in range(2):
         where = person(30 * DAY, 5, seed)
-        found, truth = evidence(where, 5, patrol, seed), shares_at_home(where, 5)
+        collected, truth = evidence(where, 5, patrol, seed), shares_at_home(where, 5)
         for estimator in (SightingShare(), ExposureRatio(), Likelihood(), Likelihood(stages=2)):
-            assert total_variation(truth, learn(estimator, found, 5).share("u0")) < 0.08
+            assert total_variation(truth, learn(estimator, collected, 5).share("u0")) < 0.08
 
 
 def test_pieces_of_evidence_join_to_the_whole() -> None:
@@ -146,7 +148,7 @@ def test_pieces_of_evidence_join_to_the_whole() -> None:
         assert np.array_equal(one, other)
 
 
-def test_intervals_hold_the_truth_as_often_as_stated_or_a_little_more() -> None:
+def test_intervals_contain_the_truth_at_least_as_often_as_stated() -> None:
     """Ten days of a patrol, 20 runs of 4 rooms and away: 90 % intervals hold 96 %.
 
     Were each covered with 0.9, fewer than 80 of 100 would be once in a thousand times; all of them

@@ -36,8 +36,8 @@ MINUTE = 60_000_000
 def followed(model: Model, bins: Bins, rooms: int, users: int, length: int = 60) -> Presence:
     """What a model believes at the end; its track is of all bins."""
     model.begin(rooms, users, MONDAY.toordinal())
-    found = [model.observe(part) for part in pieces(bins, length)]
-    home, away = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    beliefs = [model.observe(part) for part in pieces(bins, length)]
+    home, away = (np.concatenate(parts) for parts in zip(*beliefs, strict=True))
     users_ = [f"u{i}" for i in range(users)]
     return model.presence(users_, MONDAY, MINUTE, Track(0, 1, home, away))
 
@@ -73,30 +73,30 @@ def test_the_future_changes_nothing(cls: type[Model]) -> None:
 
 def test_last_seen_is_the_room_of_the_newest_sighting() -> None:
     bins = any_evidence(4, bins=150)
-    found = followed(LastSeen(), bins, 3, 2, length=11).track
+    track = followed(LastSeen(), bins, 3, 2, length=11).track
     for row in range(3):
         last = None
         for t in range(150):
             if bins.seen[t, row].any():
                 last = int(bins.seen[t, row].argmax())
             expected = [1 / 3] * 3 if last is None else [float(r == last) for r in range(3)]
-            assert expected == found.home[t, row].tolist()
-    assert not found.away.any()
+            assert expected == track.home[t, row].tolist()
+    assert not track.away.any()
 
 
-def test_long_term_is_what_was_known_before_the_update() -> None:
+def test_long_term_is_the_estimate_before_the_update() -> None:
     bins = any_evidence(5, bins=90)
-    found = followed(LongTerm(estimator=ExposureRatio()), bins, 3, 2, length=30).track
+    track = followed(LongTerm(estimator=ExposureRatio()), bins, 3, 2, length=30).track
     estimator = ExposureRatio()
     estimator.begin(3, 2)
     for k, part in enumerate(pieces(bins, 30)):
         expected = estimator.presence(["u0", "u1"], MONDAY)
         for t in (30 * k, 30 * k + 29):
-            assert expected.arrays[0].tolist() == found.home[t].tolist()
+            assert expected.arrays[0].tolist() == track.home[t].tolist()
         estimator.observe(part)
 
 
-def test_hour_of_week_tells_hours_apart() -> None:
+def test_hour_of_week_distinguishes_hours() -> None:
     bins = bins_of(evidence(person(3 * DAY, 3, 5), 3, patrol, 5))
     model = HourOfWeek(estimator=ExposureRatio(), smoothing=1)
     now = followed(model, bins, 3, 1)
@@ -124,7 +124,7 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
 
 
 @pytest.mark.parametrize("cls", CHAINS)
-def test_a_forecast_goes_on_as_bins_without_evidence_do(cls: type[Model]) -> None:
+def test_a_forecast_equals_filtering_without_evidence(cls: type[Model]) -> None:
     bins = any_evidence(6, bins=60, users=1)
     after = bins.part(30, 60)
     blind = Bins(after.day, after.minute, 6, after.watched * 0, after.seen * 0)
@@ -142,7 +142,7 @@ def test_a_forecast_goes_on_as_bins_without_evidence_do(cls: type[Model]) -> Non
     assert twice.with_away("u0").tolist() == pytest.approx(once.with_away("u0").tolist())
 
 
-def test_a_forecast_keeps_to_what_was_known_when_it_was_made() -> None:
+def test_a_forecast_does_not_change_with_later_evidence() -> None:
     bins = bins_of(evidence(person(DAY + 60, 3, 7), 3, patrol, 7))
     model = Filter()
     now = followed(model, bins.part(0, DAY), 3, 1)
@@ -170,7 +170,7 @@ def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_what_was_learned_can_be_gone_on_from(cls: type[Model]) -> None:
+def test_learning_continues_from_a_learned_state(cls: type[Model]) -> None:
     bins = any_evidence(8, bins=2000)
     one, other = cls(), cls()
     followed(one, bins, 3, 2)
@@ -196,7 +196,7 @@ def sleeper(days: int, seed: int) -> np.ndarray:
     return where
 
 
-def test_who_goes_by_the_hour_is_better_of_those_who_do() -> None:
+def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
     """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
     scores = {cls: [] for cls in (SemiMarkov, RoutineModel)}
     for seed in range(2):
@@ -210,7 +210,7 @@ def test_who_goes_by_the_hour_is_better_of_those_who_do() -> None:
     assert np.mean(scores[RoutineModel]) < 0.9 * np.mean(scores[SemiMarkov])
 
 
-def test_a_forecast_of_the_routine_goes_by_the_hours_on_the_way() -> None:
+def test_a_forecast_of_the_routine_uses_the_hours_until_then() -> None:
     where = sleeper(8, 3)
     now = followed(RoutineModel(), bins_of(evidence(where, 3, patrol, 3)), 3, 1)
     night = now.at(MONDAY + timedelta(hours=3)).with_away("u0")

@@ -45,7 +45,7 @@ def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("stages", [1, 2])
-def test_expected_exits_and_time_are_those_of_pairs_of_states(seed: int, stages: int) -> None:
+def test_expected_exits_and_time_equal_pairs_of_states(seed: int, stages: int) -> None:
     node, moments, pairs = expected(seed, stages)
     by_node = np.zeros((PLACES * stages,) * 2)
     np.add.at(by_node, (node[:, None], node[None]), pairs)
@@ -53,8 +53,8 @@ def test_expected_exits_and_time_are_those_of_pairs_of_states(seed: int, stages:
     for k in range(PLACES * stages):
         room, stage = divmod(k, stages)
         for other in set(range(PLACES)) - {room}:
-            found = by_node[k, other * stages : (other + 1) * stages].sum()
-            assert found == pytest.approx(moments.exits[k, other], abs=1e-9)
+            exits = by_node[k, other * stages : (other + 1) * stages].sum()
+            assert exits == pytest.approx(moments.exits[k, other], abs=1e-9)
         onward = by_node[k, k + 1] if stage + 1 < stages else 0.0
         assert onward == pytest.approx(moments.exits[k, PLACES], abs=1e-9)
     assert moments.arrivals.sum() == pytest.approx(
@@ -73,7 +73,7 @@ def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() 
     assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless.tolist())
 
 
-def test_ways_are_counts_by_time_with_one_event_beforehand() -> None:
+def test_transitions_are_counts_by_time_plus_one_prior_event() -> None:
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
     moments = layout.no_moments()
     moments.time[0], moments.exits[0, 1], moments.exits[0, 3] = 880.0, 6.0, 3.0
@@ -81,8 +81,8 @@ def test_ways_are_counts_by_time_with_one_event_beforehand() -> None:
     model = model_of(moments, layout, PRIOR)
     assert 1 - 10 / 1000 == pytest.approx(model.stay[0])
     entered = np.array([0.25, 6.25, 0.25, 3.25])  # to each room overall, and a quarter each
-    wanted = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
-    assert wanted.tolist() == pytest.approx(model.follow[0, :4].tolist())
+    expected = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
+    assert expected.tolist() == pytest.approx(model.follow[0, :4].tolist())
     assert [3.5 / 11, 7.5 / 11] == pytest.approx(model.spread[:2].tolist())
     assert 10 / 1000 == pytest.approx(model.restless[0])
 
@@ -97,16 +97,16 @@ def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
     return in_time(Evidence(start * 10, 10, by_room, in_rooms, parts), MONDAY, 6_000_000)
 
 
-def test_bins_that_are_alike_are_taken_together_within_the_hour() -> None:
+def test_equal_bins_are_merged_within_an_hour() -> None:
     shown = [[0, 1, 0]] * 6 + [[0, 1, 0.5]] * 2
     seen = [[0, 0, 0]] * 2 + [[0, 7, 0]] * 2 + [[0, 3, 3]] * 2 + [[0, 0, 0]] * 2
-    found = stretches_of(bins_of(shown, seen, start=57), 0, longest=5)
-    assert [2, 1, 1, 1, 1, 2] == found.bins.tolist()  # the hour ends after three
-    assert [0, 0, 1, 1, 1, 1] == found.hour.tolist()
-    assert [0, 0, 1, 2, 4, 6, 6] == found.begin.tolist()
-    assert [1, 1, 1, 2, 1, 2] == found.patch.tolist()
-    assert [1, 1, 0.5, 0.5, 0.5, 0.5] == found.share.tolist()
-    assert [0, 255, 128, 0] == found.shown[-1].tolist()
+    merged = stretches_of(bins_of(shown, seen, start=57), 0, longest=5)
+    assert [2, 1, 1, 1, 1, 2] == merged.bins.tolist()  # the hour ends after three
+    assert [0, 0, 1, 1, 1, 1] == merged.hour.tolist()
+    assert [0, 0, 1, 2, 4, 6, 6] == merged.begin.tolist()
+    assert [1, 1, 1, 2, 1, 2] == merged.patch.tolist()
+    assert [1, 1, 0.5, 0.5, 0.5, 0.5] == merged.share.tolist()
+    assert [0, 255, 128, 0] == merged.shown[-1].tolist()
     assert [1] * 8 == stretches_of(bins_of(shown, seen), 0, longest=1).bins.tolist()
 
 
@@ -118,7 +118,7 @@ def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     assert [255, 255, 0, 0] == stretches_of(bins, 0, longest=1).shown[0].tolist()
 
 
-def test_who_was_never_in_the_patch_looked_at_may_always_be_in_the_other() -> None:
+def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
     """However long a robot looks at one patch of a room, the other may have somebody in it."""
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
@@ -132,7 +132,7 @@ def test_who_was_never_in_the_patch_looked_at_may_always_be_in_the_other() -> No
     assert places[300, 0] + 0.02 < again[300, 0]
 
 
-def test_days_gone_through_again_count_once() -> None:
+def test_revisited_days_count_once() -> None:
     random = np.random.default_rng(3)
     looks = random.integers(0, 3, 3 * 1440)
     shown = np.eye(3)[looks]
@@ -144,24 +144,24 @@ def test_days_gone_through_again_count_once() -> None:
     for _ in range(20):
         for day in (2, 1, 0):
             person.revisit(day, 1.0)
-    for found, parts in zip(
+    for total, parts in zip(
         person.total, zip(*(day.moments for day in person.days), strict=True), strict=True
     ):
-        assert np.abs(found - np.sum(parts, axis=0)).max() < 1e-6
+        assert np.abs(total - np.sum(parts, axis=0)).max() < 1e-6
     assert 3 * 1440 == pytest.approx(person.total.time.sum(), rel=1e-9)
 
 
-def test_taking_together_leaves_nothing_out() -> None:
+def test_merging_bins_loses_nothing() -> None:
     for seed in range(20):
         random = np.random.default_rng(seed)
         shown = random.choice([0, 255], (90, 3), p=[0.9, 0.1]).astype(np.uint8)
         seen = random.choice([0, 3], (90, 3), p=[0.95, 0.05]).astype(np.int64)
-        found = merge_bins(np.arange(90), shown, *np.nonzero(seen), seen[seen > 0], 4)
-        assert 90 == found.bins.sum()
-        assert found.bins.max() <= 4
-        at = np.repeat(np.arange(len(found.bins)), found.bins)
-        assert np.array_equal(found.shown[at, :3], shown)
-        rebuilt = np.zeros((len(found.bins), 3))
-        stretch = np.repeat(np.arange(len(found.bins)), np.diff(found.begin))
-        rebuilt[stretch, found.patch] = found.share
+        merged = merge_bins(np.arange(90), shown, *np.nonzero(seen), seen[seen > 0], 4)
+        assert 90 == merged.bins.sum()
+        assert merged.bins.max() <= 4
+        at = np.repeat(np.arange(len(merged.bins)), merged.bins)
+        assert np.array_equal(merged.shown[at, :3], shown)
+        rebuilt = np.zeros((len(merged.bins), 3))
+        stretch = np.repeat(np.arange(len(merged.bins)), np.diff(merged.begin))
+        rebuilt[stretch, merged.patch] = merged.share
         assert np.allclose(rebuilt[at], seen / np.maximum(seen.sum(axis=1, keepdims=True), 1))

@@ -22,11 +22,11 @@ Policy = Callable[[int, int, bool, I64, np.random.Generator], int]
 def transitions(rooms: int, seed: int, dwell: float = 40.0) -> F64:
     """How a Markov person goes on: rooms and last away, of different popularity and dwell."""
     random = np.random.default_rng(seed)
-    liking = random.dirichlet(np.full(rooms + 1, 1.5))
+    popularity = random.dirichlet(np.full(rooms + 1, 1.5))
     stay = 1 - 1 / (dwell * random.uniform(0.4, 2.0, rooms + 1))
-    found = np.tile(liking, (rooms + 1, 1)) * (1 - stay)[:, None]
-    found[np.arange(rooms + 1), np.arange(rooms + 1)] += stay
-    return found
+    rows = np.tile(popularity, (rooms + 1, 1)) * (1 - stay)[:, None]
+    rows[np.arange(rooms + 1), np.arange(rooms + 1)] += stay
+    return rows
 
 
 def person(bins: int, rooms: int, seed: int, dwell: float = 40.0) -> I64:
@@ -45,23 +45,23 @@ def evidence(where: I64, rooms: int, policy: Policy, seed: int) -> Evidence:
     random = np.random.default_rng([seed, 1])
     bins = len(where)
     watched, seen = np.zeros((bins, rooms)), np.zeros((bins, 2, rooms), np.int64)
-    sightings, at, found = np.zeros(rooms, np.int64), 0, False
+    sightings, at, sees_person = np.zeros(rooms, np.int64), 0, False
     for t in range(bins):
-        at = policy(t, at, found, sightings, random)
+        at = policy(t, at, sees_person, sightings, random)
         watched[t, at] = 1
-        found = where[t] == at and random.random() < DETECTION
-        if found:
+        sees_person = where[t] == at and random.random() < DETECTION
+        if sees_person:
             seen[t, :, at] = 1
             sightings[at] += 1
     return Evidence(0, 1, watched, seen)
 
 
-def patrol(t: int, at: int, found: bool, sightings: I64, random: np.random.Generator) -> int:
+def patrol(t: int, at: int, sees_person: bool, sightings: I64, random: np.random.Generator) -> int:
     """Ten bins in a room, then another at random."""
     return int(random.integers(len(sightings))) if t % 10 == 0 else at
 
 
-def hangout(t: int, at: int, found: bool, sightings: I64, random: np.random.Generator) -> int:
+def hangout(t: int, at: int, sees_person: bool, sightings: I64, random: np.random.Generator) -> int:
     """Every half hour to the room with the most sightings, one time in ten to any."""
     if t % 30:
         return at
@@ -69,14 +69,14 @@ def hangout(t: int, at: int, found: bool, sightings: I64, random: np.random.Gene
     return int(random.integers(len(sightings))) if explore else int(np.argmax(sightings))
 
 
-def follow(t: int, at: int, found: bool, sightings: I64, random: np.random.Generator) -> int:
+def follow(t: int, at: int, sees_person: bool, sightings: I64, random: np.random.Generator) -> int:
     """Stay while the person is seen, else go from room to room."""
-    return at if found else (at + 1) % len(sightings)
+    return at if sees_person else (at + 1) % len(sightings)
 
 
-def bins_of(found: Evidence, start: datetime = MONDAY) -> Bins:
+def bins_of(collected: Evidence, start: datetime = MONDAY) -> Bins:
     """Evidence of bins of a minute."""
-    return in_time(found, start, 60_000_000)
+    return in_time(collected, start, 60_000_000)
 
 
 def pieces(bins: Bins, length: int = 60) -> list[Bins]:

@@ -42,7 +42,7 @@ def two(draw) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(st.floats(1e-300, 1e300))
-def test_logarithms_are_those_of_the_library_to_the_last_digits(x: float) -> None:
+def test_logarithms_equal_the_library_to_the_last_digits(x: float) -> None:
     assert math.log(x) == pytest.approx(float(natural_log(x)), rel=1e-15, abs=1e-15)
 
 
@@ -181,7 +181,7 @@ def test_ties_are_shared_and_stay_together(case, k: int, masses: int) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), min_size=1, max_size=40))
-def test_parts_of_the_brier_score_are_those_by_what_was_said(rows) -> None:
+def test_parts_of_the_brier_score_equal_those_by_forecast(rows) -> None:
     """Three forecasts, which many groups tell apart however often each was made."""
     said = np.array([[0.2, 0.3, 0.5], [0.4, 0.4, 0.2], [0.9, 0.1, 0.0]])
     p, truth = said[[kind for kind, _ in rows]], np.array([t for _, t in rows])
@@ -190,12 +190,12 @@ def test_parts_of_the_brier_score_are_those_by_what_was_said(rows) -> None:
 
 
 @given(two())
-def test_order_of_rooms_is_that_of_pairs(pair) -> None:
+def test_order_of_rooms_equals_pairs(pair) -> None:
     p, q = pair
     assert slow.kendall(p.tolist(), q.tolist()) == pytest.approx(float(rank_correlation(p, q)))
 
 
-def test_forecasts_that_are_right_as_often_as_they_say_are_calibrated() -> None:
+def test_forecasts_that_are_right_at_their_rates_are_calibrated() -> None:
     """20,000 forecasts in 15 groups: each gap has a standard error of 0.014 at most."""
     random = np.random.default_rng(3)
     p = random.dirichlet(np.ones(4), 20_000)

@@ -72,44 +72,45 @@ def estimate(stored: Any, algorithm: str, user: str, step: int) -> dict[str, flo
 
 
 @pytest.mark.parametrize("user", ["ana", "ben"])
-def test_ltp_error_is_the_distance_to_what_really_was(stored: Any, user: str) -> None:
+def test_ltp_error_is_the_distance_to_the_truth(stored: Any, user: str) -> None:
     rows = table(stored, "error", user=user)
     for k, step in enumerate((3599, 7199, 10799)):
         lived = places(stored, user)[: step + 1]
         home = [place for place in lived if place != "away"]
         truth = {room: home.count(room) / len(home) for room in ROOMS}
-        found = estimate(stored, "ltp", user, step)
-        gaps = [abs(truth[room] - found[room]) for room in ROOMS]
+        estimated = estimate(stored, "ltp", user, step)
+        gaps = [abs(truth[room] - estimated[room]) for room in ROOMS]
         assert sum(gaps) / 2 == pytest.approx(rows["tv"][k])
         assert max(gaps) == pytest.approx(rows["max_gap"][k])
         assert sum(gaps) / 6 == pytest.approx(rows["mean_gap"][k])
-        order = slow.kendall([truth[room] for room in ROOMS], [found[room] for room in ROOMS])
+        order = slow.kendall([truth[room] for room in ROOMS], [estimated[room] for room in ROOMS])
         assert order == pytest.approx(rows["tau"][k])
         per_room = table(stored, "gap", user=user)
         assert gaps == pytest.approx(per_room["gap"][per_room["step"] == step].tolist())
         away = lived.count("away") / len(lived)
         spread = [
-            abs(truth[room] * (1 - away) - found[room] * (1 - found["away"])) for room in ROOMS
+            abs(truth[room] * (1 - away) - estimated[room] * (1 - estimated["away"]))
+            for room in ROOMS
         ]
-        whole = (sum(spread) + abs(away - found["away"])) / 2
+        whole = (sum(spread) + abs(away - estimated["away"])) / 2
         assert whole == pytest.approx(table(stored, "with_away", user=user)["tv"][k])
     assert stored.metrics["error"][user]["tv"] == rows["tv"][-1]
     shares = [estimate(stored, "ltp", user, step) for step in (3599, 7199, 10799)]
-    best = [max(ROOMS, key=found.__getitem__) for found in shares]
+    best = [max(ROOMS, key=estimated.__getitem__) for estimated in shares]
     assert sum(a != b for a, b in pairwise(best)) == stored.metrics["error"][user]["flips"]
     assert stored.metrics["gap"][user]["mean"] == pytest.approx(rows["mean_gap"][-1])
 
 
-def test_anyone_is_where_there_is_somebody(stored: Any) -> None:
+def test_anyone_is_in_every_occupied_room(stored: Any) -> None:
     both = [places(stored, user) for user in USERS]
     occupied = {room: sum(room in now for now in zip(*both, strict=True)) for room in ROOMS}
     truth = {room: count / sum(occupied.values()) for room, count in occupied.items()}
-    found = estimate(stored, "ltp", "anyone", 10799)
-    tv = sum(abs(truth[room] - found[room]) for room in ROOMS) / 2
+    estimated = estimate(stored, "ltp", "anyone", 10799)
+    tv = sum(abs(truth[room] - estimated[room]) for room in ROOMS) / 2
     assert tv == pytest.approx(stored.metrics["error"]["anyone"]["tv"])
 
 
-def test_who_was_never_at_home_is_left_out(stored: Any) -> None:
+def test_users_who_were_never_at_home_are_skipped(stored: Any) -> None:
     for metric in ("error", "gap"):
         assert {"ana", "ben", "anyone"} == set(stored.metrics[metric])
     assert {"ana", "ben"} == set(stored.metrics["at_home"])
@@ -136,13 +137,15 @@ def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> N
     # At the end of a period the track is what was put out.
     total, right = 0.0, 0.0
     for end in range(59, 10800, 60):
-        found = estimate(stored, "minutely", user, end)
-        p = {room: found[room] * (1 - found["away"]) for room in ROOMS} | {"away": found["away"]}
+        estimated = estimate(stored, "minutely", user, end)
+        p = {room: estimated[room] * (1 - estimated["away"]) for room in ROOMS} | {
+            "away": estimated["away"]
+        }
         total -= math.log(max(p[lived[end]], 1e-6))
         right += p[lived[end]] == max(p.values())
-    found = stored.metrics["each"][user]["all"]
-    assert total / 180 == pytest.approx(found["log_loss"])
-    assert right / 180 == pytest.approx(found["top_1"])
+    estimated = stored.metrics["each"][user]["all"]
+    assert total / 180 == pytest.approx(estimated["log_loss"])
+    assert right / 180 == pytest.approx(estimated["top_1"])
 
 
 def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:
@@ -187,16 +190,16 @@ def test_a_reference_that_is_missing_is_refused() -> None:
         fleet2d.Simulation(content(metrics=metrics))
 
 
-def test_a_reference_is_left_out_of_bins_of_which_it_tells_nothing() -> None:
+def test_bins_without_a_reference_forecast_are_skipped() -> None:
     """Long-term presence without a track knows nothing of the first period."""
-    found = run(
+    stored = run(
         content(
             "1 h",
             algorithms={"rtp": {"type": "rtp"}, "ltp": {"type": "ltp", "period": "5 min"}},
             metrics={"score": {"type": "rtp_score", "of": "rtp", "reference": "ltp"}},
         )
     )
-    scores = found.metrics["score"]["ben"]["all"]
+    scores = stored.metrics["score"]["ben"]["all"]
     assert 60 == scores["bins"]
     assert 0 < scores["reference_log_loss"] < 10
     assert scores["reference_skill"] != scores["skill"]
@@ -215,15 +218,15 @@ def test_metrics_change_nothing(stored: Any) -> None:
         assert without[name] == with_[name]
 
 
-def test_an_algorithm_without_a_track_is_asked_for_forecasts() -> None:
-    found = run(
+def test_forecasts_are_used_if_an_algorithm_has_no_track() -> None:
+    stored = run(
         content(
             metrics={"score": {"type": "rtp_score", "of": "ltp", "period": "30 min"}},
             algorithms={"ltp": {"type": "ltp", "period": "30 min"}},
         )
     )
     # Of the first period nothing was known.
-    assert 150 == found.metrics["score"]["ben"]["all"]["bins"]
+    assert 150 == stored.metrics["score"]["ben"]["all"]["bins"]
 
 
 def test_another_period_than_that_of_the_track_is_refused() -> None:
@@ -262,34 +265,34 @@ def test_burn_in_ends_where_the_error_stays_small() -> None:
     assert "burn_in_day" not in metric.result()["ana"]
 
 
-def test_a_window_forgets_what_was_before() -> None:
+def test_a_window_ignores_earlier_steps() -> None:
     """A person who changed rooms: the truth of the last hour is the new room alone."""
     agenda = [{"items": [{"at": "00:00", "place": "bedroom"}, {"at": "09:00", "place": "kitchen"}]}]
     settings = {"type": "ltp_gap", "of": "ltp", "period": "30 min"}
-    found = run(
+    stored = run(
         content(
             users={"ana": {"type": "schedule", "days": agenda}},
             metrics={"new": {**settings, "window": "1 h"}, "all": settings},
         )
     )
-    rows = {name: table(found, name, user="ana", room="kitchen_0") for name in ("new", "all")}
+    rows = {name: table(stored, name, user="ana", room="kitchen_0") for name in ("new", "all")}
     assert rows["new"]["true_share"][-1] > 0.95
     assert rows["all"]["true_share"][-1] == pytest.approx(1 / 3, abs=0.02)
 
 
 def test_hours_of_the_week_are_compared_one_by_one() -> None:
     week = {"type": "ltp", "estimator": "sighting_share", "by": "hour_of_week"}
-    found = run(
+    stored = run(
         content(
             algorithms={"week": week},
             metrics={"e": {"type": "ltp_error", "of": "week", "given": "hour_of_week"}},
         )
     )
-    assert 0 < found.metrics["e"]["ben"]["tv"] < 1
-    assert "earth_mover_m" not in found.metrics["e"]["ben"]
+    assert 0 < stored.metrics["e"]["ben"]["tv"] < 1
+    assert "earth_mover_m" not in stored.metrics["e"]["ben"]
 
 
-def test_walking_distances_are_symmetric_and_far_where_no_way_leads() -> None:
+def test_walking_distances_are_symmetric_and_far_for_unreachable_rooms() -> None:
     plan = fleet2d.Simulation(content()).home.plan
     metres = walking_distances(Home(plan))
     assert np.array_equal(metres, metres.T)
