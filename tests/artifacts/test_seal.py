@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.thorough import THOROUGH
 
 from fleet2d.artifacts.manifest import FORMAT, Manifest
 from fleet2d.artifacts.seal import verify_run
@@ -19,7 +20,7 @@ from .tables import rows_of_every_kind, stored
 FIXTURES = Path(__file__).parents[1] / "fixtures" / "runs"
 """A run of each version of the format, which every later version must read."""
 
-CHANGES = int(os.environ.get("FLEET2D_CHANGES", "100"))
+CHANGES = int(os.environ.get("FLEET2D_CHANGES", "100" if THOROUGH else "40"))
 """Random changes to bytes that are tried; 10,000 before a release."""
 
 
