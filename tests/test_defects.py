@@ -16,7 +16,7 @@ from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.cli import app
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.giving_way import Wait
+from fleet2d.entities.giving_way import WaitForPeople
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
@@ -122,7 +122,7 @@ def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(
         monkeypatch.setattr(owner, method, counting)
 
     counted(Plan, "go_to_point", "legs")
-    counted(Wait, "go_on", "looks")
+    counted(WaitForPeople, "go_on", "looks")
     people = {"ana": "retired", "ben": "works_from_home"}
     users = {
         name: {"behaviors": [{"type": "reactions"}, {"type": "routine", "persona": persona}]}

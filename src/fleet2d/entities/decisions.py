@@ -7,7 +7,7 @@ from fleet2d.blame import blame
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.arbitration import Arbiter
 from fleet2d.entities.behavior import Behavior, Command, SightEvent, Situation
-from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Surroundings, Wait
+from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Surroundings, WaitForPeople
 from fleet2d.entities.orders import Order
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError
@@ -37,7 +37,7 @@ class DecidingActor(Actor):
         self.is_stuck = False
         self.passes_until = 0
         self._chosen: Plan | None = None  # by `choose` or `goes_on`, for the next `decide`
-        self._waiting: Wait | None = None
+        self._waiting: WaitForPeople | None = None
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
         self._no_way_round: object = None  # where no way round people was found, and for what
         self._blocked = ("", -1)  # what was in its way, and up to which step it waits there
@@ -133,7 +133,7 @@ class DecidingActor(Actor):
         return micros(JUST_WAITED) // self.clock.step_us + 1
 
     @property
-    def waiting(self) -> Wait | None:
+    def waiting(self) -> WaitForPeople | None:
         """Its wait, if it has stopped in front of a person; else None."""
         return self._waiting
 
@@ -147,7 +147,7 @@ class DecidingActor(Actor):
         """
         step, just = now.step, self._just_waited
         since = self._waited[0] if step <= self._waited[1] else step
-        wait = Wait(self.plan, step, since, self.arbiter.own, surroundings)
+        wait = WaitForPeople(self.plan, step, since, self.arbiter.own, surroundings)
         people = surroundings.people
         self._waited, self.passes_until = (since, step + just), step
         gives_way: GivesWay = self.entity.gives_way  # type: ignore[attr-defined]

@@ -67,7 +67,7 @@ class Surroundings(NamedTuple):
         return same and self.arrangement == other.arrangement
 
 
-class Wait:
+class WaitForPeople:
     """The wait of a robot that has stopped in front of a person.
 
     The steps at which it looks are fixed beforehand. A look is skipped if nothing has moved since
