@@ -59,7 +59,7 @@ def test_the_resulting_scenario_fails(folder: Path) -> None:
     done = falsify("flat.yaml", "--over", OVER, "--budget", "30", "--out", "found.yaml")
     assert 1 == done.exit_code, done.output
     assert "comes is violated" in done.output
-    assert "kept: found.yaml" in done.output
+    assert "written: found.yaml" in done.output
     failing = yaml.safe_load((folder / "found.yaml").read_text())
     assert "flat.yaml" == failing["extends"]
     simulation = fleet2d.Simulation("found.yaml")

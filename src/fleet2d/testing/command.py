@@ -139,7 +139,7 @@ def describe_failure(failure: "FailingPoint", job: "TryJob", what: str, out: Pat
     lines += describe_trial(trial, job.subject.body(), folder, SHRINK_TRIES, command)
     reason = trial.failures[0].text.splitlines()[0]
     out.write_text(_scenario_text(failure, job, what, out, reason), encoding="utf-8")
-    return [*lines, "", f"kept: {out}"]
+    return [*lines, "", f"written: {out}"]
 
 
 def _scenario_text(
@@ -162,7 +162,7 @@ def _scenario_text(
         )
         data = scenario.resolved()
     body = yaml.safe_dump(_plain(data), sort_keys=False, allow_unicode=True)
-    return f"# Fails, found by fleet2d falsify {what}: {reason}\n{body}"
+    return f"# This scenario fails, according to fleet2d falsify {what}: {reason}\n{body}"
 
 
 def _plain(value: Any) -> Any:

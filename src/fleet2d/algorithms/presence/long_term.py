@@ -40,7 +40,7 @@ class LongTermPresence(Algorithm):
         cast("Any", "exposure_ratio"), description="how it is estimated"
     )
     by: Literal["overall", "hour_of_week"] = Field(
-        default="overall", description="whether hours of the week are told apart"
+        default="overall", description="one estimate, or one for each hour of the week"
     )
     smoothing: PositiveDuration = Field(
         default=timedelta(hours=1),
