@@ -56,7 +56,7 @@ class Peek(Algorithm):
 
     def update(self, history: History, state: Present) -> Any:
         for name in ("truth", "looks"):
-            with pytest.raises(ComponentError, match="only metrics know"):
+            with pytest.raises(ComponentError, match=f"'{name}' is ground truth"):
                 getattr(history, name)
         self.seen.append(history.observations)
 

@@ -95,7 +95,10 @@ def test_a_sensor_says_what_it_is_told_to_say(max_span: int | None) -> None:
         ({"reset": "shar"}, "did you mean 'share'"),
         ({"replace": "share"}, "one of 'rooms', 'values'"),
         ({"replace": "share", "rooms": {"kitchn_0": 1}}, "did you mean 'kitchen_0'"),
-        ({"replace": "share", "rooms": {"kitchen_0": -1}}, "0 or more"),
+        (
+            {"replace": "share", "rooms": {"kitchen_0": -1}},
+            "rooms.kitchen_0: weight -1 is negative",
+        ),
         ({"stick": "motio"}, "did you mean 'motion'"),
         ({"restore": "motio"}, "did you mean 'motion'"),
     ],

@@ -162,7 +162,7 @@ def test_somebody_unknown_is_refused_where_a_run_has_no_column_for_the_truth() -
         ({"inject": "astro", "user": "ana", "spot": [-5, 0]}, "outside the home"),
         ({"inject": "astro", "user": "ana", "spot": [1, 1], "camera": "left"}, "no camera 'left'"),
         ({"switch_off": "astro", "behavior": "patrl"}, "has no behavior 'patrl'"),
-        ({"switch_off": "astro"}, "'camera: true', a camera's name, or 'behavior'"),
+        ({"switch_off": "astro"}, "exactly one of 'camera'"),
         ({"fault": "astro"}, "nothing fails"),
     ],
 )

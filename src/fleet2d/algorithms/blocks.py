@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class Blocks:
-    """Arrays of rows, each of a stretch of time; their shapes differ in length only.
+    """Consecutive arrays, each for an interval of steps; only their first dimension differs.
 
     Example:
         >>> blocks = Blocks()

@@ -203,7 +203,13 @@ def gather(
 def count_seen(
     sightings: SightingRows, begin: int, bins: int, bin_steps: int, users: int, rooms: int
 ) -> NDArray[np.int64]:
-    """Return Evidence.seen: a user perceived twice at a step in a room counts once."""
+    """Count, per bin and room, the steps at which each user was perceived.
+
+    Several sightings of a user in a room in one step count once.
+
+    Returns:
+        `Evidence.seen`, int64 (bins, users + 1, rooms).
+    """
     seen = np.zeros((bins, users + 1, rooms), np.int64)
     user, room = sightings.user.astype(np.int64), sightings.room.astype(np.int64)
     count_sightings(sightings.step - begin, user, room, bin_steps, seen)

@@ -154,7 +154,9 @@ class History:
 
     def _check_metric(self, what: str) -> None:
         if self.visible != frozenset(self.log.index):
-            raise ComponentError(f"{what} was requested, but only metrics know what is true")
+            raise ComponentError(
+                f"'{what}' is ground truth: algorithms can't read it, only metrics can"
+            )
 
     def poses(self, name: str) -> BodyPoses:
         """Return the poses of a body. Algorithms may read those of robots, metrics also of users.

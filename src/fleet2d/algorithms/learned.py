@@ -64,7 +64,7 @@ def load_learned(path: Path) -> dict[str, Any]:
 def _plain(value: Any, name: str) -> NDArray[Any]:
     """Return an array of plain values; refuse other entries of the archive."""
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "biufU":
-        raise ValueError(f"{name!r} is no array of numbers, truth values or texts")
+        raise ValueError(f"{name!r} is not an array of numbers, truth values or texts")
     return value
 
 
@@ -88,7 +88,7 @@ def check_shapes(initial: Mapping[str, Any], learned: Mapping[str, Any], where: 
         check_numbers(name, value, where)
         if isinstance(start, np.ndarray) and start.size and np.shape(value) != start.shape:
             raise ComponentError(
-                f"{where}: what was learned has {name!r} of shape {np.shape(value)}, but this home"
+                f"{where}: the learned state has {name!r} of shape {np.shape(value)}, but this home"
                 f" and its users need {start.shape}: it was learned in another home"
             )
 
@@ -119,8 +119,8 @@ def array_of(
     )
     if not fits or array.dtype.kind not in "biuf" or not (np.abs(array) <= most).all():
         raise ComponentError(
-            f"what was learned has no {name!r} of shape {shape}, of numbers alone: it is damaged,"
-            " or from another home, other users or another estimator"
+            f"the learned state lacks a numeric array {name!r} of shape {shape}: it is damaged, or"
+            " from another home, other users or another estimator"
         )
     return np.array(array, kind)
 
@@ -135,7 +135,7 @@ def check_numbers(name: str, value: Any, where: str) -> None:
         for inner, entry in value.items():
             check_numbers(f"{name}{SEPARATOR}{inner}", entry, where)
     elif np.asarray(value).dtype.kind == "f" and np.isnan(value).any():
-        raise ComponentError(f"{where}: what was learned has NaN in {name!r}: it is damaged")
+        raise ComponentError(f"{where}: the learned state has NaN in {name!r}: it is damaged")
 
 
 def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -241,7 +241,7 @@ class ParquetTable:
             os.close(handle)
 
     def publish(self) -> None:
-        """Give the finished file its name."""
+        """Rename the finished temporary file to its final name."""
         if not self._is_published:
             files.replace(self.path, self.partial)
             self._is_published = True

@@ -53,7 +53,7 @@ def decode(encoded: Encoded, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
         rows: Their number.
 
     Raises:
-        ValueError: The bytes are not those of so many values.
+        ValueError: The bytes don't encode that many values.
     """
     encoding, runs, parts = encoded
     content = b"".join(parts)
@@ -72,9 +72,9 @@ def decode(encoded: Encoded, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
             first = np.frombuffer(content[:head], little_endian)
             values = np.cumsum(np.concatenate([first, values]))
     else:
-        raise ValueError(f"{encoding!r} is no encoding of values")
+        raise ValueError(f"unknown encoding {encoding!r}")
     if len(values) != rows:
-        raise ValueError(f"{len(values)} values instead of {rows}")
+        raise ValueError(f"expected {rows} values, decoded {len(values)}")
     return values.astype(dtype)
 
 

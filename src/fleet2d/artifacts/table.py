@@ -74,7 +74,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class TableSpec:
-    """A table's name, which is also its file's, and its columns.
+    """A table's columns, and its name, which is also the name of its file.
 
     Example:
         >>> TableSpec("events", (Column("step", "step"), Column("what", "category"))).names
@@ -90,7 +90,7 @@ class TableSpec:
         object.__setattr__(self, "columns", tuple(self.columns))
         if not _NAME.fullmatch(self.name):
             raise ArtifactError(
-                f"a table can't be named {self.name!r}, for its name is its file's: "
+                f"a table can't be named {self.name!r}, because it becomes the file name: "
                 "use letters, digits, '_', '-' and '.'"
             )
         if not self.columns:

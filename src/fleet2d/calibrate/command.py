@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from fleet2d.calibrate.perception import Calibration, Curves
+    from fleet2d.calibrate.perception import Calibration, FittedProbability
 
 calibrating = typer.Typer(help="Fit a model to a log of a real device.", no_args_is_help=True)
 
@@ -101,11 +101,11 @@ def report(calibration: "Calibration") -> list[str]:
         f"{log.path.name}: {int(log.detected.sum())} detections in {len(log)} times in view",
         "",
         "noticed (95 % intervals in brackets)",
-        *_curve_lines(calibration.detection),
+        *_lines_of(calibration.detection),
     ]
     if calibration.identity is not None:
         identity = calibration.identity
-        lines += ["", "recognized, if noticed", *_curve_lines(identity.right)]
+        lines += ["", "recognized, if noticed", *_lines_of(identity.right)]
         lines.append(f"  of the others, taken for somebody else: {identity.mistaken}")
         for user, others in identity.confusion.items():
             shares = ", ".join(f"{name} {share:.2g}" for name, share in others.items())
@@ -113,18 +113,18 @@ def report(calibration: "Calibration") -> list[str]:
     return [*lines, *calibration.notes, ""]
 
 
-def _curve_lines(curves: "Curves") -> list[str]:
+def _lines_of(fitted: "FittedProbability") -> list[str]:
     lines = [
         f"  {name}: {estimate}{UNITS.get(name.split()[0], '')}"
-        for name, estimate in curves.estimates.items()
+        for name, estimate in fitted.estimates.items()
     ]
-    lines += [f"  {name}: left out: {reason}" for name, reason in curves.omitted.items()]
-    freedom = sum(group.rows for group in curves.groups) - len(curves.estimates)
-    verdict = "the model fits" if curves.p_value > 0.05 else "the model misses something"
+    lines += [f"  {name}: left out: {reason}" for name, reason in fitted.omitted.items()]
+    freedom = sum(group.rows for group in fitted.groups) - len(fitted.estimates)
+    verdict = "the model fits" if fitted.p_value > 0.05 else "the model misses something"
     lines.append(
-        f"  fit: deviance {curves.fit.deviance:.1f} on {freedom} degrees of freedom; predicted"
-        f" against observed: chi2 {curves.chi_square:.1f}, p = {curves.p_value:.2g}: {verdict}"
+        f"  fit: deviance {fitted.fit.deviance:.1f} on {freedom} degrees of freedom; predicted"
+        f" against observed: chi2 {fitted.chi_square:.1f}, p = {fitted.p_value:.2g}: {verdict}"
     )
     lines.append("    predicted  observed (95 %)")
-    lines += [f"    {group.predicted:9.3f}  {group.observed}" for group in curves.groups]
+    lines += [f"    {group.predicted:9.3f}  {group.observed}" for group in fitted.groups]
     return lines

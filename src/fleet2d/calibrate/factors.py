@@ -11,7 +11,7 @@ SURE = 12.0  # logits from here on count as a share of 1
 
 
 def share_of(logit: float) -> float:
-    """Return the share of a logit, exactly 1 from SURE on.
+    """Return the probability that a logit stands for, exactly 1 from SURE on.
 
     >>> share_of(0.0), share_of(SURE)
     (0.5, 1.0)
@@ -20,7 +20,7 @@ def share_of(logit: float) -> float:
 
 
 class Constant:
-    """The same share for every row."""
+    """The same factor for every row."""
 
     least, most = (-SURE,), (SURE,)
     starts = ((2.0,),)
@@ -30,18 +30,18 @@ class Constant:
         self._rows = rows
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
-        """Return the share of each row, and its derivative by the logit."""
+        """Return the factor of each row, and its derivative by the logit."""
         share = share_of(float(theta[0]))
         slope = np.full((self._rows, 1), max(share * (1 - share), 1e-9))
         return np.full(self._rows, share), slope
 
     def natural(self, index: int, value: float) -> float:
-        """Return the share."""
+        """Return the probability that a parameter, a logit, stands for."""
         return share_of(value)
 
 
 class Falling:
-    """A share that falls with a quantity x, logistically: 1 / (1 + exp((x - midpoint) / width))."""
+    """A factor that decreases logistically with x: 1 / (1 + exp((x - midpoint) / width))."""
 
     def __init__(self, name: str, values: F64) -> None:
         self.names = (f"{name} midpoint", f"{name} width")
@@ -52,7 +52,7 @@ class Falling:
         self.starts = tuple((share * span, math.log(span / 8)) for share in (0.5, 0.8, 1.1))
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
-        """Return the share of each row, and its derivatives by midpoint and log of width."""
+        """Return the factor of each row, and its derivatives by midpoint and log of width."""
         midpoint, width = float(theta[0]), math.exp(float(theta[1]))
         scaled = np.clip((self._x - midpoint) / width, -700, 700)
         share = 1 / (1 + np.exp(scaled))
@@ -65,7 +65,7 @@ class Falling:
 
 
 class Orientation:
-    """A share that falls with the angle by which a person is turned away, linear by parts.
+    """A factor that decreases with the angle by which a person is turned away, linear by parts.
 
     It is 1 for a person who faces the camera, `side` at 90 degrees and `back` at 180 degrees.
     """
@@ -80,7 +80,7 @@ class Orientation:
         self._back = np.maximum(quarters - 1, 0)
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
-        """Return the share of each row, and its derivatives by the two logits."""
+        """Return the factor of each row, and its derivatives by the two logits."""
         side, back = share_of(float(theta[0])), share_of(float(theta[1]))
         share = (1 - self._side - self._back) + side * self._side + back * self._back
         slopes = [
@@ -90,5 +90,5 @@ class Orientation:
         return share, np.stack(slopes, axis=1)
 
     def natural(self, index: int, value: float) -> float:
-        """Return the share."""
+        """Return the probability that a parameter, a logit, stands for."""
         return share_of(value)

@@ -63,7 +63,7 @@ class ParameterEstimate:
     Attributes:
         value: The most likely value.
         low: The lower end of the interval; None: the log doesn't bound the parameter.
-        high: The upper end of the interval; None: likewise.
+        high: The upper end of the interval; None: the log doesn't bound it.
     """
 
     value: float
@@ -93,7 +93,7 @@ class Fit:
 
     @property
     def deviance(self) -> float:
-        """Twice the difference of the log-likelihood to that of a perfect model, which is 0."""
+        """Twice the difference of the log-likelihood to a perfect model's, which is 0."""
         return -2 * self.log_likelihood
 
 

@@ -34,11 +34,11 @@ class ProbabilityGroup:
 
 
 @dataclass(frozen=True)
-class Curves:
-    """A fitted probability.
+class FittedProbability:
+    """A fitted model of one probability.
 
     Attributes:
-        estimates: Its parameters, by name; `top` is the probability where nothing lowers it.
+        estimates: The parameters, by name; `top` is the probability where nothing lowers it.
         fit: The fit.
         omitted: Factors without an effect in the log, and the reason for each.
         groups: Predicted and observed probabilities.
@@ -74,7 +74,7 @@ class Recognition:
         confusion: For each user, the shares of the names in such mistakes.
     """
 
-    right: Curves
+    right: FittedProbability
     mistaken: ParameterEstimate
     confusion: dict[str, dict[str, float]]
 
@@ -91,7 +91,7 @@ class Calibration:
     """
 
     log: DetectionLog
-    detection: Curves
+    detection: FittedProbability
     identity: Recognition | None
     notes: list[str] = field(default_factory=list)
 
@@ -137,13 +137,15 @@ def calibrate(log: DetectionLog) -> Calibration:
         candidates["bearing"] = Falling("bearing", log.bearing)
     if log.orientation is not None:
         candidates["orientation"] = Orientation(log.orientation)
-    detection = fit_curves(log.detected, Constant("top", rows), candidates)
+    detection = fit_probability(log.detected, Constant("top", rows), candidates)
     notes: list[str] = []
     identity = _fit_identity(log, notes)
     return Calibration(log, detection, identity, notes)
 
 
-def fit_curves(outcomes: NDArray[np.bool_], top: Constant, candidates: dict[str, Factor]) -> Curves:
+def fit_probability(
+    outcomes: NDArray[np.bool_], top: Constant, candidates: dict[str, Factor]
+) -> FittedProbability:
     """Fit the product of a constant and of those factors that improve the fit significantly."""
     factors = dict(candidates)
     omitted = {}
@@ -157,7 +159,9 @@ def fit_curves(outcomes: NDArray[np.bool_], top: Constant, candidates: dict[str,
             del factors[name]
             best = reduced
     likelihood = ProductLikelihood([top, *factors.values()], outcomes)
-    return Curves(likelihood.estimates(best), best, omitted, group_rows(best.shares, outcomes))
+    return FittedProbability(
+        likelihood.estimates(best), best, omitted, group_rows(best.shares, outcomes)
+    )
 
 
 def group_rows(shares: NDArray[np.float64], outcomes: NDArray[np.bool_]) -> list[ProbabilityGroup]:
@@ -185,7 +189,7 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
         )
         return None
     distance = log.distance[log.detected]
-    curves = fit_curves(
+    fitted = fit_probability(
         right, Constant("top", len(right)), {"distance": Falling("distance", distance)}
     )
     wrong = ~right
@@ -200,7 +204,7 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
             f"identity: the confusion has the names of the log, {', '.join(sorted(set(true)))}:"
             " give them to the scenario's users, or remove the confusion"
         )
-    return Recognition(curves, wilson(int(mistaken.sum()), int(wrong.sum())), confusion)
+    return Recognition(fitted, wilson(int(mistaken.sum()), int(wrong.sum())), confusion)
 
 
 def _shares(counts: dict[str, int]) -> dict[str, float]:

@@ -75,24 +75,28 @@ def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
 
 def export(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-    out: Annotated[Path | None, typer.Argument(help="The text file of sensors to write.")] = None,
+    out: Annotated[
+        Path | None, typer.Argument(help="The file of sensor readings to write.")
+    ] = None,
     html: Annotated[
         Path | None, typer.Option(help="The page to write: one file that plays anywhere.")
     ] = None,
     begin: Annotated[
-        str | None, typer.Option("--from", help="Of the page: where it begins, 'day 3 18:30'.")
+        str | None, typer.Option("--from", help="Where the page begins, like 'day 3 18:30'.")
     ] = None,
-    end: Annotated[str | None, typer.Option("--to", help="Of the page: where it ends.")] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Where the page ends.")] = None,
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Write a run for others: the page as one file, or sensors in the layout of CASAS."""
+    """Write a run for others: a web page in one file, or sensor readings in the layout of CASAS."""
     from fleet2d.runs.run import open_run
 
     if (out is None) == (html is None):
-        raise InputError("one file at a time: --html FILE for the page, or FILE for the sensors")
+        raise InputError(
+            "name exactly one output: --html FILE (web page), or FILE (sensor readings, CASAS)"
+        )
     if html is None and (begin is not None or end is not None):
-        raise InputError("--from and --to are for the page: give --html FILE")
+        raise InputError("--from and --to need --html FILE")
     run = open_run(directory)
     if out is not None:
         from fleet2d.runs.casas import write_casas

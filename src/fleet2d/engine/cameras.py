@@ -222,7 +222,7 @@ class Cameras:
 
     @property
     def event_names(self) -> tuple[str, str]:
-        """The kinds of event when a body is lost, and when a body is seen."""
+        """The event kinds (lost, seen) of these cameras."""
         return self.owner.entity.sight_events
 
     @property

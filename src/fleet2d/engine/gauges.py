@@ -59,7 +59,7 @@ class Gauge:
         self._parts: list[Trace] = []
 
     def take(self, block: Block) -> None:
-        """Measure a block."""
+        """Measure the signal over a block of steps, and append it."""
         self._parts.append(self._measure(block))
 
     def trace(self, end: int) -> Trace:

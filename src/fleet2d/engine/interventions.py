@@ -199,5 +199,5 @@ def read_intervention(content: Mapping[str, Any]) -> tuple[int, Intervention]:
 
 
 def is_from_outside(content: Mapping[str, Any]) -> bool:
-    """Whether a record in a manifest is not of the scenario's own script."""
+    """Whether an intervention came from a caller, not from the scenario's `script`."""
     return "by" not in content

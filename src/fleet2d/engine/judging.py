@@ -73,8 +73,8 @@ class Judging(Steering):
         verdict = self.verdicts().get(name)
         if verdict is None:
             raise InputError(
-                f"{name} is expected from now on, and no step has been simulated since: run the"
-                " simulation, and call judge() again"
+                f"{name} was added after the last step, so there is nothing to judge: simulate at"
+                " least one step, and call judge() again"
             )
         return verdict
 

@@ -235,10 +235,10 @@ class OutputReader:
                 )
             keep &= rows
         if keep.sum() != 1 or number is None:
-            raise ScenarioError(
-                f'output("{self._path}") stands for {keep.sum()} rows of it: name one, by'
-                f" {', '.join(words) or 'nothing that it has'}"
+            how = (
+                f"select one by: {', '.join(words)}" if words else "they have no names to select by"
             )
+            raise ScenarioError(f'output("{self._path}") matches {keep.sum()} rows; {how}')
         return float(columns[number][keep][0])
 
 
@@ -268,7 +268,7 @@ class MetricReader:
         if isinstance(result, Mapping) and not result:
             return float("nan")
         keys = ", ".join(result) if isinstance(result, Mapping) else repr(result)
-        raise ScenarioError(f'metric("{self._path}") is no number: extend it by one of {keys}')
+        raise ScenarioError(f'metric("{self._path}") is not a number: extend it by one of {keys}')
 
 
 _MAKERS: Mapping[type, Callable[[Any, State, int], Gauge]] = {

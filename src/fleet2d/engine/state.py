@@ -51,7 +51,8 @@ class State:
         changes: The changes of the home.
         watchers: All followers of the bodies, in their order.
         clearance, blocking, encounters, sensors: Some of the watchers.
-        gazes, cameras: The cameras of users, and those of robots.
+        gazes: The cameras of users: what users see.
+        cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
         learners: Algorithms and metrics, what they have learned, and their outputs.
         log: The data that learners may read; None if there are no learners.
@@ -59,12 +60,12 @@ class State:
         store: The tables of the run.
         events: The stream of events to all sinks.
         max_span: The most steps of a span; None: `capacity`.
-        settled: The step before which all watchers have taken in all steps.
+        settled: The first step that watchers have not processed yet.
         pending: Events that interrupted the plan of a body, by its row, until it decides.
         interventions: The interventions, done and scheduled.
         driven: Rows of the bodies that are driven from outside.
-        requested: Kinds of events at which a caller wants the span to end.
-        awaited: Those, and the kinds that interventions wait for.
+        requested: Event kinds that end a span because a caller waits for them.
+        awaited: Event kinds that end a span: `requested`, and those that interventions wait for.
         expecting: The expectations of the run; None if there are none.
         notes_emitted: Number of notes of each body's present plan that have happened.
     """

@@ -96,7 +96,7 @@ class Actor(Body):
             self.part = max(self.space.part_at(x, y), 0)
             x, y = self.point(place)  # type: ignore[arg-type]
         else:
-            self.part = self._first_part(place)  # type: ignore[arg-type]
+            self.part = self._start_part(place)  # type: ignore[arg-type]
             x, y = self.find(place, 0, "start")
         heading = self.entity.start_heading_deg
         if heading is None:

@@ -319,8 +319,8 @@ class Body:
             return True
         return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
 
-    def _first_part(self, names: RoomChoice) -> int:
-        """Return the largest part of its space with one of these rooms; else the largest of all."""
+    def _start_part(self, names: RoomChoice) -> int:
+        """Return the largest connected part with one of these rooms, else the largest part."""
         for part in range(self.space.parts):
             reachable = [r for r in self.home.rooms if len(self.space.cells(r.index, part))]
             if {ANY, *(r.name for r in reachable), *(r.type for r in reachable)} & set(names):

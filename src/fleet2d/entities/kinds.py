@@ -61,7 +61,7 @@ def available_rooms(
 
 
 def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
-    """Tell whether a place names only kinds of things, and no single one of this home."""
+    """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
     if is_point(place):
         return False
     names = {room.name for room in body.home.rooms} | {t.name for t in body.home.objects}

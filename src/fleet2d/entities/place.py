@@ -124,7 +124,7 @@ def matching_rooms(
     close = difflib.get_close_matches(names[0].split(OF)[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     if any(name.split(OF)[0] in (t.name, t.type) for name in names for t in objects):
-        raise PlacementError(f"{requested} has no place to use it from that can be reached")
+        raise PlacementError(f"no place from which {requested} is used can be reached")
     raise PlacementError(
         f"there is no room {requested}{hint or '.'} The rooms are: {room_names}."
         f"{_furniture(objects)} A list that ends in 'any' works in every home"

@@ -73,7 +73,9 @@ def _whole(value: Mapping[str, Any], operator: str) -> Expectation:
         return vocabulary.at_end(part)
     if "until" in value:
         if operator != "always":
-            raise problem_at(("until",), f"until goes with always, not with {operator}")
+            raise problem_at(
+                ("until",), f"'until' can only be combined with 'always', not with {operator!r}"
+            )
         return vocabulary.until(part, _part(value, "until"), within=within)
     expectation: Expectation = getattr(vocabulary, operator)(part, within=within)
     return expectation
@@ -93,7 +95,7 @@ def _condition(value: Mapping[str, Any], operator: str) -> Expectation:
 def _at_most(value: Mapping[str, Any]) -> Expectation:
     _refuse(value, "at_most", "until", "after", "within", "during")
     if "of" not in value:
-        raise InputError("at_most: say of what, such as of: events(find_begins, astro)")
+        raise InputError("at_most needs the key 'of', such as of: events(find_begins, astro)")
     part = _part(value, "of")
     if "holds_for" in value:
         part = vocabulary.holds_for(part, value["holds_for"])

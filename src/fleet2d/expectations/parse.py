@@ -93,7 +93,7 @@ class _Reader:
                 f"{value} is compared with nothing: write {value} > 0.5, or == kitchen"
             )
         raise InputError(
-            f"{ast.unparse(node)} is no condition, which holds or doesn't"
+            f"{ast.unparse(node)} is not a condition, which holds or doesn't"
             f"{did_you_mean(value, WORDS)}"
         )
 

@@ -107,17 +107,16 @@ class Scene:
             ScenarioError: The kind is unknown, or there is no entity to which it could happen.
         """
         if kind == EventKind.SENSOR:
-            raise self.error(f"{of}: readings of sensors are no events: write sensor(NAME)")
+            raise self.error(f"{of}: sensor readings are not events: write sensor(NAME)")
         self.check_name("event", kind, sorted({*KINDS, *self.records}), of)
         candidates = list(self._candidates(kind))
         if entity is not None:
             self.check_name("body or object", entity, [*self.bodies, *self.doors], of)
         is_possible = bool(candidates) and (entity in (None, *candidates) or candidates == [""])
         if not is_possible:
-            exception = "there is none" if entity is None else f"not to {entity}"
             raise self.error(
-                f"{of}: it can never happen: {kind!r} happens to {_entities_of(kind)}, {exception}"
-                + (f", but to {', '.join(candidates)}" if candidates not in ([], [""]) else "")
+                f"{of}: no such event is possible: {kind!r} happens only to {_entities_of(kind)}"
+                f" (here: {', '.join(candidates) or 'none'})"
             )
         if kind in SIGHTS and detail is not None:
             self.check_name("user or robot", detail, self.bodies, of)
@@ -153,4 +152,4 @@ def _entities_of(kind: str) -> str:
     if kind == EventKind.ACTIVITY:
         return "users"
     behaviors = [name for name, kinds in _OF_BEHAVIORS.items() if kind in kinds]
-    return f"robots whose behavior is {' or '.join(behaviors)}"
+    return f"robots with the behavior {' or '.join(behaviors)}" if behaviors else "users and robots"

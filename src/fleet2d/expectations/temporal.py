@@ -168,7 +168,7 @@ class Until(Temporal):
         return min(run.first + _steps(self.within, run), run.end - 1)
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
-        """Return the maximum over goal steps of the least robustness up to that step."""
+        """Return the maximum over later steps t of min(goal at t, least `hold` before t)."""
         hold, goal = self.hold.robustness(run, high), self.goal.robustness(run, high)
         after = run.beyond(-INFINITE, high=high, bounded=self.within is not None)
         whole = hold.until_goal(goal, after)

@@ -186,12 +186,13 @@ def check_judged(expectation: object) -> Expectation:
     """
     if not isinstance(expectation, Expectation):
         raise InputError(
-            f"{expectation!r} is no expectation: write one like"
+            f"{expectation!r} is not an expectation: write one like"
             ' always(distance("ana", "astro") > 0.5)'
         )
     if not expectation.is_judged:
         raise InputError(
-            f"{expectation} doesn't say when: write always(…), never(…), eventually(…), at_end(…)"
+            f"{expectation} doesn't say when: write always(…), never(…), eventually(…), at_end(…),"
+            " until(…), after(…) or at_most(…)"
         )
     return expectation
 

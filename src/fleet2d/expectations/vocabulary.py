@@ -76,7 +76,9 @@ def count(expectation: Expectation, *, per: str | None = None) -> signals.Signal
 def at_most(times: int, expectation: Expectation, *, per: str | None = None) -> Expectation:
     """Expect a condition to begin at most `times` times: each hour, day or week, or in the run."""
     if type(times) is not int or times < 0:
-        raise InputError(f"at_most: {times!r} times: a whole number, 0 or more, is wanted first")
+        raise InputError(
+            f"at_most: the number of times must be a whole number, 0 or more, not {times!r}"
+        )
     count(expectation, per=per)
     return counting.AtMost(times, expectation, per)
 
@@ -166,7 +168,7 @@ def sensor(name: str) -> Expectation:
 
 
 def events(kind: str, entity: str | None = None, *, detail: str | None = None) -> Expectation:
-    """Condition that an event happens: of a kind, to an entity or any, with a detail or any."""
+    """Condition that an event of a kind happens, optionally only to an entity or with a detail."""
     return states.EventHappens(kind, entity, detail)
 
 
@@ -194,6 +196,6 @@ def _part(expectation: object, word: str) -> Expectation:
     if isinstance(expectation, Expectation):
         return expectation
     raise InputError(
-        f"{word}: {expectation} is no condition, which holds or doesn't: compare it, as in"
+        f"{word}: {expectation} is not a condition, which holds or doesn't: compare it, as in"
         ' distance("ana", "astro") > 0.5, or room("ana") == "kitchen"'
     )

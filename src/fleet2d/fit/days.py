@@ -67,7 +67,7 @@ def find_days(timeline: Timeline) -> list[LivedDay]:
 
 
 def _nights(asleep: NDArray[np.bool_], days: int) -> dict[int, tuple[int, int]]:
-    """Return begin and end [min] of the night after each day, the longest of several.
+    """Return begin and end [min] of the night after each day: the longest sleep, if several.
 
     Night -1 is the one before the first day.
     """

@@ -62,7 +62,7 @@ class Timeline:
 
 
 def read_timeline(log: ActivityLog) -> Timeline:
-    """Return the minutes of a log.
+    """Return the state, a place and an activity, of each minute of a log.
 
     Raises:
         LogError: The state is unknown for most of the time.
@@ -80,7 +80,7 @@ def read_timeline(log: ActivityLog) -> Timeline:
 
 
 def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
-    """Return the states of a log, and the index of that in each second of its days, -1 unknown."""
+    """Return the states of a log, and for each second the index of its state, -1 if unknown."""
     kinds = {label: (_kind(label),) for label in log.rooms}
     rule = VisitRule(
         step_us=1_000_000,

@@ -30,7 +30,7 @@ class Validation(NamedTuple):
         days: The number of days, each held back once.
         folds: The number of parts that were held back in turn.
         rooms: The distances of rooms, for each model of MODELS.
-        activities: The distances of activities, likewise.
+        activities: The distances of activities, for each model of MODELS.
     """
 
     days: int
@@ -39,7 +39,7 @@ class Validation(NamedTuple):
     activities: tuple[Distances, ...]
 
     def worse_than_copying(self) -> list[str]:
-        """Return lines about distances of rooms in which the persona is worse than copied days."""
+        """Return a line for each room distance in which the persona is worse than copied days."""
         persona, copies = self.rooms[0], self.rooms[1]
         keys = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
         return [

@@ -289,7 +289,7 @@ class FloorPlan:
         return tuple(self.rooms[other] for other in sorted(linked - {index}))
 
     def rooms_of_type(self, kind: str) -> tuple[Room, ...]:
-        """Return the rooms of a type, then those that have it as a further label."""
+        """Return the rooms of a type, then rooms with it as a secondary type (in `labels`)."""
         normal = room_type(kind)
         first = [room for room in self.rooms if room.type == normal]
         return (*first, *(r for r in self.rooms if normal in r.labels and r.type != normal))

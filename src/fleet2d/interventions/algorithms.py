@@ -56,9 +56,12 @@ class Replace(Lasting):
     @model_validator(mode="after")
     def _is_one_output(self) -> Self:
         if sum(map(bool, (self.rooms, self.values, self.frozen, self.withheld))) != 1:
-            raise problem("one of 'rooms', 'values', 'frozen: true', 'withheld: true' is wanted")
-        if any(weight < 0 for weight in self.rooms.values()):
-            raise problem("a weight of a room is 0 or more")
+            raise problem(
+                "give exactly one of 'rooms', 'values', 'frozen: true' and 'withheld: true'"
+            )
+        for room, weight in self.rooms.items():
+            if weight < 0:
+                raise problem(f"rooms.{room}: weight {weight:g} is negative")
         return self
 
     def check(self, world: World) -> None:

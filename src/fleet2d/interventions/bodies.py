@@ -32,8 +32,8 @@ class BodyIntervention(Intervention):
 class Put(BodyIntervention):
     """Put a body at a place at once, as if it were carried; it decides anew there.
 
-    A robot that is put elsewhere is kidnapped: only its new position shows it. In a room the point
-    is drawn at random; at furniture it is the point from which it is used.
+    A robot is not told that it was moved; it can notice only by its position. In a room the point
+    is drawn at random; at furniture it is the point from which the furniture is used.
     """
 
     to: Place = Field(description="where: a room, furniture, or a point")
@@ -128,16 +128,16 @@ class Replan(BodyIntervention):
 
 @register("intervention", "drive")
 class Drive(BodyIntervention):
-    """Let a body follow only plans from outside, not its behaviors, for the rest of the run."""
+    """Control a body externally for the rest of the run, by plans instead of its behaviors."""
 
     def begin(self, world: World) -> None:
-        """Let it follow plans from outside; without one it stays where it is."""
+        """Let it follow given plans; without a plan it stays where it is."""
         world.drive(body(world, self.entity))
 
 
 @register("intervention", "decide")
 class Decide(BodyIntervention):
-    """Give a plan to a body that follows plans from outside."""
+    """Give a plan to an externally controlled body."""
 
     plan: dict[str, Any] = Field(description="the plan, as Plan.data() returns it")
 

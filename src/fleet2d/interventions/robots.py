@@ -51,7 +51,7 @@ class Call(RobotIntervention):
     def _is_one_command(self) -> Self:
         is_set = (self.to is not None, self.find is not None, self.dock, self.command is not None)
         if sum(is_set) != 1:
-            raise problem("one of 'to', 'find', 'dock: true' and 'command' is wanted")
+            raise problem("give exactly one of 'to', 'find', 'dock: true' and 'command'")
         return self
 
     @property
@@ -113,7 +113,7 @@ class Switch(Lasting):
     @model_validator(mode="after")
     def _has_one_subject(self) -> Self:
         if (self.behavior is None) == (not self.camera):
-            raise problem("'camera: true', a camera's name, or 'behavior' is wanted, one of them")
+            raise problem("give exactly one of 'camera' (true, or a camera's name) and 'behavior'")
         return self
 
     def check(self, world: World) -> None:

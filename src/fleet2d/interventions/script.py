@@ -69,7 +69,7 @@ class Entry(Settings):
     @model_validator(mode="after")
     def _has_one_time(self) -> Self:
         if (self.at is None) == (self.on is None):
-            raise problem("'at' a time or 'on' an event is wanted, one of them")
+            raise problem("give exactly one of 'at' (a time) and 'on' (an event)")
         if self.on is None and self.delay:
             raise problem("'delay' is the time after an event: it goes with 'on'")
         if self.each and self.on is None and not isinstance(self.at, ClockTime):

@@ -20,7 +20,7 @@ class Stick(Lasting):
     sensor: str = Field(description="the sensor")
     says: SensorFault = Field(
         default="silent",
-        description="on: it is always excited; off: never; silent: it reports nothing",
+        description="on: it is always triggered; off: never; silent: it reports nothing",
     )
 
     def check(self, world: World) -> None:

@@ -19,8 +19,8 @@ HOURS = 168  # of a week, from Monday 00:00
 SUM_ERROR = 1e-6  # largest deviation of a distribution's sum from one
 
 
-class Track(NamedTuple):
-    """The belief after each bin of a period, from the evidence up to the end of that bin.
+class BeliefSeries(NamedTuple):
+    """Room probabilities at the end of each bin of a period, given the evidence up to then.
 
     Attributes:
         begin: First step of the first bin.
@@ -46,7 +46,7 @@ class Presence:
         users: Names of the users.
         names: Names of the rows: the users, and anyone.
         time: The local time that it describes.
-        track: For real-time presence, the belief after each bin of the period; else None.
+        track: For real-time presence, the belief at the end of each bin; else None.
 
     Raises:
         ComponentError: Shapes don't fit, a value isn't finite, or rooms don't sum to one.
@@ -66,7 +66,7 @@ class Presence:
         away: F64,
         time: datetime,
         interval: tuple[F64, F64] | None = None,
-        track: Track | None = None,
+        track: BeliefSeries | None = None,
     ) -> None:
         """Keep the arrays, which become read-only.
 
@@ -76,7 +76,7 @@ class Presence:
             away: float64 (users + 1,).
             time: The local time that it describes.
             interval: Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
-            track: The belief after each bin of the period.
+            track: The belief at the end of each bin of the period.
         """
         self.users, self.time, self.track = tuple(users), time, track
         self.names = (*self.users, ANYONE)
@@ -196,7 +196,7 @@ def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArra
 def are_distributions(home: F64, away: F64) -> NDArray[np.bool_]:
     """Return whether shares (..., rooms) sum to one and away (...) is from 0 to 1: bool (...).
 
-    NaN is no distribution.
+    NaN is not a distribution.
 
     Example:
         >>> are_distributions(np.array([[0.5, 0.5], [0.5, 0.6], [np.nan, 1]]), np.zeros(3)).tolist()
@@ -215,7 +215,7 @@ class WeeklyPresence(Presence):
         users: Sequence[str],
         week: tuple[F64, F64],
         time: datetime,
-        track: Track | None = None,
+        track: BeliefSeries | None = None,
     ) -> None:
         """Keep the probabilities for each slot of the week.
 
@@ -224,7 +224,7 @@ class WeeklyPresence(Presence):
             week: Shares float64 (slots, users + 1, rooms), and away float64 (slots, users + 1), for
                 slots of equal length that divide the week from Monday 00:00.
             time: The local time that it describes.
-            track: The belief after each bin of the period.
+            track: The belief at the end of each bin of the period.
         """
         self._week = week
         slot = slot_of_week(time, len(week[1]))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
-from fleet2d.algorithms.presence.belief import Presence, Track
+from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, normalized
 from fleet2d.algorithms.presence.habits import Habits
@@ -70,7 +70,7 @@ class ChainPresence(Presence):
         people: Sequence[PersonForecast],
         time: datetime,
         bin_us: int,
-        track: Track | None = None,
+        track: BeliefSeries | None = None,
     ) -> None:
         """Keep the present distributions.
 
@@ -79,7 +79,7 @@ class ChainPresence(Presence):
             people: The forecast of each user; without users, one forecast, of anyone.
             time: The local time that it describes.
             bin_us: Length of a bin [us].
-            track: The belief after each bin of the period, whose last bin is the present belief.
+            track: The belief at the end of each bin, whose last bin is the present belief.
         """
         self._people, self._bin_us = tuple(people), bin_us
         if track is None:
@@ -210,7 +210,9 @@ class Filter(Model):
         """Return how a user's transitions depend on the hour; None: they don't."""
         return None
 
-    def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
+    def presence(
+        self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
+    ) -> Presence:
         """Return the present belief, which forecasts later times by `at`."""
         pairs = enumerate(zip(self.learner.people, self.followers, strict=True))
         people = [

@@ -139,7 +139,7 @@ class Estimator(Component):
         shape = np.asarray(learned.get("counts", {}).get("over", ())).shape
         if shape != self.counts.shape:
             raise ComponentError(
-                f"what was learned has sums of shape {shape}, but {self.type_name} needs"
+                f"the learned state has sums of shape {shape}, but {self.type_name} needs"
                 f" {self.counts.shape} here (users and anyone, numbers of each): it is from another"
                 " home, other users or another estimator"
             )

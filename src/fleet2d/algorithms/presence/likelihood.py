@@ -266,7 +266,7 @@ class DayEvidence(NamedTuple):
         )
 
     def stretches(self, user: int, longest: int) -> Stretches:
-        """Return the evidence of one user, with equal bins merged."""
+        """Return the evidence of one user, with runs of identical consecutive bins merged."""
         assert self.watched is not None
         assert self.sightings is not None
         return merge_bins(self.minute, self.watched, *self.sightings.of_user(user), longest)

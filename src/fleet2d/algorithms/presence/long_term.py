@@ -56,11 +56,11 @@ class LongTermPresence(Algorithm):
     @model_validator(mode="after")
     def _check_interval(self) -> "LongTermPresence":
         if self.interval is not None and self.by != "overall":
-            raise problem(f"interval is {self.interval:g}, but there are none by: {self.by}")
+            raise problem(f"'interval' can't be combined with 'by: {self.by}': leave one out")
         if self.interval is not None and not self.estimator.has_interval:
             raise problem(
-                f"interval is {self.interval:g}, but {self.estimator.type_name} has none: leave it"
-                " out, or choose another estimator"
+                f"'interval: {self.interval:g}' needs an estimator that has intervals, and"
+                f" {self.estimator.type_name} has none: leave it out, or choose another"
             )
         return self
 

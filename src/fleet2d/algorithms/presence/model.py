@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from fleet2d.algorithms.presence.belief import HOURS, Presence, Track, WeeklyPresence
+from fleet2d.algorithms.presence.belief import HOURS, BeliefSeries, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import F64, Estimator
 from fleet2d.component import Component, OneOf, register
@@ -44,14 +44,16 @@ class Model(Component):
         """
         raise NotImplementedError
 
-    def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
+    def presence(
+        self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
+    ) -> Presence:
         """Return the present belief, which may forecast later times by `at`.
 
         Args:
             users: Names of the users.
             time: Local time at which the last bin ended.
             bin_us: Length of a bin [us].
-            track: The belief after each bin of the period; its last bin is the present belief.
+            track: The belief at the end of each bin; its last bin is the present belief.
         """
         return Presence(users, track.home[-1], track.away[-1], time, track=track)
 
@@ -138,6 +140,8 @@ class HourOfWeek(LongTerm):
         """Return shares of rooms and of away for each hour of the week."""
         return self.estimator.shares(self.estimator.smoothed_week(self.smoothing))
 
-    def presence(self, users: Sequence[str], time: datetime, bin_us: int, track: Track) -> Presence:
+    def presence(
+        self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
+    ) -> Presence:
         """Return the belief for the present hour, and by `at` for others."""
         return WeeklyPresence(users, self.week(), time, track=track)

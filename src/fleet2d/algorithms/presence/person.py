@@ -124,18 +124,19 @@ class StretchPlaces(NamedTuple):
 
 @dataclass
 class PersonDay:
-    """The evidence of one day of a person, and what was learned from it.
+    """The evidence of one day of a person, and the statistics learned from it.
 
     Attributes:
         stretches: The evidence.
         start: float64 (stages, patches), the distribution before the day.
-        future: float64 (stages, patches), the likelihood of the later days given each state.
-        moments: The expected moments of the day.
+        backward: float64 (stages, patches), the backward message from later days: the likelihood
+            of their evidence given each state.
+        moments: The expected sufficient statistics of the day.
     """
 
     stretches: Stretches
     start: F64
-    future: F64
+    backward: F64
     moments: Moments
 
 
@@ -191,9 +192,9 @@ class Person:
             weight: Weight of the day.
         """
         day, moments = self.days[number], self.layout.no_moments()
-        places, end, begin = smooth(self.model, day.stretches, day.start, day.future, moments)
+        places, end, begin = smooth(self.model, day.stretches, day.start, day.backward, moments)
         if number > 0:
-            self.days[number - 1].future = begin
+            self.days[number - 1].backward = begin
         if number + 1 < len(self.days):
             self.days[number + 1].start = end
         else:
@@ -214,7 +215,7 @@ class Person:
             self.total = Moments(*(weight * part for part in self.total))
 
     def forget(self, count: int) -> None:
-        """Keep the last `count` days only; what was learned from the others stays."""
+        """Keep the last `count` days only; the statistics of the others stay."""
         del self.days[:-count]
 
     def remember(self) -> dict[str, Any]:
@@ -249,7 +250,7 @@ def watched_patches(bins: Bins) -> NDArray[np.uint8]:
 def stretches_of(
     bins: Bins, user: int, longest: int, watched: NDArray[np.uint8] | None = None
 ) -> Stretches:
-    """Return the evidence of one user, with equal bins merged.
+    """Return the evidence of one user, with runs of identical consecutive bins merged.
 
     Args:
         bins: The evidence.

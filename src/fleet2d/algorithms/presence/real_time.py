@@ -10,7 +10,7 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_numbers
-from fleet2d.algorithms.presence.belief import ANYONE, Presence, Track, are_distributions
+from fleet2d.algorithms.presence.belief import ANYONE, BeliefSeries, Presence, are_distributions
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.component import OneOf, register
@@ -57,7 +57,7 @@ class RealTimePresence(Algorithm):
             return None
         home, away = self.model.observe(bins)
         self._check(home, away, len(bins.day), state)
-        track = Track(evidence.begin, evidence.bin_steps, home, away)
+        track = BeliefSeries(evidence.begin, evidence.bin_steps, home, away)
         time = state.start + timedelta(
             microseconds=(evidence.begin + len(bins.day) * bins.bin_steps) * step_us
         )

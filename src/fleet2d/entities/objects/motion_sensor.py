@@ -33,7 +33,7 @@ class MotionSensor(Sensor):
     hold: Duration = Field(
         default=timedelta(seconds=5), description="it goes off when nobody moved for this long"
     )
-    robots: bool = Field(default=False, description="whether robots excite it, too")
+    robots: bool = Field(default=False, description="whether robots trigger it, too")
 
     def start(self, home: Home, step_us: int) -> None:
         """Compute its position on the lattice."""

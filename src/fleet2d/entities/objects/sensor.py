@@ -16,7 +16,7 @@ Mask = NDArray[np.bool_]
 
 
 SensorFault = Literal["on", "off", "silent"]
-"""How a sensor fails: it is always excited, never excited, or reports nothing."""
+"""How a sensor fails: it is always triggered, never triggered, or reports nothing."""
 
 
 class SensorReading(NamedTuple):
@@ -59,7 +59,7 @@ class SensorView:
 
 
 class Sensor(HomeObject):
-    """Base of sensors: a subclass implements `sense`, which returns the steps that excite it.
+    """Base of sensors: a subclass implements `sense`, which returns the steps that trigger it.
 
     The readings follow from that: the sensor goes on with the first of those steps, and off after
     its `hold` without any.
@@ -82,19 +82,19 @@ class Sensor(HomeObject):
         raise NotImplementedError
 
     def hold_us(self) -> int:
-        """Return how long it stays on after the last step that excites it [us]."""
+        """Return how long it stays on after the last step that triggers it [us]."""
         return 0
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return the steps that excite it, ascending, and the user of each; int64 (n,) each."""
+        """Return the steps that trigger it, ascending, and the user of each; int64 (n,) each."""
         raise NotImplementedError
 
 
-def first_cause(excited: Mask, first: int) -> tuple[I64, I64]:
-    """Return the steps in which a body excites a sensor, and the lowest row of those that do.
+def first_cause(triggered: Mask, first: int) -> tuple[I64, I64]:
+    """Return the steps in which a body triggers a sensor, and the lowest row of those that do.
 
     Args:
-        excited: Whether each body excites it at each step, bool (bodies, steps).
+        triggered: Whether each body triggers it at each step, bool (bodies, steps).
         first: The step of the first column.
 
     Example:
@@ -102,17 +102,17 @@ def first_cause(excited: Mask, first: int) -> tuple[I64, I64]:
         >>> steps.tolist(), bodies.tolist()
         ([101, 102], [1, 0])
     """
-    columns = np.flatnonzero(excited.any(axis=0))
-    return columns + first, np.argmax(excited[:, columns], axis=0).astype(np.int64)
+    columns = np.flatnonzero(triggered.any(axis=0))
+    return columns + first, np.argmax(triggered[:, columns], axis=0).astype(np.int64)
 
 
 class SensorState:
     """The state of a sensor between spans.
 
     Attributes:
-        hold: How many steps it stays on after the last one that excites it.
+        hold: How many steps it stays on after the last one that triggers it.
         on: Whether it is on.
-        last: The last step that excited it.
+        last: The last step that triggered it.
         user: The index of the user that switched it on; -1: none.
     """
 
@@ -123,7 +123,7 @@ class SensorState:
         self.user = -1
 
     def read(self, steps: I64, users: I64, end: int) -> list[SensorReading]:
-        """Return the readings before step `end`, given the steps that excite it, and their users.
+        """Return the readings before step `end`, given the steps that trigger it, and their users.
 
         Args:
             steps: Ascending, int64 (n,).

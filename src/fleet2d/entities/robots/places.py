@@ -61,7 +61,10 @@ class HangoutPlaces:
         self._seats = dict(enumerate(seats))
 
     def _lay_out(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64, Seats, F64, F64]:
-        """Return the points, their rooms, the seats of each room, `block` and `prox`."""
+        """Return the points, their rooms, the seats of each room, and two costs of each point.
+
+        The costs are `block`, how much it blocks ways, and `prox`, how near it is to a seat.
+        """
         self.points, self.room = self._candidates(avoid, off_doors)
         seats = tuple(read_only(self._seats_of(room)) for room in self._actor.home.rooms)
         block, prox = read_only(self._blocking()), read_only(self._proximity())

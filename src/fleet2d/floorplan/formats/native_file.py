@@ -155,7 +155,7 @@ class ObjectUse(FileModel):
 
 
 class ObjectEntry(ObjectUse):
-    """A piece of furniture or a device; it is no wall."""
+    """A piece of furniture or a device, stored separately from the walls."""
 
     type: Text = Field(description="what it is, such as bed")
     footprint: Area
@@ -192,7 +192,7 @@ class PlanFile(FileModel):
         default=None, description="passages between rooms; left out: the walls are searched"
     )
     objects: Listed[ObjectEntry] = Field(
-        default_factory=list, description="furniture and devices; they are no walls"
+        default_factory=list, description="furniture and devices, which are separate from the walls"
     )
     no_go: Listed[Area] = Field(default_factory=list, description="areas that robots keep out of")
     entrance: Point | None = Field(default=None, description="a place just inside the front door")

@@ -88,7 +88,7 @@ class HomeChange(Settings):
         verbs = [verb for verb in VERBS if getattr(self, verb) is not None]
         if len(verbs) != 1:
             listed = " and ".join(verbs) or "nothing"
-            raise problem(f"{listed} is given: one of {', '.join(VERBS)} is wanted")
+            raise problem(f"{listed} is given: give exactly one of {', '.join(VERBS)}")
         for verb, further in (("move", "to"), ("room", "type")):
             if (verbs[0] == verb) != (getattr(self, further) is not None):
                 raise problem(f"'{verb}' and '{further}' go together")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.output import RoomDistribution
-from fleet2d.algorithms.presence.belief import Presence, Track
+from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.errors import ComponentError
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def presence_of(name: str, state: "Present") -> Presence | None:
 class BeliefReader:
     """Reads what an algorithm believed at the end of each bin of a period.
 
-    That is the output's track of the bins; without a track, it is the forecast of the newest output
+    That is the output's `track`; for an output without one, it is the forecast of the newest output
     before the period.
 
     Attributes:
@@ -79,7 +79,7 @@ class BeliefReader:
         arrays = [previous.at(time).arrays for time in times]
         return np.array([home for home, _ in arrays]), np.array([away for _, away in arrays])
 
-    def _tracked(self, track: Track, history: History, ends: I64) -> tuple[F64, F64] | None:
+    def _tracked(self, track: BeliefSeries, history: History, ends: I64) -> tuple[F64, F64] | None:
         last = track.begin + len(track.away) * track.bin_steps - 1
         begin = int(ends[0]) + 1 - track.bin_steps
         if last < history.first:  # an output of an earlier period: this one had no whole bin
