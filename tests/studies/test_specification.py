@@ -1,6 +1,7 @@
 """Study files: what is read from them, and how wrong ones are refused, with file and line."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, base
@@ -73,3 +74,19 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
 def test_wrong_files_are_refused_with_their_line(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         read_text(text, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("study", "message"),
+    [
+        ({"replicates": 10**400}, "1,000,000 replicates are the most in one study"),
+        ({"axes": {"robots.astro.speed": {"range": [0, 1], "step": 1e-9}}}, "choose a longer step"),
+        ({"axes": {"robots.astro.speed": {"range": [0, 1], "count": 10**9}}}, "1000000"),
+        ({"axes": {"home": {"synthetic": 10**9}}}, "1000000"),
+    ],
+)  # fmt: skip
+def test_axes_of_more_values_than_fit_into_memory_are_refused(
+    study: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        read_specification(study)
