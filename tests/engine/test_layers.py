@@ -186,7 +186,7 @@ def test_layer_is_stored_when_it_is_due_and_at_the_end() -> None:
         values = read_layer(stored, "dust", step)
         assert {dust} == set(values[kitchen].tolist())
         assert {0.0} == set(values[~kitchen].tolist())
-    with pytest.raises(ArtifactError, match="not stored after step 5, but: 239, 479, 599"):
+    with pytest.raises(ArtifactError, match="not stored at step 5; stored steps: 239, 479, 599"):
         read_layer(stored, "dust", 5)
     with pytest.raises(ArtifactError, match="no layer 'dusk': did you mean 'dust'"):
         read_layer(stored, "dusk")

@@ -595,7 +595,7 @@ def test_unknown_keys_are_left_out_with_their_lines(folder: Path) -> None:
         ("radius: 0.2", "radius: .nan", "radius: found nan; a number of 0 or more, 2 at most is w"),
         ("radius: 0.2", f"radius: 1{'0' * 400}", "a number of 0 or more, 2 at most is wanted"),
         ("x: 8.0", "x: [1]", "users.user0.base.pose_config.init_pose.x: found [1]; a number is wa"),
-        ("x: 8.0", "x: 8.0e+9", "would become no valid scenario: users.user0.start: found"),
+        ("x: 8.0", "x: 8.0e+9", "can't be converted to a valid scenario: users.user0.start: found"),
         ("lin_speed: 0.1", "lin_speed: 30", "lin_speed: 30 m in a step of 1 s is 30 m/s; 20 m/s a"),
         ("lin_speed: 0.1", "lin_speed: -1", "lin_speed: found -1; a number of 0 or more is wanted"),
         ("ang_speed: 15", "ang_speed: 1.0e+9", "ang_speed: found 1000000000.0; a number of -3600"),
@@ -620,8 +620,8 @@ def test_wrong_value_is_refused(folder: Path, before: str, after: str, message: 
     [
         ("", "old.yaml is empty"),
         ("[1, 2]", "old.yaml: a scenario is a mapping"),
-        ("floorplan: {type: he}", "and robot, and here is no simulation"),
-        ("simulation: {duration: 1}", "old.yaml is no configuration of the published Fleet2D"),
+        ("floorplan: {type: he}", "and robot: there is no section simulation"),
+        ("simulation: {duration: 1}", "old.yaml is not a configuration of the published Fleet2D"),
         (
             "simulation: {start: 2026-01-05}\nfloorplan: {}",
             "old.yaml is a scenario already: run it",

@@ -145,5 +145,5 @@ def test_what_is_no_household_is_refused_in_plain_words(
 
 
 def test_days_before_the_first_are_not_made_up() -> None:
-    with pytest.raises(ValueError, match="known from"):
+    with pytest.raises(ValueError, match="before the first day"):
         lives().day(MONDAY - 2)

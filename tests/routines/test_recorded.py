@@ -67,7 +67,7 @@ def test_what_a_household_does_together_takes_the_place_of_what_would_be_done() 
 @pytest.mark.parametrize(
     ("days", "words"),
     [
-        (["07:00 wash, 06:00 sleep, 31:00 end"], "rise"),
+        (["07:00 wash, 06:00 sleep, 31:00 end"], "06:00 follows 07:00; write 30:00 if"),
         (["07:00 wash, 23:00 tv, 31:00 end"], "asleep"),
         (["7 wash"], "a time and an activity"),
         (["07:00 wsh, 23:00 sleep, 31:00 end"], "wash"),

@@ -95,7 +95,7 @@ def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None
         (["bundled:base", "--over", OVER], "has no expectations"),
         (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget soon"),
         (["test_flat.py::test_come", "--over", OVER], "did you mean 'test_comes'"),
-        (["test_flat.py::test_more", "--over", OVER], "takes tmp_path"),
+        (["test_flat.py::test_more", "--over", OVER], "other arguments (tmp_path)"),
         (["flat.yaml", "--over", OVER, "--out", "flat.yaml"], "exists already"),
     ],
 )

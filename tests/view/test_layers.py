@@ -87,7 +87,7 @@ def test_a_layer_of_another_step_is_another_picture(layer_run: Any, tmp_path: Pa
 def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run: Any, tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match="stored no layer 'mud'"):
         draw_layer(layer_run, "mud", tmp_path / "a.png")
-    with pytest.raises(ArtifactError, match="not stored after step 60"):
+    with pytest.raises(ArtifactError, match="not stored at step 60"):
         draw_layer(layer_run, "explored.astro", tmp_path / "a.png", 60)
     with pytest.raises(InputError, match=r"not as '\.gif'"):
         draw_layer(layer_run, "dust", tmp_path / "a.gif")

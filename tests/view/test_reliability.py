@@ -1,4 +1,4 @@
-"""Reliability diagrams: forecasts and truth as stored, the same bytes, and what is no presence."""
+"""Reliability diagrams: forecasts and truth as stored, the same bytes, and other tables refused."""
 
 from pathlib import Path
 from typing import Any
@@ -63,12 +63,12 @@ def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Pa
     ("name", "why"),
     [
         ("rpt", "no table 'rpt': did you mean 'rtp'"),
-        ("room_share", "no presence"),
-        ("share", "no presence"),
-        ("key_frames", "no presence"),
+        ("room_share", "no room probabilities"),
+        ("share", "no room probabilities"),
+        ("key_frames", "no room probabilities"),
     ],
 )
-def test_what_is_no_presence_is_refused(
+def test_a_table_without_room_probabilities_is_refused(
     forecast_run: Any, name: str, why: str, tmp_path: Path
 ) -> None:
     with pytest.raises(ArtifactError, match=why):

@@ -1,8 +1,4 @@
-"""Many points seen from one place: which are in sight, and which are in range and angle.
-
-For methods of sight that are not compiled: the queries of many steps, without consecutive
-duplicates.
-"""
+"""Visibility queries for sight methods written in Python: many steps at once, without repeats."""
 
 from fleet2d._core import points_in_reach, points_in_sight, view_queries
 

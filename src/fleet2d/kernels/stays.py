@@ -20,14 +20,14 @@ U8 = NDArray[np.uint8]
 
 
 class Stretches(NamedTuple):
-    """Evidence of one user, with equal consecutive bins merged.
+    """Evidence of one user, with runs of identical consecutive bins merged.
 
     Attributes:
         bins: int64 (stretches,), number of bins of each stretch.
         hour: int64 (stretches,), hour of the day.
         shown: uint8 (stretches, patches), the part of each patch in view, in 1/255; 0 for away,
             the last patch.
-        begin: int64 (stretches + 1,), where each stretch's sightings begin in the next two.
+        begin: int64 (stretches + 1,), offsets of each stretch's sightings in `patch` and `share`.
         patch: int64 (sightings,), where the user was perceived.
         share: float64 (sightings,), share of the steps with a sighting.
     """
@@ -46,7 +46,7 @@ class StayModel(NamedTuple):
     Each room, and away, the last, has its own stages: number room * stages + stage.
 
     Attributes:
-        stay: float64 (stages,), probability of the same stage a bin later.
+        stay: float64 (stages,), probability of remaining in the stage for another bin.
         follow: float64 (stages, rooms + 2), distribution after a stage: each room, away, and the
             next stage of the same room; rows sum to one.
         spread: float64 (patches,), probability of the patch given that a person comes to its room.
@@ -93,9 +93,9 @@ def merge_bins(
         minute: int64 (bins,), begin of each bin [minutes since midnight]; no stretch crosses an
             hour.
         shown: uint8 (bins, patches), as in Stretches, without away.
-        seen_bin: int64 (sightings,), ascending, the bins in which the user was perceived.
-        patch: int64 (sightings,), ascending in each bin, the patches.
-        steps: int64 (sightings,), the numbers of steps.
+        seen_bin: int64 (sightings,), the bin of each sighting, ascending.
+        patch: int64 (sightings,), where the user was perceived, ascending within each bin.
+        steps: int64 (sightings,), the number of steps with a sighting in that bin and patch.
         longest: Largest number of bins in a stretch.
 
     Raises:

@@ -51,13 +51,13 @@ USUAL: dict[str, RoomChoice] = {
 def map_rooms(
     labels: Mapping[str, int], overrides: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
 ) -> dict[str, RoomChoice | None]:
-    """Return the rooms that each label of a log stands for, to be tried in turn.
+    """Return the candidate rooms of each label of a log, best first.
 
-    `("away",)` is out of the home and `("door",)` its front door; None leaves the readings out.
+    `("away",)` means absent and `("door",)` the front door; None leaves the readings out.
 
     Args:
         labels: How many readings each label has.
-        overrides: The user's choices for some labels, before their usual meaning.
+        overrides: The user's choices for some labels; they take precedence over the usual meaning.
         rooms: The rooms of the home.
 
     Raises:
@@ -69,9 +69,9 @@ def map_rooms(
         choice = overrides[label] if label in overrides else _usual(label, rooms)
         if choice is None and label not in overrides:
             raise LogError(
-                f"no room of this home stands for {label!r}, which {count} readings of the log"
-                f" name; say which does by rooms: {{{label}: …}}, one of"
-                f" {', '.join(_names(rooms))}, away, door, or null to leave them out"
+                f"no room of this home stands for {label!r} (readings in the log: {count}); choose"
+                f" one by rooms: {{{label}: …}}: {', '.join(_names(rooms))}, away, door, or null to"
+                " leave these readings out"
             )
         mapped[label] = choice
     return mapped
@@ -89,7 +89,7 @@ def _check_overrides(
         if choice is not None and _first_fit(choice, rooms) is None:
             names = _names(rooms)
             raise LogError(
-                f"rooms: {label!r} is to be {' or '.join(choice)}, but there is no such room"
+                f"rooms: {label!r} is mapped to {' or '.join(choice)}, but there is no such room"
                 f"{suggest(choice[0], names)}, away, door"
             )
 

@@ -51,7 +51,7 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
         notes += [f"{file.name}: {note}" for note in order_notes]
     readings = parts["activities"]
     if parts["sensors"]:
-        readings = _joined(parts["sensors"], readings)
+        readings = _with_activities(parts["sensors"], readings)
     return ActivityLog(path, "uci_adl", first_day, tuple(readings), tuple(notes))
 
 
@@ -102,8 +102,8 @@ def _reading(row: _Row, first_day: date) -> Reading:
     return Reading(since(first_day, begin), since(first_day, end), room, activity, number)
 
 
-def _joined(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
-    """Return the readings of sensors with the activities at that time, and those of being out."""
+def _with_activities(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
+    """Label sensor readings with the concurrent activity, and add readings for absences."""
     begins = [activity.begin_us for activity in activities]
     readings = [reading for reading in activities if reading.room == AWAY]
     for sensor in sensors:

@@ -52,9 +52,9 @@ class LoggedVisit(NamedTuple):
 
     Attributes:
         first: The first step at which the body is there.
-        keep: The step up to which it must stay. A reading that lasts has to be kept only at its
-            begin: its end may be cut for the way to the next visit.
-        last: The last step at which the log says that it is there.
+        keep: The step up to which the body must stay. Of a reading that lasts, only the begin must
+            be kept: its end may be cut for the way to the next visit.
+        last: The last step of the visit according to the log.
         place: The room or kind of room, "away", "door" or "unknown".
         activities: Pairs of a step and the activity from that step on.
     """
@@ -72,7 +72,8 @@ class LoggedVisits(NamedTuple):
     Attributes:
         visits: The visits, in order.
         unmapped: The number of readings whose label stands for no room.
-        overruled: The number of readings of another room than later ones at the same step.
+        overruled: The number of readings without effect, as a later one of another room holds from
+            their first step on.
     """
 
     visits: list[LoggedVisit]
@@ -96,7 +97,7 @@ def visits_of(
         else:
             intervals.append(_interval(reading, choice[0], rule))
     pieces, overruled = _sweep(intervals)
-    return LoggedVisits(_without_gaps(_merged(pieces, rule), rule), unmapped, overruled)
+    return LoggedVisits(_without_gaps(_merge_pieces(pieces, rule), rule), unmapped, overruled)
 
 
 def _interval(reading: Reading, place: str, rule: VisitRule) -> RoomInterval:
@@ -143,8 +144,13 @@ def _sweep(intervals: Sequence[RoomInterval]) -> tuple[list[tuple[RoomInterval, 
     return pieces, len(overruled)
 
 
-def _merged(pieces: Sequence[tuple[RoomInterval, bool]], rule: VisitRule) -> list[LoggedVisit]:
-    """Join pieces in one room to visits; after a long silence at the front door, one is away."""
+def _merge_pieces(
+    pieces: Sequence[tuple[RoomInterval, bool]], rule: VisitRule
+) -> list[LoggedVisit]:
+    """Merge consecutive pieces in a room to a visit.
+
+    A long silence after the front door counts as absence.
+    """
     visits: list[LoggedVisit] = []
     for piece, is_instant in pieces:
         keep = piece.last if is_instant else piece.first

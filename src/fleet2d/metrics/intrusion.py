@@ -66,7 +66,7 @@ class Intrusion(Metric):
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the zones in which a robot intrudes, without social distance."""
+        """Return the intrusion time per zone, leaving out the social zone."""
         return {
             robot: {
                 user: {k: v for k, v in n.items() if k != "social"} for user, n in users.items()

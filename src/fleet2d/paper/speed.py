@@ -1,8 +1,8 @@
-"""Section V.A: the time of the paper's scenarios, beside its own figures.
+"""Section V.A: the time of the paper's scenarios, beside the paper's own numbers.
 
 Every row is measured in a process of its own on one core, `fleet2d run …`, which prepares the home,
 simulates and stores the run; all of that counts. Rows that draw frames are processes of their own,
-too. The paper's figures are from its authors' machine, and show the order of magnitude only.
+too. The paper's numbers are from its authors' machine, and show the order of magnitude only.
 """
 
 import json
@@ -29,26 +29,31 @@ TITLE = "Section V.A: time of the base scenario and its variants"
 PHASES = ("setup", "simulate", "save")
 CROWDS = (2, 5, 10, 20, 50)
 QUICK_CROWDS = (2, 5)
-NO_FIGURE = "–"
+NO_NUMBER = "–"
 NOTES = (
     "the paper builds a cache of visibility once per home, 1 h for a HouseExpo plan and 6 h for a"
     " real one; here nothing is built beforehand",
-    f"{NO_FIGURE}: the paper has no figure",
+    f"{NO_NUMBER}: the paper has no number",
 )
 
 
-class PaperFigure(NamedTuple):
-    """A figure of the paper as text, and as simulated time over wall time if it is known."""
+class PaperNumber(NamedTuple):
+    """A number quoted from the paper.
+
+    Attributes:
+        text: The quotation.
+        speedup: Simulated time over wall time, if the paper gives it.
+    """
 
     text: str
     speedup: float | None = None
 
 
-UNKNOWN = PaperFigure(NO_FIGURE)
-PAPER_BASE = PaperFigure("194 s: 45 load a prebuilt cache, 127 simulate; 13,000 x", 13_000)
-PAPER_CROWDS = {50: PaperFigure("28 min, and all memory", 30 * 86_400 / (28 * 60))}
-PAPER_WATCHED = PaperFigure("8 to 12 x", 10)
-PAPER_CACHE = PaperFigure("6 h to build the cache")
+UNKNOWN = PaperNumber(NO_NUMBER)
+PAPER_BASE = PaperNumber("194 s: 45 load a prebuilt cache, 127 simulate; 13,000 x", 13_000)
+PAPER_CROWDS = {50: PaperNumber("28 min, and all memory", 30 * 86_400 / (28 * 60))}
+PAPER_WATCHED = PaperNumber("8 to 12 x", 10)
+PAPER_CACHE = PaperNumber("6 h to build the cache")
 
 
 @dataclass(frozen=True)
@@ -58,13 +63,13 @@ class SpeedRow:
     Attributes:
         case: The name of the scenario.
         overrides: Changes of the bundled base scenario.
-        paper: The paper's figure.
+        paper: The paper's number.
         frames: The frames to draw; None: none.
     """
 
     case: str
     overrides: tuple[str, ...] = ()
-    paper: PaperFigure = UNKNOWN
+    paper: PaperNumber = UNKNOWN
     frames: FrameSeries | None = None
 
 

@@ -38,7 +38,7 @@ def convert_file(old: Path, new: Path) -> list[str]:
         old key.
 
     Raises:
-        InputError: `old` can't be read or is no such configuration, or `new` exists or can't be
+        InputError: `old` can't be read or isn't such a configuration, or `new` exists or can't be
             written.
         ArtifactError: The disk is full. After any error, there is no file `new`.
     """
@@ -88,12 +88,12 @@ def _convert(reader: ConfigReader, old: Path, new: Path) -> dict[str, Any]:
 
 
 def _validate(data: dict[str, Any], plan_file: Path | None, shown_as: str) -> Scenario:
-    """Return the scenario, fully checked; without a plan's file, with the bundled plan."""
+    """Validate the scenario; if its plan file is missing, use the bundled plan."""
     plan = {"type": "houseexpo", "path": str(plan_file)} if plan_file else {"type": "bundled"}
     try:
         return load_scenario({**data, "floorplan": {**plan, "cell": data["floorplan"]["cell"]}})
     except ScenarioError as error:
-        raise ScenarioError(f"{shown_as} would become no valid scenario: {error}") from None
+        raise ScenarioError(f"{shown_as} can't be converted to a valid scenario: {error}") from None
 
 
 def _move_starts(

@@ -33,8 +33,8 @@ class ConfigReader:
         wrong = [s for s in sections if not isinstance(self.document.data.get(s), Mapping)]
         if wrong:
             raise ScenarioError(
-                f"{self.shown_as} is no configuration of the published Fleet2D: that has the"
-                f" sections simulation, floorplan, users and robot, and here is no {wrong[0]}"
+                f"{self.shown_as} is not a configuration of the published Fleet2D, whose sections"
+                f" are simulation, floorplan, users and robot: there is no section {wrong[0]}"
             )
         if "start" in self.document.data["simulation"] or "path" in self.document.data["floorplan"]:
             raise ScenarioError(
@@ -42,7 +42,7 @@ class ConfigReader:
             )
 
     def remark(self, keys: Keys, text: str, *also: Keys) -> None:
-        """Add a remark about a key, and others; all keys with the same text share one remark."""
+        """Add a remark on one or more keys; equal texts are reported once, with all their keys."""
         self._remarks.setdefault(text, []).extend(".".join(path) for path in (keys, *also))
 
     def finish(self) -> list[str]:

@@ -111,7 +111,7 @@ def _windows(reader: ConfigReader) -> None:
 
 
 def convert_sight(reader: ConfigReader) -> dict[str, Any]:
-    """Return the section `sight`: the method with the name of the provider, if there is one."""
+    """Return the section `sight`: the method that corresponds to the old `fov_provider`."""
     keys: Keys = (*_SIMULATION, "fov_provider")
     provider = reader.text(keys)
     if provider == "Flashlight":

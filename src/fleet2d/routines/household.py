@@ -73,9 +73,9 @@ class JointActivity(Timing):
     @model_validator(mode="after")
     def _has_a_time(self) -> Self:
         if self.at is None and self.between is None:
-            raise problem("what is done together needs 'at' or 'between'")
+            raise problem("a joint activity needs 'at' or 'between'")
         if self.on is None and not self.dates:
-            raise problem("what is done together needs its days: 'on' or 'dates'")
+            raise problem("a joint activity needs its days: 'on' or 'dates'")
         return self
 
 
@@ -114,7 +114,7 @@ class Household(Settings):
         for where, name in named:
             if name not in self.members:
                 hint = did_you_mean(name, self.members)
-                raise problem_at(where, f"{name!r} is no member of the household{hint}")
+                raise problem_at(where, f"the household has no member {name!r}{hint}")
         for name, joint in self.together.items():
             try:
                 find_activity(joint.activity or name, {})
@@ -195,7 +195,9 @@ class Lives:
             ValueError: It is before the first day.
         """
         if ordinal < self._first:
-            raise ValueError(f"the days of a household are known from {self._first} on")
+            raise ValueError(
+                f"day {ordinal} is before the first day of the household, {self._first}"
+            )
         if ordinal < self._next and ordinal not in self._cache:  # draw all days again
             self._cache.clear()
             self._next = self._first
@@ -208,7 +210,7 @@ class Lives:
     def _by_preference(
         self, name: str, rooms: Mapping[str, Sequence[int]]
     ) -> dict[str, Sequence[int]]:
-        """Return a member's rooms by activity, each list rotated by a number drawn once."""
+        """Order the rooms of each activity, beginning at one randomly chosen for this member."""
         draws = Draws(stream_key(self._seed, f"{self._path}.{name}", "own room"), 0)
         shift = draws.below(1 << 20)
         return {
@@ -293,7 +295,7 @@ class Lives:
         return result
 
     def _with_welcome(self, name: str, day: Sequence[Doing], at: int) -> Sequence[Doing]:
-        """Return a day in which a member comes to the door at a time, if it is at leisure then."""
+        """Return a day in which a member comes to the door, if they are free at that time."""
         for i, doing in enumerate(day):
             end = at + WELCOME_S
             if doing.begin <= at < doing.end:

@@ -9,7 +9,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from fleet2d.streams import Draws
@@ -167,17 +167,17 @@ def empirical(quantiles: Sequence[int]) -> Law:
 def draw_weighted(draws: Draws, weights: Sequence[int]) -> int:
     """Draw an index of `weights` with a probability proportional to its weight.
 
+    Args:
+        draws: The random draws.
+        weights: Whole numbers from 0 on, not all 0.
+
     >>> from fleet2d.streams import Draws, stream_key
     >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
     >>> [draw_weighted(draws, [0, 8, 0]) for _ in range(8)]
     [1, 1, 1, 1, 1, 1, 1, 1]
     """
-    at = draws.below(sum(weights))
-    for i, weight in enumerate(weights):
-        at -= weight
-        if at < 0:
-            return i
-    raise ValueError("weights are 0 or more")
+    sums = list(accumulate(weights))
+    return bisect_right(sums, draws.below(sums[-1]))
 
 
 def exp(x: float) -> float:

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.problems import problem
 from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
-from fleet2d.routines.planner import SLEEP, Doing, Job
+from fleet2d.routines.planner import DAY_S, SLEEP, Doing, Job
 from fleet2d.streams import Draws
 
 # Probability of a switch to another day where one is possible [in 16ths], and the largest distance
@@ -63,8 +63,13 @@ def parse_day(value: Any) -> RecordedDay:
             )
         times.append(int(hours) * 3600 + int(minutes) * 60)
         names.append(name.strip())
-    if any(a >= b for a, b in pairwise(times)):
-        raise problem("the times of a recorded day rise; write 25:10 for ten past one at night")
+    for before, after in pairwise(times):
+        if after <= before:
+            hint = f"; write {_clock(after + DAY_S)} if it is on the next date"
+            raise problem(
+                f"times must ascend: {_clock(after)} follows {_clock(before)}"
+                f"{hint if after < DAY_S else ''}"
+            )
     if len(names) < 3 or names[-1] != END or names[-2] != SLEEP:
         raise problem("a recorded day ends asleep: its last entries are 'sleep' and 'end'")
     return RecordedDay(tuple(times[:-1]), tuple(names[:-1]), times[-1])
@@ -73,7 +78,11 @@ def parse_day(value: Any) -> RecordedDay:
 def write_day(day: RecordedDay) -> str:
     """Write a recorded day in the form that `parse_day` reads."""
     entries = [*zip(day.begins, day.activities, strict=True), (day.end, END)]
-    return ", ".join(f"{at // 3600:02}:{at // 60 % 60:02} {name}" for at, name in entries)
+    return ", ".join(f"{_clock(at)} {name}" for at, name in entries)
+
+
+def _clock(at: int) -> str:
+    return f"{at // 3600:02}:{at // 60 % 60:02}"
 
 
 AnyRecordedDay = Annotated[
@@ -149,7 +158,7 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
         result.append(Doing(SLEEP, now, next_wake))
     elif result[-1].activity != SLEEP:
         result[-1] = result[-1]._replace(activity=SLEEP)
-    return _joined(result)
+    return _merge_repeats(result)
 
 
 def _draw_ending(
@@ -161,8 +170,8 @@ def _draw_ending(
     return positions[low + draws.below(high - low)] if high > low else None
 
 
-def _joined(day: Sequence[Doing]) -> list[Doing]:
-    """Return a day in which successive doings of the same activity are joined."""
+def _merge_repeats(day: Sequence[Doing]) -> list[Doing]:
+    """Merge successive doings of the same activity."""
     result: list[Doing] = []
     for doing in day:
         if result and result[-1].activity == doing.activity:

@@ -10,7 +10,9 @@ expected shares are exactly those of the survey:
     stay(a, age)  = (1 - hazard(a, age)) * min(1, target(a) / stayers(a))
     next(b)       ~ target(b) - staying(b)
 
-An episode whose next activity is the same continues. Durations have the survey's means as far as
+Here stayers(a) is the share of people in activity a whose episode doesn't end by its law of
+durations, and staying(b) the share of people that remains in activity b after the step. An episode
+whose next activity is the same continues. Durations have the survey's means as far as
 the shares allow.
 """
 

@@ -45,7 +45,9 @@ def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
         step = steps[-1]
     if step not in steps:
         listed = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
-        raise ArtifactError(f"the layer {name!r} was not stored after step {step}, but: {listed}")
+        raise ArtifactError(
+            f"the layer {name!r} was not stored at step {step}; stored steps: {listed}"
+        )
     table = _table(run, name)
     at_step = table["step"].to_numpy() == step
     row, column, value = (

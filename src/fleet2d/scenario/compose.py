@@ -52,14 +52,14 @@ def compose(
 
 
 def apply_changes(document: Document, changes: Sequence[Document]) -> Document:
-    """Return a composed scenario with changes applied as one; the document is not modified.
+    """Return a composed scenario with all changes applied, or none; the document is not modified.
 
     Args:
         document: A scenario as `compose` returns it.
         changes: Changes, each applied to the one before; see `assignment`.
 
     Raises:
-        ScenarioError: A change deletes an unknown entry, or sets a key in one.
+        ScenarioError: A change deletes an entry, or sets a key of an entry, that doesn't exist.
     """
     change = reduce(merge, changes, Document())
     _refuse_unknown_deletions(document, change)

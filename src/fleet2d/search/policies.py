@@ -141,7 +141,12 @@ def after_empty_looks(
 
 
 def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]) -> list[int]:
-    """Return the order that each time has the most worth, a function of way [s] and gain."""
+    """Return a greedy order: next the site with the largest worth.
+
+    Args:
+        problem: The problem.
+        worth: A function of the time of travel and look [s] and the probability of detection.
+    """
     gain, look = problem.gain.tolist(), problem.look.tolist()
     remaining, order = list(range(len(gain))), list[int]()
     while remaining:

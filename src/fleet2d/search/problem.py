@@ -1,9 +1,9 @@
 """The search problem: probabilities of sites, travel times, and the outcome of an order of looks.
 
-A target stays at one of n sites, or is at none of them. At its end, a look at the target's site
-finds it with a known probability. To minimize the expected time of detection is the graph search
-problem (Li and Chong 2009); with equal probabilities it is that of the traveling deliveryman, or
-minimum latency (Kulich and others, ECMR 2017).
+A target stays at one of n sites, or is at none of them. A look takes time; when it ends at the
+target's site, it detects the target with a known probability. To minimize the expected time of
+detection is the graph search problem (Li and Chong 2009); with equal probabilities it is that of
+the traveling deliveryman, or minimum latency (Kulich and others, ECMR 2017).
 """
 
 from collections.abc import Sequence
@@ -85,7 +85,8 @@ def search_problem(
     """Return a search problem; a number for `look` or `detect` holds for all sites.
 
     Raises:
-        ValueError: Shapes don't fit, or there is a negative or unknown value.
+        ValueError: Shapes don't fit, a value is negative or not finite, or a probability
+            exceeds one.
 
     Example:
         >>> flat = search_problem([0.5, 0.3], [4, 1], [[0, 5], [5, 0]], look=2)

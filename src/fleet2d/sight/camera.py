@@ -41,7 +41,7 @@ class Pan(Settings):
 
 
 class Lens(NamedTuple):
-    """One camera in the integers of the sight kernel; see `fleet2d.kernels.look.Lenses`."""
+    """A camera in integer units for the sight kernel; see `fleet2d.kernels.look.Lenses`."""
 
     near: int  # lattice units
     far: int
@@ -152,7 +152,7 @@ class Camera(Settings):
         return self
 
     def lens(self, units_per_m: float, step_us: int) -> Lens:
-        """Return the camera in the integers of the sight kernel.
+        """Convert the camera to integer units: lattice units, parts of a turn, and steps.
 
         Raises:
             ValueError: The period, or a given `lost_after`, is no multiple of the step.

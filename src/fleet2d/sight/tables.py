@@ -218,7 +218,7 @@ def _check_users(names: Mapping[str, object], key: str, context: TableContext) -
     for name in names:
         if name not in context.users:
             raise ScenarioError(
-                f"{context.path}: perception: {key} names {name!r}, who is no user"
+                f"{context.path}: perception: {key}: there is no user {name!r}"
                 f"{suggest(name, context.users)}"
             )
 
@@ -250,8 +250,8 @@ def _fill_false_positives(
     mean = sum(map(Decimal, rates)) * hours
     if mean > 1:
         raise ScenarioError(
-            f"{context.path}: perception.false_positives: {sum(rates):g} per hour are more than one"
-            f" in each look, {float(1 / hours):g} per hour"
+            f"{context.path}: perception.false_positives: {sum(rates):g} per hour exceeds the"
+            f" limit of one per look ({float(1 / hours):g} per hour at this period)"
         )
     # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
     term, total = decay(mean), 0.0

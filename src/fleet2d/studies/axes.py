@@ -56,7 +56,7 @@ class Axis(Settings):
         return self.columns(name) if self.is_population else ()
 
     def choices(self, name: str) -> list[Choice]:
-        """Return its choices in order.
+        """Return the label and the scenario changes of each value of the axis, in order.
 
         Raises:
             InputError: A file or a package is missing.

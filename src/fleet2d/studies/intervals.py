@@ -42,8 +42,8 @@ class Spread:
     residual: float
     values: int
 
-    def shows(self, size: float, units: Mapping[str, int]) -> bool:
-        """Return whether so many units show with a power of 80 % that a mean isn't zero.
+    def detects(self, size: float, units: Mapping[str, int]) -> bool:
+        """Return whether this sample size detects a mean of `size` with a power of 80 %.
 
         Args:
             size: The mean.
@@ -93,7 +93,7 @@ class MeanEstimate:
         for level, current in self.spread.units.items():
 
             def is_enough(count: int, level: str = level) -> bool:
-                return self.spread.shows(self.mean, {**self.spread.units, level: count})
+                return self.spread.detects(self.mean, {**self.spread.units, level: count})
 
             if current >= 2 and is_enough(MOST_NEEDED):
                 count = bisect_left(range(MOST_NEEDED), True, lo=2, key=is_enough)

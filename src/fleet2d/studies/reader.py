@@ -306,8 +306,9 @@ class Study:
 
     def _with_metric(self, metric: str) -> "pl.DataFrame":
         if metric not in self.metrics:
+            hint = did_you_mean(metric, self.metrics)
             raise InputError(
-                f"no variant has a number {metric!r}{did_you_mean(metric, self.metrics)} There are:"
+                f"no variant has a numeric metric {metric!r}{hint} There are:"
                 f" {', '.join(self.metrics[:20])}{', …' if len(self.metrics) > 20 else ''}"
             )
         pl = _polars()

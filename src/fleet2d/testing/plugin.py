@@ -58,7 +58,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def trial() -> None:
-    """Stand for the trial that a function with @fleet2d.testing.trial gets in each run."""
+    """Placeholder; @fleet2d.testing.trial supplies the real trial in each run."""
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -98,7 +98,7 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
     if best.told_from == 0:
         fewest = math.floor(math.log(error) / math.log(1 - holds)) + 1
         raise InputError(
-            f"seeds={seeds} can't refuse holds={holds:g} with an error of {error:g} at most: take"
+            f"seeds={seeds} is too few to test holds={holds:g} with an error of {error:g}: take"
             f" {max(fewest, seeds + 1)} seeds or more"
         )
     return best

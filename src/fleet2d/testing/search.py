@@ -287,8 +287,9 @@ def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
     function = getattr(module, name)
     others = [name for name in signature(function).parameters if name != "trial"]
     if others or hasattr(function, "pytestmark"):
+        extra = f"other arguments ({', '.join(others)})" if others else "pytest marks"
         raise InputError(
-            f"{path}::{name} takes {', '.join(others) or 'parameters'} beside the trial: only a"
-            " test of a trial alone can be searched"
+            f"{path}::{name} has {extra}: falsify needs a test without marks, whose only argument"
+            " is `trial`"
         )
     return lambda trial: function(trial=trial), getattr(function, ATTRIBUTE)

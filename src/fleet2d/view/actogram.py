@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
-from fleet2d.view.page import HATCH_COLOR, QUIET_COLOR
+from fleet2d.view.overlay import HATCH_COLOR, QUIET_COLOR
 from fleet2d.view.traces import BodyTrace
 
 DAY_US = 86_400_000_000

@@ -56,8 +56,8 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
         table["user"][: places * (len(users) + 1)].to_pylist()
     ):
         raise ArtifactError(
-            f"{algorithm} stored {', '.join(table.column_names[2:])}, which is no presence: name an"
-            " algorithm like rtp or ltp"
+            f"{algorithm} stored {', '.join(table.column_names[2:])}, no room probabilities: choose"
+            " a presence algorithm such as ltp or rtp"
         )
     shares = table["share"].to_numpy().reshape(-1, len(users) + 1, places)
     steps = table["step"].to_numpy().reshape(shares.shape)[:, 0, 0]

@@ -40,7 +40,7 @@ from fleet2d.view.life import (
     draw_view,
     places_of,
 )
-from fleet2d.view.page import LINE_IN, QUIET_COLOR, Chip, Page
+from fleet2d.view.overlay import LINE_IN, QUIET_COLOR, Chip, Overlay
 from fleet2d.view.traces import BodyTrace, trace_of
 
 MOST_BODIES = 4  # users with an actogram, and robots
@@ -186,18 +186,18 @@ class _Picture:
         ]
         self._lay_out_plan()
         self.figure = Figure(figsize=(self.width, self.body), dpi=DPI, facecolor="white")
-        self.page = Page(self.figure)
-        self.life_lines = self.page.lines(self.left, list(self._life_chips()), SMALL)
-        self.room_lines = self.page.lines(self.right - DATES, list(self._room_chips()), SMALL)
+        self.overlay = Overlay(self.figure)
+        self.life_lines = self.overlay.lines(self.left, list(self._life_chips()), SMALL)
+        self.room_lines = self.overlay.lines(self.right - DATES, list(self._room_chips()), SMALL)
         # With few days, the legend starts in the space below their rows.
         days = ROW_MOST * len(self.days[0]) if self.days else 0.0
         self.rows_high = min(self.body - CAPTION - TICKS, days)
         spare = self.body - CAPTION - TICKS - self.rows_high
         lines = max(len(self.life_lines), len(self.room_lines) - int(spare / LINE_IN))
-        self.note_lines = self.page.wrap(self.notes, SEPARATOR, NOTE, self.width - 2 * EDGE)
+        self.note_lines = self.overlay.wrap(self.notes, SEPARATOR, NOTE, self.width - 2 * EDGE)
         self.foot = FOOTER + LINE_IN * (lines + len(self.note_lines))
         self.height = HEADER + self.body + self.foot
-        self.page.resize(self.width, self.height)
+        self.overlay.resize(self.width, self.height)
 
     def _lay_out_plan(self) -> None:
         """Choose the size of the plan, and with it that of the picture."""
@@ -227,10 +227,10 @@ class _Picture:
         top = self.height
         name = scenario.get("name") or "run"
         duration = _length(self.steps * self.step_us)
-        x = self.page.write(EDGE, top - 0.42, self.page.fit(name, 16, 4.0), 16, weight="bold")
+        x = self.overlay.write(EDGE, top - 0.42, self.overlay.fit(name, 16, 4.0), 16, weight="bold")
         subtitle = f"{duration} in {short_name(self.plan.name)}"
-        subtitle = self.page.fit(subtitle, 16, self.width - EDGE - x - 0.15)
-        self.page.write(x + 0.12, top - 0.42, subtitle, 16, color=QUIET_COLOR)
+        subtitle = self.overlay.fit(subtitle, 16, self.width - EDGE - x - 0.15)
+        self.overlay.write(x + 0.12, top - 0.42, subtitle, 16, color=QUIET_COLOR)
         end = self.start + timedelta(microseconds=self.steps * self.step_us)
         digest = self.run.digest
         facts = [
@@ -239,9 +239,9 @@ class _Picture:
             f"seed {self.run.manifest['seed']}",
             f"digest {digest[:12]}" if digest else "no digest",
         ]
-        x = self.page.write(EDGE, top - 0.66, WIDE_SEPARATOR.join(facts), 8.5, color=QUIET_COLOR)
+        x = self.overlay.write(EDGE, top - 0.66, WIDE_SEPARATOR.join(facts), 8.5, color=QUIET_COLOR)
         if self.run.status != "complete":
-            self.page.write(
+            self.overlay.write(
                 x + 0.2, top - 0.66, self.run.status, 8.5, color=ACCENT_COLOR, weight="bold"
             )
 
@@ -261,7 +261,7 @@ class _Picture:
                 draw_sightings(self.rings[robot.name], robot.color, axes)
         for view in self.views:
             draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
-        self.page.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
+        self.overlay.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
 
     def _life_chips(self) -> Iterator[Chip]:
         for user in self.users:
@@ -295,19 +295,20 @@ class _Picture:
             marks = marks_by_day(steps, self.start, self.step_us, len(rooms))
             draw_actogram(self.plan, rooms, marks, self.start, axes, dates=number == 0)
             self._caption(trace, left, bottom + height, width)
-        self.page.legend(x, bottom - TICKS - 0.13, self.room_lines, SMALL)
+        self.overlay.legend(x, bottom - TICKS - 0.13, self.room_lines, SMALL)
 
     def _caption(self, trace: BodyTrace, x: float, y: float, width: float) -> None:
-        name = self.page.fit(trace.name, 9.5, width)
-        self.page.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
+        name = self.overlay.fit(trace.name, 9.5, width)
+        self.overlay.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
         facts = [] if trace.robot else [f"{_percent(float(np.mean(trace.room >= 0)))} at home"]
         share = self._metric("sightings").get(trace.name)
         if share is not None and self.robots:
             facts.append(f"{_percent(share)} of that seen")
         facts += [covers] if (covers := self._covers(trace.name)) else []
-        while len(facts) > 1 and self.page.fit(SEPARATOR.join(facts), SMALL, width).endswith("…"):
+        fit = self.overlay.fit
+        while len(facts) > 1 and fit(SEPARATOR.join(facts), SMALL, width).endswith("…"):
             facts.pop()
-        self.page.write(x, y + 0.09, SEPARATOR.join(facts), SMALL, color=QUIET_COLOR)
+        self.overlay.write(x, y + 0.09, SEPARATOR.join(facts), SMALL, color=QUIET_COLOR)
 
     def _room_chips(self) -> Iterator[Chip]:
         indices = {room for rooms in self.days for room in np.unique(rooms).tolist()}
@@ -324,7 +325,7 @@ class _Picture:
 
     def _footer(self) -> None:
         for number, line in enumerate(reversed(self.note_lines)):
-            self.page.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
+            self.overlay.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
 
     def _metric(self, kind: str) -> Mapping[str, Any]:
         """Return the result of the first metric of a type."""

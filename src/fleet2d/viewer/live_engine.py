@@ -131,7 +131,7 @@ class LiveEngine:
         return intervention_marks(records)
 
     def walls(self) -> int:
-        """Return the number of the walls that block sight now, for `mesh`."""
+        """Return the id of the present set of walls, for `mesh`."""
         mesh = self.simulation.home.walls
         key = id(mesh)
         if key not in self._meshes:
@@ -140,13 +140,13 @@ class LiveEngine:
         return self._meshes[key]
 
     def mesh(self, number: int) -> Mesh:
-        """Return walls by their number.
+        """Return a set of walls by its id.
 
         Raises:
-            InputError: There is no such number.
+            InputError: There is no such set of walls.
         """
         if not 0 <= number < len(self._walls):
-            raise InputError(f"the run has no walls of number {number}")
+            raise InputError(f"there is no set of walls with id {number}")
         return self._walls[number]
 
     def apply(self, order: LiveOrder) -> None:

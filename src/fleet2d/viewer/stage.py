@@ -20,7 +20,7 @@ from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 from fleet2d.view.floorplan import floorplan_axes
 from fleet2d.view.life import RIM_COLOR, SightWalls, field_of_view
-from fleet2d.view.page import QUIET_COLOR
+from fleet2d.view.overlay import QUIET_COLOR
 from fleet2d.viewer.contract import BodyFacts
 from fleet2d.viewer.part import part_of_run
 from fleet2d.viewer.run_facts import bodies_of

@@ -51,7 +51,7 @@ class WallsHistory:
     """The walls of a run over time, each arrangement of doors and furniture once.
 
     Attributes:
-        changes: The steps at which the walls change, with the number of the new walls, in order.
+        changes: The steps at which the walls change, with the id of the new set of walls, in order.
     """
 
     def __init__(self, run: Run, doors: HomeDoors) -> None:
@@ -69,18 +69,18 @@ class WallsHistory:
                 self._replay(step, entity, event, detail)
 
     def mesh(self, number: int) -> Mesh:
-        """Return the walls of an arrangement.
+        """Return a set of walls by its id.
 
         Raises:
-            ArtifactError: There is no such arrangement.
+            ArtifactError: There is no such set of walls.
         """
         if not 0 <= number < len(self._meshes):
-            raise ArtifactError(f"the run has no walls of number {number}")
+            raise ArtifactError(f"there is no set of walls with id {number}")
         return self._meshes[number]
 
     @property
     def count(self) -> int:
-        """Number of different arrangements."""
+        """Number of different sets of walls."""
         return len(self._meshes)
 
     def _replay(self, step: int, entity: str, event: str, detail: str) -> None:
@@ -104,7 +104,7 @@ class WallsHistory:
             self.changes.append(WallsChange(step=step, walls=walls))
 
     def _number(self) -> int:
-        """Return the number of the walls as they are now."""
+        """Return the id of the present set of walls."""
         tall = (item for item in self._home.objects if item.blocks == "sight")
         key = (self._home.shut, tuple((item.name, item.footprint.wkb) for item in tall))
         if key not in self._numbers:

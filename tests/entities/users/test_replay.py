@@ -246,9 +246,10 @@ def test_what_does_not_fit_is_refused_with_what_would(
 
 def test_a_label_that_no_room_stands_for_is_refused_by_name(tmp_path: Path) -> None:
     log = events(tmp_path, [("07:00:00", "Sauna", "Relax")])
-    with pytest.raises(
-        InputError, match=r"users.ben: no room of this home stands for 'Sauna'.*1 read"
-    ):
+    message = (
+        r"users.ben: no room of this home stands for 'Sauna' \(readings in the log: 1\); choose"
+    )
+    with pytest.raises(InputError, match=message):
         run(replay(log))
 
 

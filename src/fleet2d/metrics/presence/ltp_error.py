@@ -212,7 +212,7 @@ class LtpError(LongTermMetric):
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return each user's total variation, metres and day of burn-in."""
+        """Return each user's total variation, earth mover's distance [m] and burn-in day."""
         has_one_user = len(result) == 2  # whose row is equal to that of anyone
         return {
             user: {name: row[name] for name in SHOWN if name in row}

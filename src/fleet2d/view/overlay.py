@@ -1,4 +1,4 @@
-"""A layer for text and legends of a figure, with coordinates in inches."""
+"""Text and legends over a whole figure, at positions in inches."""
 
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
@@ -28,11 +28,11 @@ class Chip(NamedTuple):
     label: str
 
 
-class Page:
-    """A layer over a whole figure, in inches from its lower left corner."""
+class Overlay:
+    """Transparent axes over a whole figure, in inches from its lower left corner."""
 
     def __init__(self, figure: Figure) -> None:
-        """Lay the page over the figure."""
+        """Add the axes to the figure."""
         self._figure = figure
         self._canvas = FigureCanvasAgg(figure)
         self.axes: Axes = figure.add_axes((0, 0, 1, 1), zorder=10)
