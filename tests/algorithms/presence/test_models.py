@@ -15,7 +15,7 @@ from tests.algorithms.presence.worlds import (
     pieces,
 )
 
-from fleet2d.algorithms.presence.belief import Presence, Track
+from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import (
     Filter,
     MarkovDecay,
@@ -39,7 +39,7 @@ def followed(model: Model, bins: Bins, rooms: int, users: int, length: int = 60)
     beliefs = [model.observe(part) for part in pieces(bins, length)]
     home, away = (np.concatenate(parts) for parts in zip(*beliefs, strict=True))
     users_ = [f"u{i}" for i in range(users)]
-    return model.presence(users_, MONDAY, MINUTE, Track(0, 1, home, away))
+    return model.presence(users_, MONDAY, MINUTE, BeliefSeries(0, 1, home, away))
 
 
 @pytest.mark.parametrize("cls", ALL)
