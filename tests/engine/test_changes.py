@@ -359,7 +359,7 @@ def test_homes_without_doors_pay_nothing() -> None:
     [
         ({"changes": [{"at": "1 s", "shut": "dor"}]}, r"changes\.0: there is no door 'dor'"),
         ({"changes": [{"shut": "door"}]}, r"changes\.0: there is no 'at'"),
-        ({"changes": [{"at": "1 s"}]}, "one of open, shut, lock, unlock, move, room is wanted"),
+        ({"changes": [{"at": "1 s"}]}, "exactly one of open, shut, lock, unlock, move, room"),
         ({"changes": [{"at": "1 s", "move": "cart"}]}, "'move' and 'to' go together"),
         ({"changes": [{"at": "1 s", "move": "cart", "to": [99, 9]}]}, "is not in the home"),
         ({"changes": [{"at": "1 s", "move": "bed", "to": [6, 2]}]}, r"no object.*'bed'.*cart"),
