@@ -104,10 +104,10 @@ class RtpScore(Metric):
     unit: ClassVar[str] = "all gaps"
     units: ClassVar[Mapping[str, str]] = {
         "log_loss": "nats, 0 is best",
-        "top_1": "share of minutes in which the likeliest place was right",
-        "ece": "mean difference of forecasts and rates",
-        "skill": "1 is best, 0 like the room seen last",
-        "reference_skill": "1 is best, 0 like the reference",
+        "top_1": "share of minutes guessed right",
+        "ece": "mean gap of forecasts and rates",
+        "skill": "1 best, 0 like last room seen",
+        "reference_skill": "1 best, 0 like the reference",
     }
 
     of: str = Field(description="the algorithm whose presence is scored")
