@@ -31,7 +31,7 @@ def event(step: int, kind: str = "found", entity: str = "ana") -> Event:
 class Short(EventStream):
     """Keeps five events."""
 
-    KEPT = 5
+    CAPACITY = 5
 
 
 def test_every_sink_is_handed_each_event_once_in_the_order_it_became_known() -> None:
