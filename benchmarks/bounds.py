@@ -27,8 +27,9 @@ PAGE = """# How fast
 
 Made by `python benchmarks/bounds.py --page docs/speed.md` from
 [bounds.toml](../benchmarks/bounds.toml): every bound that the project set itself, and what was
-measured on {machine}. Seconds are of the processor, least of several; a dash was not
-measured this time.
+measured on {machine}. Seconds are of the processor, least of several, with one thread for
+linear algebra, as the command line sets it: the others only wait, but their waiting counts as
+processor time. A dash was not measured this time.
 
 | | measured | must | aim | last release |
 | --- | --- | --- | --- | --- |
@@ -193,7 +194,11 @@ def measure(bound: Bound) -> float | None:
     """Return the figure of a bound, measured in a process of its own; None without its data."""
     assert bound.code is not None
     done = subprocess.run(
-        [sys.executable, __file__, "--code", bound.code], check=True, capture_output=True, text=True
+        [sys.executable, __file__, "--code", bound.code],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={"OPENBLAS_NUM_THREADS": "1", **os.environ},
     )
     figure: float | None = json.loads(done.stdout.splitlines()[-1])
     return figure
