@@ -61,7 +61,7 @@ class PoseColumns(NamedTuple):
     away: NDArray[np.uint8]
 
 
-class Blocking:
+class BlockedWays:
     """The bodies of a run that block each other's way.
 
     Attributes:

@@ -7,7 +7,7 @@ from typing import Any
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.blocking import Blocking
+from fleet2d.engine.blocking import BlockedWays
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
@@ -54,7 +54,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
             group.prepare_to_err()
     encounters, clearance = Encounters(users, robots), Clearance(users, robots)
-    blocking = Blocking(users, robots, scenario.simulation.people_block)
+    blocking = BlockedWays(users, robots, scenario.simulation.people_block)
     changes = Changes(scenario.objects, home, clock)
     for index, change in enumerate(scenario.changes):
         with _locate_errors(scenario, f"changes.{index}"):

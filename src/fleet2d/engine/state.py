@@ -12,7 +12,7 @@ from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.observations import OBSERVATION
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.blocking import Blocking
+from fleet2d.engine.blocking import BlockedWays
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
@@ -75,7 +75,7 @@ class State:
     home: Home
     changes: Changes
     clearance: Clearance
-    blocking: Blocking
+    blocking: BlockedWays
     encounters: Encounters
     sensors: Sensors
     gazes: list[Cameras]

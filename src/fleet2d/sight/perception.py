@@ -66,7 +66,7 @@ class Detection(Settings):
         return self
 
 
-class Spot(Settings):
+class MistakenSpot(Settings):
     """A place that is sometimes mistaken for a person: a coat rack, a screen, a mirror."""
 
     at: tuple[Length, Length] = Field(description="where it is [m]", examples=[[2.5, 1.0]])
@@ -85,7 +85,7 @@ class FalsePositives(Settings):
     per_hour: float = Field(
         default=0.0, ge=0, description="per hour of looking, uniform over what is in view"
     )
-    spots: tuple[Spot, ...] = Field(
+    spots: tuple[MistakenSpot, ...] = Field(
         default=(), max_length=64, description="places with rates of their own"
     )
     looks_like: dict[str, Share] = Field(
