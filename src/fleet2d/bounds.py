@@ -102,10 +102,12 @@ LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
 """Size of what an algorithm has learned, unpacked."""
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 """Size of a table, unpacked, that is read at once."""
+VARIANTS = Bound("VARIANTS", 1_000_000, "values")
+"""Values of one axis of a study, and replicates."""
 
 BOUNDS = (
     FILE_BYTES, PICTURE_BYTES, LOG_BYTES, DEPTH, VALUES, JSON_VALUES, PIXELS, POLYGONS, CORNERS,
-    LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES,
+    LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES, VARIANTS,
 )  # fmt: skip
 """All bounds."""
 

@@ -79,10 +79,10 @@ def test_wrong_files_are_refused_with_their_line(tmp_path: Path, text: str, mess
 @pytest.mark.parametrize(
     ("study", "message"),
     [
-        ({"replicates": 10**400}, "1,000,000 replicates are the most in one study"),
-        ({"axes": {"robots.astro.speed": {"range": [0, 1], "step": 1e-9}}}, "choose a longer step"),
-        ({"axes": {"robots.astro.speed": {"range": [0, 1], "count": 10**9}}}, "1000000"),
-        ({"axes": {"home": {"synthetic": 10**9}}}, "1000000"),
+        ({"replicates": 10**400}, "replicates: more than 1,000,000 values"),
+        ({"axes": {"robots.astro.speed": {"range": [0, 1], "step": 1e-9}}}, "more than 1,000,000 values"),
+        ({"axes": {"robots.astro.speed": {"range": [0, 1], "count": 10**9}}}, "FLEET2D_MAX_VARIANTS"),
+        ({"axes": {"home": {"synthetic": 10**9}}}, "FLEET2D_MAX_VARIANTS"),
     ],
 )  # fmt: skip
 def test_axes_of_more_values_than_fit_into_memory_are_refused(

@@ -13,10 +13,9 @@ from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem
 from fleet2d.studies.choice import Choice, Label, key_path, label_values
+from fleet2d.studies.count import Count, check_count
 from fleet2d.studies.sampling import Method, Parameter, draw, rounded
 
-MOST_VALUES = 1_000_000
-"""Values of an axis at most, and replicates: each is a variant, which takes memory."""
 FLOORPLAN_SUFFIXES = (".json", ".geojson", ".yaml", ".yml")
 
 
@@ -94,9 +93,7 @@ class RangeAxis(Axis):
     key: str = Field(description="the key path")
     range: tuple[float, float] = Field(description="first and last number")
     step: float | None = Field(default=None, gt=0, description="from one to the next")
-    count: int | None = Field(
-        default=None, ge=2, le=MOST_VALUES, description="how many, instead of a step"
-    )
+    count: Count | None = Field(default=None, ge=2, description="how many, instead of a step")
     log: bool = Field(default=False, description="with count: by a constant factor")
     unit: str = Field(default="", description="written behind the number: d, cm, %")
 
@@ -107,11 +104,8 @@ class RangeAxis(Axis):
             raise problem("give step, or count")
         if not first < last:
             raise problem(f"found {first:g} to {last:g}; the first must be below the last")
-        if self.step is not None and (last - first) / self.step > MOST_VALUES:
-            raise problem(
-                f"{first:g} to {last:g} by steps of {self.step:g} are more than {MOST_VALUES:,}"
-                " values: choose a longer step"
-            )
+        if self.step is not None:
+            check_count((last - first) / self.step)
         if self.log and (first <= 0 or self.count is None):
             raise problem("log needs a count, and numbers above 0")
         return self
@@ -216,7 +210,7 @@ class SyntheticAxis(Axis):
 
     is_population: ClassVar[bool] = True
 
-    synthetic: Annotated[int, Field(le=MOST_VALUES)] | tuple[int, ...] = Field(
+    synthetic: Count | tuple[int, ...] = Field(
         description="how many homes, from seed 0 on; or a list of seeds"
     )
     first: int = Field(default=0, ge=0, description="the first seed, where a number is given")
@@ -265,7 +259,7 @@ class SampleAxis(Axis):
     """Random or Latin-hypercube samples of several parameters at once."""
 
     sample: dict[str, Parameter] = Field(min_length=1, description="the parameters, by column")
-    count: int = Field(ge=1, le=MOST_VALUES, description="how many samples")
+    count: Count = Field(ge=1, description="how many samples")
     method: Method = Field(default="latin_hypercube", description="latin_hypercube or random")
     seed: int = Field(default=0, ge=0, description="of the samples")
 

@@ -17,7 +17,8 @@ from fleet2d.problems import problem, problem_at, suggest
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.explain import explain
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.axes import MOST_VALUES, AnyAxis
+from fleet2d.studies.axes import AnyAxis
+from fleet2d.studies.count import check_count
 from fleet2d.studies.tune_settings import TuneSettings
 from fleet2d.trust import check_code
 
@@ -65,12 +66,7 @@ def _numbers_or_count(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
         if value < 1:
             raise problem(f"found {one_line(value)}; 1 or more replicates are wanted")
-        if value > MOST_VALUES:
-            raise problem(
-                f"{MOST_VALUES:,} replicates are the most in one study: make several, each with a"
-                " list of its seeds"
-            )
-        return tuple(range(value))
+        return tuple(range(check_count(value)))
     return value
 
 
