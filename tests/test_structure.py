@@ -53,12 +53,8 @@ def reachable(graph: dict[str, set[str]], name: str) -> set[str]:
 
 
 def imports(name: str, path: Path) -> Iterator[str]:
-    """Yield the modules that a module imports when it runs, now or later."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            node.body = []
-    for node in ast.walk(tree):
+    """Yield the modules that a module imports: at once, later, or for types only."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             targets = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

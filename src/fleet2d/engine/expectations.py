@@ -1,31 +1,23 @@
 """Expectations of a run: measured during the run, judged at any time and at its end."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fleet2d.algorithms.log import SensorRow
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
-from fleet2d.engine.gauges import Block, Gauge, ValueGauge
-from fleet2d.engine.signal_gauges import BatteryGauge, gauge_of
-from fleet2d.engine.state import State
+from fleet2d.engine.gauges import BatteryGauge, Block, Gauge, ValueGauge
+from fleet2d.engine.learners import Learners
 from fleet2d.engine.tables import STEP, TIME
 from fleet2d.entities.actor import Actor
-from fleet2d.errors import InputError
 from fleet2d.events import Event
 from fleet2d.expectations.expectation import Expectation, RunSignals
-from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import Measurement
-from fleet2d.expectations.verdict import Verdict, check_judged, verdict_of
+from fleet2d.expectations.verdict import Verdict, verdict_of
 from fleet2d.metrics.metric import Metric
-from fleet2d.scenario.model import Scenario
-from fleet2d.units import MICROSECOND
 
 TABLE = "violations"
 
@@ -54,16 +46,30 @@ class Expecting:
         self._events: list[Event] = []
         self._end = 0
 
-    def add(self, name: str, expectation: Expectation, since: int, state: State) -> None:
-        """Add an expectation from a step on; its signals are measured from the present step on."""
-        self._end = state.settled
+    def add(
+        self,
+        name: str,
+        expectation: Expectation,
+        since: int,
+        settled: int,
+        gauge_of: Callable[[Measurement], Gauge],
+    ) -> None:
+        """Add an expectation from a step on.
+
+        Args:
+            name: Its name.
+            expectation: The expectation.
+            since: The step.
+            settled: The present step, from which on its signals are measured.
+            gauge_of: Makes the gauge of a signal.
+        """
+        self._end = settled
         for signal in expectation.measures():
             if str(signal) not in self._gauges:
-                self._measure(signal, state)
+                self._measure(signal, gauge_of(signal))
         self.entries[name] = ActiveExpectation(expectation, since)
 
-    def _measure(self, signal: Measurement, state: State) -> None:
-        gauge = gauge_of(signal, state, self._clock.step_us)
+    def _measure(self, signal: Measurement, gauge: Gauge) -> None:
         self._gauges[str(signal)] = gauge
         if isinstance(gauge, BatteryGauge):
             self._batteries[signal.robot] = gauge  # type: ignore[attr-defined]
@@ -82,39 +88,28 @@ class Expecting:
         if actor.name in self._batteries:
             self._batteries[actor.name].begin_plan(actor)
 
-    def learned(self, step: int, state: State) -> None:
+    def learned(self, step: int, learners: Learners) -> None:
         """Measure the outputs of algorithms and the results of metrics before a step."""
-        learners = state.learners
+        results = {
+            learner.name: learner.component.result
+            for learner in learners.all
+            if isinstance(learner.component, Metric) and learner.since == step
+        }
         for (kind, name), gauges in self._value_gauges.items():
             for gauge in gauges:
                 if kind == "OutputSignal" and name in learners.fresh:
                     gauge.note(step, learners.fresh[name])
-                elif kind == "MetricSignal":
-                    self._note_metric(gauge, name, step, state)
+                elif kind == "MetricSignal" and name in results:
+                    gauge.note(step, results[name]())
 
-    def _note_metric(self, gauge: ValueGauge, name: str, step: int, state: State) -> None:
-        for learner in state.learners.all:
-            metric = learner.component
-            if learner.name == name and isinstance(metric, Metric) and learner.since == step:
-                gauge.note(step, metric.result())
-
-    def take(
-        self,
-        first: int,
-        end: int,
-        state: State,
-        observations: NDArray[np.int64],
-        readings: Sequence[SensorRow],
-    ) -> None:
-        """Measure the steps from `first` to `end` - 1, in which the home is as it is now."""
-        events = [event for event in self._events if event.step < end]
-        self._events = [event for event in self._events if event.step >= end]
-        events.sort(key=lambda event: (event.step, event.rank))
-        names = state.sensors.names
-        block = Block(first, end, state.bodies, state.home, observations, readings, events, names)
+    def take(self, block: Block) -> None:
+        """Measure the signals over a block of steps; its events are those of `take_events`."""
+        events = [event for event in self._events if event.step < block.end]
+        self._events = [event for event in self._events if event.step >= block.end]
+        block.events = sorted(events, key=lambda event: (event.step, event.rank))
         for gauge in self._gauges.values():
             gauge.take(block)
-        self._end = end
+        self._end = block.end
 
     # Judging
 
@@ -193,61 +188,3 @@ def store_violations(store: RunStore, verdicts: Mapping[str, Verdict], clock: Cl
         worst_step=np.array(worst, np.int64),
         robustness=np.where(np.isfinite(value), value, np.nan),
     )
-
-
-def expect(
-    state: State,
-    scenario: Scenario,
-    clock: Clock,
-    name: str,
-    expectation: Expectation,
-    since: int,
-) -> None:
-    """Add an expectation to a run, from a step on.
-
-    Raises:
-        ScenarioError: It names something unknown or an impossible event, or lasts too long.
-        InputError: It has no time, or there is another one of that name.
-    """
-    check_judged(expectation)
-    expectation.check(
-        scene_of(state, scenario, (clock.steps - since) * clock.step_us * MICROSECOND)
-    )
-    if state.expecting is None:
-        state.expecting = Expecting(clock)
-        state.events.sinks.append(state.expecting)
-    if name in state.expecting.entries:
-        raise InputError(f"{name!r} is expected already: give this another name")
-    state.expecting.add(name, expectation, since, state)
-
-
-def scene_of(state: State, scenario: Scenario, remaining: timedelta) -> Scene:
-    """Return the names of a run that expectations may use."""
-    users = state.bodies.users
-    behaviors = {
-        actor.name: [_type_of(behavior) for behavior in actor.behaviors] or ["own"]
-        for actor in state.actors
-    }
-    return Scene(
-        users=[actor.name for actor in state.actors[:users]],
-        robots=[actor.name for actor in state.actors[users:]],
-        rooms=[name for room in state.home.rooms for name in (room.name, room.type)],
-        things=[item.name for item in state.home.plan.objects],
-        doors=state.changes.names,
-        sensors=state.sensors.names,
-        algorithms=list(scenario.algorithms),
-        metrics=list(scenario.metrics),
-        batteries=[actor.name for actor in state.actors if actor.charge is not None],
-        cameras={
-            c.owner.name: [other.name for other in c.others] for c in [*state.gazes, *state.cameras]
-        },
-        behaviors=behaviors,
-        records=[kind for a in state.actors for b in a.behaviors for kind in b.records],
-        remaining=remaining,
-    )
-
-
-def _type_of(behavior: Any) -> str:
-    """Return the type of a built-in behavior, "own" of any other."""
-    name = str(behavior.type_name)
-    return "own" if ":" in name or "." in name else name

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.engine.bodies import Bodies
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.battery import Course
 from fleet2d.events import Event, EventKind
 from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
@@ -20,8 +22,12 @@ from fleet2d.kernels.signals import distances_between, distances_to_shape, speed
 
 I64 = NDArray[np.int64]
 
+# The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
+PARTS = 1000
+ROUNDING = 1e-9
 
-@dataclass(frozen=True)
+
+@dataclass
 class Block:
     """The steps from `first` to `end` - 1, in which the home doesn't change.
 
@@ -32,8 +38,8 @@ class Block:
         home: The home in these steps.
         observations: The observations of robots, int64 (n, OBSERVATION).
         readings: The readings of sensors.
-        events: The events, in order of step.
         sensors: Names of the sensors, in the order of their numbers.
+        events: The events, in order of step.
     """
 
     first: int
@@ -42,8 +48,8 @@ class Block:
     home: Home
     observations: I64
     readings: Sequence[SensorRow]
-    events: Sequence[Event]
     sensors: Sequence[str]
+    events: Sequence[Event] = ()
 
 
 class Gauge:
@@ -249,6 +255,35 @@ class EventGauge(Gauge):
             and self._detail in (None, event.detail)
         ]
         return pulses(np.array(steps, np.int64), block.first, block.end)
+
+
+class BatteryGauge(Gauge):
+    """Measures the charge of a robot, plan by plan."""
+
+    def __init__(self, actor: Actor) -> None:
+        super().__init__()
+        self._courses: list[Course] = []
+        self._step_us = actor.clock.step_us
+        self.begin_plan(actor)
+
+    def begin_plan(self, actor: Actor) -> None:
+        """Add the course of the charge along a new plan."""
+        if actor.charge is not None and hasattr(actor, "motion"):
+            course = actor.charge.course(actor.motion)
+            self._courses = [c for c in self._courses if c.begins[0] < course.begins[0]]
+            self._courses.append(course)
+
+    def _measure(self, block: Block) -> Trace:
+        moments = np.arange(block.first, block.end, dtype=np.int64) * self._step_us
+        begins = np.array([course.begins[0] for course in self._courses], np.int64)
+        edges = [0, *np.searchsorted(moments, begins[1:]).tolist(), len(moments)]
+        pieces = [
+            course.levels(np.maximum(moments[a:b], course.begins[0]))
+            for course, a, b in zip(self._courses, edges, edges[1:], strict=False)
+        ]
+        charge = np.floor(np.concatenate(pieces) * PARTS + ROUNDING) / PARTS
+        self._courses = self._courses[-1:]
+        return shortest(np.arange(block.first, block.end), charge, block.end)
 
 
 class PerceivedGauge(Gauge):

@@ -5,7 +5,7 @@ from typing import Any
 
 from fleet2d.artifacts.manifest import Status
 from fleet2d.engine.control import Steering
-from fleet2d.engine.expectations import expect
+from fleet2d.engine.expect import expect
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.parse import parse_expectation

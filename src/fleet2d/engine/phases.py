@@ -174,7 +174,7 @@ def _update(state: State, log: Log, end: int) -> None:
         state.count_looks()
         learners.update(end, log, events)
         if state.expecting is not None:
-            state.expecting.learned(end, state)
+            state.expecting.learned(end, learners)
         for name, output in learners.fresh.items():
             if isinstance(output, HomeChanges) and name not in learners.replaced:
                 for change in output.changes:

@@ -13,7 +13,7 @@ from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.expectations import expect
+from fleet2d.engine.expect import expect
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners

@@ -1,4 +1,4 @@
-"""The gauge for each signal, and the gauges of batteries and of cameras."""
+"""The gauge for each signal, and the gauge of cameras."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -11,6 +11,7 @@ from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.gauges import (
     ActivityGauge,
     AwayGauge,
+    BatteryGauge,
     Block,
     DistanceGauge,
     DoorGauge,
@@ -21,16 +22,14 @@ from fleet2d.engine.gauges import (
     SeenGauge,
     SensorGauge,
     SpeedGauge,
+    SwitchGauge,
     ValueGauge,
     outline,
 )
 from fleet2d.engine.state import State
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.battery import Course
 from fleet2d.errors import ScenarioError
 from fleet2d.expectations import quantities, states
 from fleet2d.expectations.signals import Measurement
-from fleet2d.expectations.trace import Trace, shortest
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
 from fleet2d.kernels.look import SightMemory
@@ -38,40 +37,8 @@ from fleet2d.problems import suggest
 
 I64 = NDArray[np.int64]
 
-# The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
-PARTS = 1000
-ROUNDING = 1e-9
 # The chance of a lens that notices all bodies in view.
 CERTAIN = 2**53
-
-
-class BatteryGauge(Gauge):
-    """Measures the charge of a robot, plan by plan."""
-
-    def __init__(self, actor: Actor) -> None:
-        super().__init__()
-        self._courses: list[Course] = []
-        self._step_us = actor.clock.step_us
-        self.begin_plan(actor)
-
-    def begin_plan(self, actor: Actor) -> None:
-        """Add the course of the charge along a new plan."""
-        if actor.charge is not None and hasattr(actor, "motion"):
-            course = actor.charge.course(actor.motion)
-            self._courses = [c for c in self._courses if c.begins[0] < course.begins[0]]
-            self._courses.append(course)
-
-    def _measure(self, block: Block) -> Trace:
-        moments = np.arange(block.first, block.end, dtype=np.int64) * self._step_us
-        begins = np.array([course.begins[0] for course in self._courses], np.int64)
-        edges = [0, *np.searchsorted(moments, begins[1:]).tolist(), len(moments)]
-        pieces = [
-            course.levels(np.maximum(moments[a:b], course.begins[0]))
-            for course, a, b in zip(self._courses, edges, edges[1:], strict=False)
-        ]
-        charge = np.floor(np.concatenate(pieces) * PARTS + ROUNDING) / PARTS
-        self._courses = self._courses[-1:]
-        return shortest(np.arange(block.first, block.end), charge, block.end)
 
 
 class PerfectCameras(Cameras):
@@ -90,30 +57,21 @@ class PerfectCameras(Cameras):
         return memory
 
 
-class InViewGauge(Gauge):
+class InViewGauge(SwitchGauge):
     """Measures whether a body is in view of a camera, by perfect cameras at the same place."""
 
     def __init__(self, state: State, cameras: Cameras, body: str) -> None:
-        super().__init__()
+        super().__init__(False)
         actors, users = state.actors, state.bodies.users
         self._cameras = PerfectCameras(cameras.row, actors, users, cameras.method, cameras.radii)
         self._cameras.next_step = state.settled
-        self._body, self._is_seen = body, False
+        self._body = body
 
-    def _measure(self, block: Block) -> Trace:
+    def _changes(self, block: Block) -> list[tuple[int, float]]:
         events = self._cameras.take(block.bodies, block.end)
         self._cameras.collect()
         _, seen = self._cameras.event_names
-        start, value = [block.first], [float(self._is_seen)]
-        for event in events:
-            if event.detail == self._body:
-                self._is_seen = event.event == seen
-                if event.step == start[-1]:
-                    value[-1] = float(self._is_seen)
-                else:
-                    start.append(event.step)
-                    value.append(float(self._is_seen))
-        return shortest(np.array(start, np.int64), np.array(value), block.end)
+        return [(e.step, float(e.event == seen)) for e in events if e.detail == self._body]
 
 
 # The gauge for each signal

@@ -3,7 +3,7 @@
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.expectations import Expecting
+from fleet2d.engine.gauges import Block
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
@@ -30,9 +32,6 @@ from fleet2d.events import Event, EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
-
-if TYPE_CHECKING:
-    from fleet2d.engine.expectations import Expecting
 
 # The most steps that watchers take in together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16
@@ -94,7 +93,7 @@ class State:
     driven: set[int] = field(default_factory=set)
     requested: frozenset[str] = frozenset()
     awaited: frozenset[str] = frozenset()
-    expecting: "Expecting | None" = None
+    expecting: Expecting | None = None
     notes_emitted: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -202,7 +201,10 @@ class State:
             self.interventions.take_events(self.sensors.events_of(readings))
         self.recorder.take(first, end, observations, readings)
         if self.expecting is not None:
-            self.expecting.take(first, end, self, observations, readings)
+            names = self.sensors.names
+            self.expecting.take(
+                Block(first, end, self.bodies, self.home, observations, readings, names)
+            )
         if self.log is not None:
             self.log.observe(observations)
             self.log.readings += readings
